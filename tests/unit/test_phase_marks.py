@@ -159,3 +159,16 @@ def test_where_no_name_tells_the_power_or_the_nominal_voltage_does(tmp_path):
 def test_names_in_other_languages_say_line_or_ground(name, line):
     meant = role(name, "kV", "rst" if "R" in name else "abc")
     assert (meant.quantity, meant.line) == ("U", line)
+
+
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [
+        *((name, 1.0) for name in ("Uline", "U line", "Uлин", "U_л", "Line voltage")),
+        *((name, np.sqrt(3)) for name in ("Phase voltage", "U phase", "V_phase", "Uф")),
+    ],
+)
+def test_line_or_phase_said_in_a_word(tmp_path, name, share):
+    t, U, P, Q = slow()
+    got, _ = read(tmp_path / "a.csv", f"t,{name} (kV),P (MW),Q (Mvar)", [t, U / share, P, Q])
+    assert got == pytest.approx(SIZE, rel=0.01)

@@ -41,9 +41,7 @@ def starting_level(
         if last.shape[1] > 1 and (np.ptp(last, axis=1) <= limits * middle).all():
             return middle
     first = levels[:, :most]
-    middle = np.maximum(
-        np.array([np.median(first[:, : k + 1], axis=1) for k in range(first.shape[1])]).T, 1e-12
-    )
+    middle = np.maximum(measure_growing_medians(first), 1e-12)
     stays = np.all(np.abs(first / middle - 1) <= limits[:, None] / 2, axis=0)
     # a dead channel leaves nothing
     count = len(stays) if stays.all() else max(1, int(np.argmin(stays)))
@@ -85,13 +83,12 @@ def falls(
         part = U[k : k + block]
         below = part < (1 - margin) * reference
         if not below.any():
-            if float(np.median(part)) > (1 + margin) * reference and (
-                swell := _swell(t, U, k, reference, margin)
-            ):
+            level = measure_median(part)
+            if level > (1 + margin) * reference and (swell := _swell(t, U, k, reference, margin)):
                 swells.append(swell)
                 k = swell[1]
                 continue
-            reference += 0.1 * (float(np.median(part)) - reference)
+            reference += 0.1 * (level - reference)
             k += len(part)
             continue
         crossing = k + int(np.argmax(below))
@@ -104,9 +101,23 @@ def falls(
         dips.append((start, end))
         # the higher: the short one where another dip follows soon, the long one while U still rises
         if end < len(U):
-            reference = max(float(np.median(U[end : end + n])) for n in (FEWEST_BEFORE, block))
+            reference = max(measure_median(U[end : end + n]) for n in (FEWEST_BEFORE, block))
         k = end
     return dips, swells
+
+
+def measure_median(x: np.ndarray) -> float:
+    """The median of finite values (N,), N at least 1; of few much sooner than NumPy's."""
+    low, high = (len(x) - 1) // 2, len(x) // 2
+    ordered = np.partition(x, (low, high))
+    return float(ordered[low] + ordered[high]) / 2
+
+
+def measure_growing_medians(x: np.ndarray) -> np.ndarray:
+    """The medians (K, N) of the first 1, 2, ... N of finite values (K, N)."""
+    at = np.arange(x.shape[1])
+    ordered = np.sort(np.where(at <= at[:, None], x[:, None], np.inf), axis=2)
+    return (ordered[:, at, at // 2] + ordered[:, at, (at + 1) // 2]) / 2
 
 
 def margin_of(U: np.ndarray) -> float:

@@ -16,6 +16,7 @@ from itertools import zip_longest
 
 from tractexp.recording.phase_mark import (
     DIGITS,
+    MOST_KNOWN_NAMES,
     ORDERS,
     QUANTITY,
     pairs,
@@ -142,7 +143,12 @@ def phase(channel: Channel, orders: Sequence[str] = ORDERS) -> str:
     """The phase that a channel's label gives in one of the orders: one or two of a, b, c; "" where
     it gives none.
     """
-    label = re.sub(r"phasen?|phase|fase|фaзa|[-_/ 相]", "", plain(channel.phase))
+    return _read_phase(channel.phase, tuple(orders))
+
+
+@functools.lru_cache(maxsize=MOST_KNOWN_NAMES)
+def _read_phase(label: str, orders: tuple[str, ...]) -> str:
+    label = re.sub(r"phasen?|phase|fase|фaзa|[-_/ 相]", "", plain(label))
     label = re.sub(r"(?<=.)(?:n|g|e|pe|gnd)$", "", label)  # to ground, as a phase by itself is
     for text in (label, label.removeprefix("l"), label[1:] if label[:1] in QUANTITY else ""):
         marks = [*text.replace("l", "")]
@@ -244,10 +250,15 @@ def _two_may_do(label: tuple[str, str, bool], places: Mapping[int, list[int]], s
     return len(have) == 2 and (label[2] or (label[1] != "123" and (sure or label[1] != "uvw")))
 
 
-def _marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
+@functools.lru_cache(maxsize=MOST_KNOWN_NAMES)
+def _marks(text: str) -> tuple[tuple[str, str, bool, int, float], ...]:
     """Every reading of a name: (the name without the mark, alphabet, whether a pair, 0 to 2, how
     likely).
     """
+    return tuple(_read_marks(text))
+
+
+def _read_marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
     for letters in ORDERS:
         for mark in pairs(text, letters):
             x, y = mark.places

@@ -17,9 +17,12 @@ DIGITS = "123"
 # letters that look like Latin ones, as phases are often typed
 CYRILLIC = str.maketrans("авсеіо", "abceio")
 LATIN = {latin: other for other, latin in CYRILLIC.items()}
+MOST_KNOWN_NAMES = 8192  # whose reading is kept: each load of a file asks for it again
 QUANTITY = "uvie"  # letters before a phase's: U, V, E of a voltage, I of a current
 GROUND = r"n|g|e|pe|gnd|neutral|ground|earth|neutro|tierra|terre|erde"
 SAID = (  # what is said in words, and the word that stands for it
+    (r"^(?:phase[- ]?voltage|voltage[- ]phase|[uv][ _]?(?:phase|ф))$", "voltage ln"),
+    (r"^[uv][ _]?(?:line|лин|л)$", "voltage ll"),
     (r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:l|line|ph|phase)(?![a-z\d])", " ll "),
     (
         r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:n|g|neutral|ground|earth)(?![a-z\d])",
@@ -55,6 +58,7 @@ class PhaseMark:
         return "".join("abc"[place] for place in self.places)
 
 
+@functools.lru_cache(maxsize=MOST_KNOWN_NAMES)
 def plain(text: str) -> str:
     """Lower case, full-width and Roman characters and look-alike Cyrillic letters as Latin ones."""
     return unicodedata.normalize("NFKC", text).strip().lower().translate(CYRILLIC)

@@ -20,6 +20,8 @@ UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded fee
 # windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short
 # record)
 LONG_SNAPSHOT_WINDOWS = 25
+# of a spectrum, so that a short one has lines between those that its samples tell apart
+FEWEST_LINES = 1 << 14
 
 
 # {recording: {(number, segment, f): (phasors, rest)}}: each load, bus and check of a file asks for
@@ -51,6 +53,9 @@ class Snapshots:
         """Whether the channel is a wave of this frequency in at least some of the windows where it
         is largest.
         """
+        return self.remember(("pure", number), lambda: self._turns(number))
+
+    def _turns(self, number: int) -> bool:
         k = self.numbers.index(number)
         size = np.abs(self.X[k])
         if not np.isfinite(size).any() or np.nanmax(size) == 0:
@@ -183,7 +188,7 @@ def _line(
     wave = np.nan_to_num(waves[int(np.argmax(size))])
     if not np.any(wave):
         return None
-    padded = 8 * n
+    padded = max(2 * n, min(8 * n, FEWEST_LINES))
     power = np.abs(np.fft.rfft((wave - wave.mean()) * np.hanning(n), padded)) ** 2
     lines = np.fft.rfftfreq(padded, 1 / segment.rate)
     power[(lines < 10) | (lines > 75)] = 0

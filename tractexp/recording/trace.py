@@ -177,8 +177,13 @@ def _track_frequency(phasors: Phasors, nominal: float) -> np.ndarray:
     n = len(phasors.t)
     step = (phasors.t[-1] - phasors.t[0]) / max(n - 1, 1)
     half = max(1, round(2.5 / nominal / step)) if step > 0 else 1
-    knots = np.arange(0, n, half)
-    smooth = np.array([np.median(phasors.f[max(k - half, 0) : k + half + 1]) for k in knots])
+    knots, smooth = np.arange(0, n, half), np.empty(len(range(0, n, half)))
+    whole = (knots >= half) & (knots + half < n)  # whose five cycles lie within the record
+    if whole.any():
+        views = np.lib.stride_tricks.sliding_window_view(phasors.f, 2 * half + 1)
+        smooth[whole] = np.median(views[knots[whole] - half], axis=1)
+    for j in np.flatnonzero(~whole):
+        smooth[j] = np.median(phasors.f[max(knots[j] - half, 0) : knots[j] + half + 1])
     return np.clip(np.interp(np.arange(n), knots, smooth), 0.9 * nominal, 1.1 * nominal)
 
 
