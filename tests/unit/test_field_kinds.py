@@ -241,6 +241,53 @@ def test_a_bus_tells_the_fault_that_its_circuits_end_at_different_instants(tmp_p
     [bus] = [line for line in str(seen.summary()).splitlines() if line.strip().startswith("bus 1")]
     assert "dip at 0.99" in bus
     assert "1200 ms" in bus
+    assert "phase a to 5" in bus
+
+
+def bus_line(path):
+    seen, _ = look(path)
+    [bus] = [line for line in str(seen.summary()).splitlines() if line.strip().startswith("bus 1")]
+    return bus, seen
+
+
+@pytest.mark.parametrize(
+    ("fallen", "named"), [((0,), "a"), ((1,), "b"), ((2,), "c"), ((0, 2), "a and c")]
+)
+def test_a_bus_tells_which_phase_fell(tmp_path, fallen, named):
+    t = np.arange(0, 2, 1 / RATE)
+    fault = (t >= 1) & (t < 1.2) & np.isin(np.arange(3), fallen)[:, None]
+    V = 110 / np.sqrt(3) * np.where(fault, 0.1, 1.0) * TURN
+    I = np.conj((20 + 8j) / 110**2) * V
+    rows = [
+        (f"{letter}{p}", unit, x)
+        for letter, unit, z in (("U", "kV", V), ("I", "kA", I))
+        for p, x in zip("ABC", waves(z, t), strict=True)
+    ]
+    bus, seen = bus_line(written(tmp_path, t, rows))
+    assert f"phase{'s' * (len(fallen) > 1)} {named} to 10" in bus
+    [event] = seen.events.rows
+    shares = [0.1 if k in fallen else 1.0 for k in range(3)]
+    assert event["phases"] == pytest.approx(shares, abs=0.02)
+    assert named in event["why"]
+
+
+def test_a_dip_of_all_phases_names_none(tmp_path):
+    t = np.arange(0, 2, 1 / RATE)
+    bus, _ = bus_line(written(tmp_path, t, station(t, [(1.0, 0.2, 0.3)])))
+    assert "phase" not in bus
+
+
+def test_a_phase_that_is_dead_from_first_to_last_is_never_within_the_thresholds(tmp_path):
+    from tractexp.api.surveying import rows_of
+
+    t = np.arange(0, 2, 1 / RATE)
+    rows = [(name, unit, x * (1e-6 if name == "UB" else 1.0)) for name, unit, x in station(t, [])]
+    path = written(tmp_path, t, rows)
+    bus, seen = bus_line(path)
+    assert "no voltage in phase b from first to last" in bus
+    assert "within the thresholds" not in str(seen.summary())
+    [row] = rows_of(str(tmp_path), path.name)
+    assert "no voltage in phase b" in row["why"]
 
 
 def write_direct(path, columns, volts=1500.0, rate=2000.0, ripple=0.02, pulses=300.0, factor=0.0):

@@ -341,6 +341,7 @@ def event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]
         "dip": event.dip,
         "worth": event.worth,
         "why": event.why,
+        "phases": list(what.phases),
     }
 
 
@@ -445,6 +446,7 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
         **_sums(shown),
         "said": list(shown.said),
         "unexamined": shown.unexamined,
+        "dead_phases": shown.dead_phases,
         "secondary": shown.secondary,
         "command": command(view, shown),
         "events": [hide_secondary(event_row(event, view.begun), shown) for event in shown.events],

@@ -106,10 +106,16 @@ def _without_events(view: View) -> dict[str, str]:
 
 
 def _quiet(view: View) -> str:
-    return (
-        "; ".join(dict.fromkeys(said for s in view.sights for said in s.said))
-        or "the voltage stays as it is"
-    )
+    said = [*(said for s in view.sights for said in s.said), *_find_dead_phases(view)]
+    return "; ".join(dict.fromkeys(said)) or "the voltage stays as it is"
+
+
+def _find_dead_phases(view: View) -> list[str]:
+    return [
+        f"no voltage in phase {s.dead_phases} from first to last"
+        for s in view.sights
+        if s.dead_phases
+    ]
 
 
 def _common(view: View) -> dict[str, Any]:

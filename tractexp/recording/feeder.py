@@ -33,6 +33,7 @@ from tractexp.recording.railway import (
 )
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots, frequency, nearest_nominal, snapshots
+from tractexp.recording.transformer import mark_other_sides
 from tractexp.recording.unit import in_doubt
 
 # three magnitudes this close, as a share of their mean, may be three phases
@@ -110,8 +111,8 @@ def propose(recording: Recording) -> list[Feeder]:
     options += _single(recording, phasors, volts, amps, taken, level)
     feeders = _with_others(closed_sums(phasors, [each[0] for each in options]), options)
     level = max((phasors.size(f.currents) for f in feeders), default=0.0)
-    marked = (_mark_unloaded(recording, phasors, feeder, level, strange) for feeder in feeders)
-    return sorted(marked, key=lambda f: not f.loaded)
+    marked = [_mark_unloaded(recording, phasors, feeder, level, strange) for feeder in feeders]
+    return sorted(mark_other_sides(recording, phasors, marked), key=lambda f: not f.loaded)
 
 
 def buses_alone(recording: Recording) -> list[Feeder]:

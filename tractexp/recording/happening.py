@@ -1,15 +1,22 @@
 """What happened to a voltage: its kind, its size, and whether a load model can be fitted to it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tractexp.record.change import SMALL_LOAD_SHARE, Change, load_changes, runs
+from tractexp.record.direction import direction
 from tractexp.record.fall import FEWEST_BEFORE, REFERENCE, SHALLOWEST, STEADY
 from tractexp.record.no_dip import OPEN_POLE, UNCLEARED
 from tractexp.record.phasor import Phasors, WaveSource
 from tractexp.record.record import Record
-from tractexp.recording.excursion import DEAD_VOLTAGE_SHARE, Excursion, excursions
+from tractexp.recording.excursion import (
+    DEAD_VOLTAGE_SHARE,
+    LEAVES_PHASE,
+    Excursion,
+    excursions,
+)
 from tractexp.recording.trace import Trace, of_record, of_waves
 
 # of the voltage: a larger change that stays is no tap or switching step
@@ -36,6 +43,7 @@ BLOWN = 0.1  # of a phase: less is left where a fuse has blown
 LOST_VOLTAGE, UNTOUCHED = 0.7, 0.03
 FUSE_CYCLES = 3.0  # so long at least
 FUSE_SAMPLES = 50  # half cycles before it, whose median it is compared with
+FALLEN_SHARE = 0.5  # of the deepest fall of a phase: the others that fell as well fall farther
 CARRIES = 0.05  # of the record's greatest current: what is less is no load
 
 
@@ -53,6 +61,8 @@ class Happening:
     after: tuple[float, float]
     worth: bool  # fitting
     why: str  # what makes it (not) worth fitting, one sentence
+    # voltage of each phase, farthest from that before, over that; () where phases are not recorded
+    phases: tuple[float, ...] = ()
 
 
 def happenings(
@@ -70,6 +80,14 @@ def happenings(
     frequency.
     """
     return happenings_in(of_waves(waves, rate, start, nominal, phasors), trigger)
+
+
+def find_dead_phases(trace: Trace) -> list[int]:
+    """Which of three phases have no voltage from first to last, while another has."""
+    if len(trace.phases) != 3:
+        return []
+    most = np.percentile(trace.phases, 95, axis=1)
+    return np.flatnonzero(most <= DEAD_VOLTAGE_SHARE * most.max()).tolist() if most.any() else []
 
 
 def happenings_of(record: Record) -> list[Happening]:
@@ -395,7 +413,35 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
         after,
         worth,
         why,
+        _measure_phases(trace, e, first),
     )
+
+
+def _measure_phases(trace: Trace, e: Excursion, first: int) -> tuple[float, ...]:
+    """The voltage of each of three phases during an event over its median from `first` to it; ()
+    where not known.
+    """
+    if len(trace.phases) != 3:
+        return ()
+    before, inside = (
+        trace.phases[:, a : max(b, a + 1)] for a, b in ((first, e.start), (e.start, e.end))
+    )
+    usual = np.median(before, axis=1)
+    farthest = inside.max(axis=1) if e.worst > 0 else inside.min(axis=1)
+    alive = usual > DEAD_VOLTAGE_SHARE * usual.max()
+    return tuple(np.divide(farthest, usual, out=np.ones(3), where=alive).tolist())
+
+
+def name_fallen_phases(phases: Sequence[float]) -> str:
+    """Which of the phases a, b, c fell, where not all did alike: "phase a to 5 %"; "" else."""
+    falls = 1 - np.asarray(phases)
+    if len(falls) < 3 or falls.max() < LEAVES_PHASE:
+        return ""
+    fallen = np.flatnonzero(falls > FALLEN_SHARE * falls.max())
+    if len(fallen) == 3:
+        return ""
+    names = " and ".join("abc"[k] for k in fallen)
+    return f"phase{'s' * (len(fallen) > 1)} {names} to {100 * (1 - falls.max()):.3g} %"
 
 
 def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
@@ -426,14 +472,13 @@ def _worth(
     lead = (e.start - first) * trace.step
     size = f"the voltage falls by {100 * depth:.3g} %"
     if len(trace.phases) == 3:
-        usual = np.maximum(
-            np.median(trace.phases[:, first : max(e.start, first + 1)], axis=1), 1e-12
-        )
-        lowest = (trace.phases[:, e.start : e.end] / usual[:, None]).min()
+        phases = _measure_phases(trace, e, first)
         size = (
             f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to"
-            f" {100 * lowest:.3g} %"
+            f" {100 * min(phases):.3g} %"
         )
+        fallen = name_fallen_phases(phases)
+        size += f" ({fallen})" if fallen else ""
     if lead < FEWEST_BEFORE * 1e-3 or e.start - first < 2:
         return False, f"{size}, but only {1000 * lead:.0f} ms of steady state come before it"
     if not e.cleared:
@@ -452,11 +497,7 @@ def _worth(
     if not e.sudden:
         return False, f"{size}, but slowly: it determines only the static part of the load"
     if before[0] < 0:
-        why = (
-            "power is fed back, or the current is counted out of the load (then"
-            " data.reverse_current=true makes it one)"
-        )
-        return False, f"{size}, but P is negative before it: {why}"
+        return False, f"{size}, but {NEGATIVE}{_explain_negative_power(trace)}"
     short = (
         f"; only the {1000 * lead:.0f} ms before it tell voltage and power before"
         if lead < REFERENCE
@@ -465,6 +506,16 @@ def _worth(
     return True, f"{size}, {lead:.2g} s before it and the recovery are recorded{short}"
 
 
+def _explain_negative_power(trace: Trace) -> str:
+    """Why power is negative before a dip, as its answer to the voltage shows it."""
+    usual = (
+        "power is fed back, or the current is counted out of the load (then"
+        " data.reverse_current=true makes it one)"
+    )
+    return direction(trace.U, trace.P, trace.Q) or usual
+
+
+NEGATIVE = "P is negative before it: "  # then its cause
 NO_SYSTEM = (
     "the voltages are no three phases of this frequency: the line is dead, or other channels were"
     " meant"

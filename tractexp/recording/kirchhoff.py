@@ -12,6 +12,7 @@ from tractexp.recording.snapshot import UNLOADED, Snapshots
 if TYPE_CHECKING:
     from tractexp.recording.feeder import Feeder
 
+CLOSED_SUM = "add up to"  # in the note of a sum that closes
 CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
 
 
@@ -83,8 +84,8 @@ def _describe_closure(
     out = [feeders[k].name for k, s in zip(loaded, signs, strict=True) if s == 0]
     for k, sign in zip(loaded, signs, strict=True):
         said = (
-            f"the currents of {np.count_nonzero(signs)} feeders add up to {100 * closes:.2g} % of"
-            " their magnitudes"
+            f"the currents of {np.count_nonzero(signs)} feeders {CLOSED_SUM} {100 * closes:.2g} %"
+            " of their magnitudes"
         )
         if out:
             said += f", without {' and '.join(out)}" + (

@@ -15,7 +15,14 @@ from tractexp.record.dips import FileDip, check_load
 from tractexp.record.phasor import Phasors, join_phasors
 from tractexp.recording.arrangement import arrange_feeder
 from tractexp.recording.feeder import Feeder, buses_alone, propose
-from tractexp.recording.happening import OF_LOADS, Happening, happenings_in, happenings_of
+from tractexp.recording.happening import (
+    OF_LOADS,
+    Happening,
+    find_dead_phases,
+    happenings_in,
+    happenings_of,
+)
+from tractexp.recording.infeed import describe_directions
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.quality import Quality, measure_stamp_jitter, network_frequency, quality
 from tractexp.recording.reader import WaveformReader
@@ -74,6 +81,7 @@ class Sight:
     record: Record | None = None
     # why nothing can be said of what happened to it, one sentence; "" where it was examined
     unexamined: str = ""
+    dead_phases: str = ""  # of its voltages without any from first to last, in words
     secondary: bool = False  # its values are secondary, of an unknown ratio: no kV, no MW
     said: tuple[str, ...] = ()  # why parts of it could not be analysed, one sentence each
     # by which a reader reads it, without the dips
@@ -255,8 +263,18 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
             said = (str(error),)
         bus = buses.setdefault(str((feeder.voltages, feeder.connection)), _Bus())
         shown = sight(reader, recording, feeder, feeder.loaded or not loaded, bus)
-        sights.append(replace(shown, said=(*said, *shown.said)))
-    return sights
+        shown = replace(shown, said=(*said, *shown.said))
+        sights.append(_refuse_events(shown, said[0]) if said else shown)
+    return describe_directions(sights)
+
+
+def _refuse_events(shown: Sight, reason: str) -> Sight:
+    """A load whose channels make no sense: no command reads it, whatever happened to it."""
+    events = (
+        replace(each, event=None, why=f"it gives no record: {reason}") if each.worth else each
+        for each in shown.events
+    )
+    return replace(shown, events=tuple(events))
 
 
 def sight(
@@ -273,7 +291,7 @@ def sight(
     What loads of the same `bus` share is measured once.
     """
     bus = bus or _Bus()
-    phasors, changes, said = [], [], []
+    phasors, changes, said, dead = [], [], [], list[int]()
     blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
     if feeder.currents and any(
         in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)
@@ -300,7 +318,10 @@ def sight(
                 trace = of_waves(waves, segment.rate, segment.start, recording.frequency, measured)
                 traces.append(trace if feeder.currents else trace.without_currents())
         phasors += [join_phasors(parts)] if parts else []
-        changes += happenings_in(joined_traces(traces), recording.trigger) if traces else []
+        if traces:
+            trace = joined_traces(traces)
+            changes += happenings_in(trace, recording.trigger)
+            dead = dead or find_dead_phases(trace)
     dips, refused = [], ""
     try:
         streams = [(p, ()) for p in phasors]
@@ -318,6 +339,7 @@ def sight(
         said=tuple(said),
         unexamined=unexamined,
         secondary=secondary,
+        dead_phases=" and ".join("abc"[k] for k in dead),
     )
     return replace(shown, said=(*said, *_improbable(reader.path, shown)))
 

@@ -8,12 +8,14 @@ from typing import Any
 
 from tractexp.blocks import Report, Table
 from tractexp.recording.excursion import HYSTERESIS
-from tractexp.recording.happening import OF_LOADS
+from tractexp.recording.happening import OF_LOADS, name_fallen_phases
+from tractexp.recording.transformer import SAME_CURRENT
 from tractexp.report import unfitted
 from tractexp.report.look import (
     NO_LOAD,
     SECONDARY,
     channels,
+    describe_dead_phases,
     events,
     explain_unnamed,
     frequency,
@@ -48,6 +50,14 @@ def summary(content: Entry) -> Report:
         unloaded = [feeder["name"] for feeder in entry["feeders"] if not feeder["loaded"]]
         if unloaded and len(unloaded) < len(entry["feeders"]):
             page.text(f"  {NO_LOAD}: {', '.join(unloaded)}")
+        page.items(
+            [
+                f"{feeder['name']}: {said}"
+                for feeder in entry["feeders"]
+                for said in feeder["why"]
+                if said.startswith(SAME_CURRENT)
+            ]
+        )
         page.items(
             list(dict.fromkeys(said for feeder in entry["feeders"] for said in feeder["said"]))
         )
@@ -129,10 +139,9 @@ def _label(event: Entry) -> str:
 
 
 def _event(event: Entry) -> str:
-    return (
-        f"{_label(event)} at {starts(event, ' s')} ({event['depth']:.1%},"
-        f" {1000 * event['duration']:.0f} ms)"
-    )
+    fallen = name_fallen_phases(event.get("phases") or ())
+    size = [f"{event['depth']:.1%}", f"{1000 * event['duration']:.0f} ms", *[fallen] * bool(fallen)]
+    return f"{_label(event)} at {starts(event, ' s')} ({', '.join(size)})"
 
 
 def _reservation(why: str) -> str:
@@ -202,9 +211,15 @@ def _of_voltage(bus: Sequence[Entry]) -> list[Entry]:
                 max(last["end"], event["end"]),
             )
             span = {"start": last["start"], "end": end, "duration": end - last["start"]}
-            event = {**last, "depth": worst["depth"], **span}
+            event = {**last, "depth": worst["depth"], **span, "phases": _join_phases(last, event)}
         told.append(event)
     return sorted((*shared, *told), key=lambda each: each["start"])
+
+
+def _join_phases(*events: Entry) -> list[float]:
+    """The voltage of each phase that is farthest from that before, in either event."""
+    told = [event["phases"] for event in events if event.get("phases")]
+    return [max(phase, key=lambda x: abs(x - 1)) for phase in zip(*told, strict=True)]
 
 
 def _beside_voltage(event: Entry) -> bool:
@@ -226,7 +241,8 @@ def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     events = join_words(told) or (
         quiet(bus[0]) if any(feeder["loaded"] or not feeder["currents"] for feeder in bus) else ""
     )
-    parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), events])
+    dead = "" if not happened else describe_dead_phases(bus[0])
+    parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), dead, events])
     return f"bus {number}: {'; '.join(parts)}"
 
 
