@@ -11,7 +11,6 @@ from tractexp.extend import (
     Reader,
     Record,
     UserError,
-    check_distinct,
     check_range,
     plugin,
 )
@@ -25,6 +24,7 @@ from tractexp.extend.files import (
     Powers,
     Sidecar,
     Tabular,
+    check_joined,
     check_load,
     check_numbers,
     chosen,
@@ -89,7 +89,7 @@ class CSV(Tabular, Reader):
     def check(self) -> None:
         if self.path:
             self._check_numbers()
-            check_distinct(f"{DATA.path} and {DATA.join}", [self.path, *map(str, self.join)])
+            check_joined("data.join", [self.path, *self.join], self.endings)
         elif self.join:
             raise UserError(f"{DATA.join} goes with {DATA.path}: name the first file there")
         elif not self.train:

@@ -235,3 +235,25 @@ def test_names_tell_what_tells_files_apart():
     assert not name_one_event(["event_1.csv", "event_2.csv", "event_3.csv"])
     assert not name_one_event(["north.csv", "south.csv"])
     assert not name_one_event(["bay_a1.csv", "bay_a2.csv"])
+
+
+def test_files_of_other_kinds_and_none_are_refused(tmp_path):
+    first = write_comtrade(tmp_path / "a.cfg", slice(0, 3), ["UA", "UB", "UC"])
+    table = write_table(tmp_path / "b.csv", {"IA [kA]": WAVES[3]})
+    for join, words in (
+        (
+            [str(table)],
+            r"join: .*b.csv is of another kind than .*a.cfg: one reader reads all files",
+        ),
+        (["absent.cfg"], r"absent.cfg: there is no such file"),
+        (5, r"join=5 must be a list of files of the same event"),
+    ):
+        with pytest.raises(UserError, match=words):
+            tractexp.read(str(first), join=join)
+
+
+def test_why_a_zip_is_not_one_event_is_said(tmp_path):
+    """Channels of an oscilloscope, of which nothing says what they measure."""
+    paths = [write_table(tmp_path / f"T1CH{k}.csv", {f"CH{k}": WAVES[k]}) for k in (1, 2, 3)]
+    with pytest.raises(UserError, match=r"holds 3 records.*not read as one event.*column U"):
+        tractexp.look(str(pack(tmp_path / "scope.zip", *paths)), progress=False)

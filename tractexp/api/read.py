@@ -233,9 +233,14 @@ def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
                 f"{path} is neither a file with an ending nor a shipped"
                 f" record{among(path, shipped)}"
             )
-    join = settings.get("join") or []
-    given = {**settings, "join": [join]} if isinstance(join, str) else settings
-    return {**settings_of(path, *given.get("join") or ()), **given}
+    if not settings.get("join"):
+        return {**settings_of(path), **settings}
+    join = settings["join"]
+    paths = [join] if isinstance(join, str | Path) else join
+    if not isinstance(paths, Sequence):
+        raise UserError(f"join={join!r:.60} must be a list of files of the same event as {path}")
+    named = [*map(str, paths)]
+    return {**settings_of(path, *named), **settings, "join": named}
 
 
 def record_to_dict(record: Record) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, cut
 from tractexp.record.record import DECLARATION, LOAD, SIZES
 from tractexp.recording.archive import records
 from tractexp.recording.estimator import estimator_of
-from tractexp.recording.event_files import event_paths
+from tractexp.recording.event_files import check_joined, event_paths
 from tractexp.wording import count_noun
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "Sidecar",
     "Tabular",
     "cev",
+    "check_joined",
     "check_load",
     "check_numbers",
     "chosen",

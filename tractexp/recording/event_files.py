@@ -5,15 +5,16 @@ Files of one event are aligned by the moments that they state, else by equal rat
 """
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tractexp import files
-from tractexp.errors import UserError
+from tractexp.errors import UserError, check_distinct, setting
 from tractexp.quoting import shell
 from tractexp.recording.phase_mark import plain, spell_marks
 from tractexp.recording.record_files import find_packed
@@ -26,7 +27,7 @@ SAME_INSTANT = 0.01  # of a step, within which two samples are of one instant
 PART = re.compile(r"[^\W_]+")
 QUANTITY = re.compile(
     r"[uvipq]|f|freq\w*|volt\w*|curr\w*|amps?|spann\w*|str[oö]me?|tens\w*|corr\w*|courants?"
-    r"|power|напр\w*|ток\w*|电压|电流|(?:ch|chan|channel|analog)\d{1,2}"
+    r"|power|напр\w*|ток\w*|电压|电流|\w*(?:ch|chan|channel|analog)\d{1,2}"
 )
 PHASE = re.compile(r"(?:phase )?[uvi]? ?(?:a|b|c|ab|bc|ca|l[123]|l1 ?l2|l2 ?l3|l3 ?l1)")
 ORDERS = ("abc", "rst", "uvw", "ryb", "rwb")  # of phases in files' names, beside L1, L2, L3
@@ -77,6 +78,21 @@ def event_paths(path: str, join: Sequence[str], wanted: Sequence[str]) -> list[s
     if not inside:
         raise UserError(f"{path} holds no file that ends in {join_words(wanted, 'or')}")
     return [*inside, *join]
+
+
+def check_joined(where: str, paths: Sequence[Any], endings: Collection[str]) -> None:
+    """Raise `UserError` for files of one event that are no texts, twice there, or of another kind
+    than one reader reads.
+    """
+    check_distinct(where, [*map(str, paths)])
+    for path in paths:
+        ending = Path(str(path)).suffix.lower()
+        if ending not in endings and not files.is_called_archive(str(path)):
+            raise UserError(
+                f"{setting(where)}: {path} is of another kind than {paths[0]}: one reader reads all"
+                f" files of an event, here those ending in {join_words(sorted(endings), 'or')};"
+                " export them alike"
+            )
 
 
 def say_several(archive: str, inside: Sequence[str]) -> str:

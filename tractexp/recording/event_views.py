@@ -44,8 +44,18 @@ def _settings_of_archive(archive: Path) -> dict[str, Any]:
         )
     together = settings_of(*inside) if len(inside) == 1 else join_event(inside)
     if together is None:
-        raise UserError(say_several(str(archive), inside))
+        why = f"; {_explain_apart(inside)}" if name_one_event(inside) else ""
+        raise UserError(f"{say_several(str(archive), inside)}{why}")
     return together
+
+
+def _explain_apart(paths: Sequence[str]) -> str:
+    """Why files whose names are those of one event are not read together."""
+    try:
+        view_of(paths[0], settings_of(*paths))
+    except UserError as error:
+        return f"they are not read as one event: {error}"
+    return "together they show no load"
 
 
 def join_event(paths: Sequence[str]) -> dict[str, Any] | None:

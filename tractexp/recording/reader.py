@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from tractexp import plugin, quoting
-from tractexp.errors import DATA, UserError, check_distinct, check_range, setting
+from tractexp.errors import DATA, UserError, check_range, setting
 from tractexp.overrides import format_assignment
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
 from tractexp.record.dips import (
@@ -25,7 +25,7 @@ from tractexp.recording.arrangement import arrange_feeder, tune_frequency
 from tractexp.recording.bridge import bridge_recording
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
-from tractexp.recording.event_files import event_paths
+from tractexp.recording.event_files import check_joined, event_paths
 from tractexp.recording.feeder import Feeder, can_be_named, explain_unrecognized, propose
 from tractexp.recording.joined import join_recordings
 from tractexp.recording.label import order, shared_name
@@ -105,7 +105,7 @@ class WaveformReader(Reader):
             raise UserError(
                 f"{DATA.path} is missing: give the file, e.g. {DATA.path}=station{self.endings[0]}"
             )
-        check_distinct(f"{DATA.path} and {DATA.join}", [self.path, *map(str, self.join)])
+        check_joined("data.join", [self.path, *self.join], self.endings)
         check_units(self.units, self.quantities)
         check_numbers(self.train, self.validate)
         check_range("data.pre", self.pre, 0.05)
