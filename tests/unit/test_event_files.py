@@ -257,3 +257,24 @@ def test_why_a_zip_is_not_one_event_is_said(tmp_path):
     paths = [write_table(tmp_path / f"T1CH{k}.csv", {f"CH{k}": WAVES[k]}) for k in (1, 2, 3)]
     with pytest.raises(UserError, match=r"holds 3 records.*not read as one event.*column U"):
         tractexp.look(str(pack(tmp_path / "scope.zip", *paths)), progress=False)
+
+
+def test_rows_that_one_table_lacks_are_refused(tmp_path):
+    """By their clocks, the rows after a lost one would be a step off."""
+    times = [(START + timedelta(seconds=float(t))).isoformat() for t in T]
+    first = write_table(tmp_path / "e_U.csv", {"U [kV]": WAVES[0]}, times)
+    kept = np.arange(len(T)) != 700
+    columns = {"I [kA]": WAVES[3][kept]}
+    second = write_table(tmp_path / "e_I.csv", columns, [times[k] for k in np.flatnonzero(kept)])
+    with pytest.raises(UserError, match=r"rows are missing or double in one of them"):
+        tractexp.read(str(first), join=[str(second)])
+
+
+def test_dead_channels_of_one_name_are_not_one_channel(tmp_path):
+    dead = np.zeros(len(T))
+    paths = [
+        write_table(tmp_path / f"ev_{p}.csv", {"U [kV]": WAVES[k], "I [kA]": dead})
+        for k, p in enumerate("ABC")
+    ]
+    seen = tractexp.look(*map(str, paths), progress=False)
+    assert [row["name"] for row in seen.channels] == ["U A", "I A", "U B", "I B", "U C", "I C"]

@@ -6,6 +6,8 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tractexp.errors import UserError
 from tractexp.filetypes.columns import role
 from tractexp.filetypes.heading import TableHeading
@@ -15,6 +17,8 @@ from tractexp.filetypes.table import TableColumn, TableFile
 from tractexp.recording.event_files import SampledFile, align, move_samples, tell_apart
 
 Place = tuple[int, int]  # the number of a part, and of a column in it
+
+EVEN = 0.1  # of a step, and of all steps: what differs more is uneven
 
 
 class JoinedTable(TableFile):
@@ -30,6 +34,8 @@ class JoinedTable(TableFile):
         first, count = self.aligned.first[0], self.aligned.count
         times = read[0][0]
         t = times.t[first : first + count]
+        for k, part in enumerate(parts):
+            _check_rows(part, read[k][0].t[self.aligned.first[k] :][:count], t, parts[0].source)
         if times.start is not None:
             self.start, t = times.start + timedelta(seconds=float(t[0] - times.t[0])), t - t[0]
         self.t, self.frequency = t, parts[0].frequency
@@ -91,10 +97,25 @@ def _times(part: TableFile) -> tuple[TableTimes, set[int]]:
 def _sampled(part: TableFile, times: TableTimes) -> SampledFile:
     if len(times.t) < 3:
         raise UserError(f"{part.source}: only {len(times.t)} rows; a part of an event needs more")
-    step = float(times.t[-1] - times.t[0]) / (len(times.t) - 1)
+    steps = np.diff(times.t)
+    usual = float(np.median(steps))
+    even = np.mean(np.abs(steps - usual) < EVEN * usual) > 1 - EVEN  # but for rows that are lost
+    step = usual if even else float(steps.mean())
     if not step > 0:
         raise UserError(f"{part.source}: its times do not increase, so nothing can be joined to it")
     return SampledFile(part.source, 1 / step, len(times.t), float(times.t[0]), times.start)
+
+
+def _check_rows(part: TableFile, own: np.ndarray, t: np.ndarray, other: str) -> None:
+    """Raise `UserError` where rows (N,) [s] of a table are not at the times of the first one's."""
+    off = np.abs((own - own[0]) - (t - t[0]))
+    if off.max() > 0.5 * float(np.median(np.diff(t))):
+        row = int(np.argmax(off > 0.5 * float(np.median(np.diff(t)))))
+        raise UserError(
+            f"{part.source}: row {row + 1} of those that it has in common with {other} is"
+            f" {own[row] - own[0]:.6g} s after the first, and there {t[row] - t[0]:.6g} s: rows are"
+            " missing or double in one of them; export both with all rows, or interpolate"
+        )
 
 
 def _columns(
@@ -121,13 +142,15 @@ def _columns(
     return columns, names, notes
 
 
-def _same(
-    parts: Sequence[TableFile], one: tuple[int, int, str, str], other: tuple[int, int]
-) -> bool:
-    """Whether two columns begin with the same cells."""
-    rows = zip(parts[one[0]].sample, parts[other[0]].sample, strict=False)
-    pairs = [(_cell(a, one[1]), _cell(b, other[1])) for a, b in rows]
-    return bool(pairs) and all(a == b for a, b in pairs)
+def _same(parts: Sequence[TableFile], one: Place, other: Place) -> bool:
+    """Whether two columns hold the same cells, and not one value alone, as dead channels do."""
+    (j, a), (k, b) = one, other
+    if any(
+        _cell(x, a) != _cell(y, b) for x, y in zip(parts[j].sample, parts[k].sample, strict=False)
+    ):
+        return False
+    first, second = list(parts[j].cells(a)), list(parts[k].cells(b))
+    return first == second and any(cell != first[0] for cell in first)
 
 
 def _tell(name: str, unit: str, told: str) -> str:

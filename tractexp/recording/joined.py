@@ -130,6 +130,11 @@ def _name_channels(recordings: Sequence[Recording]) -> tuple[list[Channel], list
 
 
 def _same(one: Channel, other: Channel) -> bool:
-    """Whether two files hold the same samples under the same name."""
-    alike = other.name.strip() == one.name.strip() and len(other.raw) == len(one.raw)
-    return alike and bool(np.array_equal(one.values(), other.values(), equal_nan=True))
+    """Whether two files hold the same samples under the same name, and not one value alone, as
+    dead channels do.
+    """
+    if other.name.strip() != one.name.strip() or len(other.raw) != len(one.raw):
+        return False
+    values = one.values()
+    varies = bool((values != values[:1]).any())
+    return varies and bool(np.array_equal(values, other.values(), equal_nan=True))
