@@ -1,6 +1,7 @@
 """The door through which plugins and schemas enter Hydra's groups."""
 
 import argparse
+import contextlib
 import functools
 import hashlib
 from collections.abc import Sequence
@@ -87,6 +88,12 @@ def register(arguments: Sequence[str] = ()) -> None:
     Plugins.instance().register(ModelFiles)
     for cls in (Grid, Cores):
         hydra_plugins.admit(cls)
+    with contextlib.suppress(ImportError):  # the extra `slurm` is not installed
+        from tractexp.sweep.batches import LAUNCHERS
+
+        for name, (cls, schema) in LAUNCHERS.items():
+            store.store(group="hydra/launcher", name=name, node=schema)
+            hydra_plugins.admit(cls)
     register_resolver = hydra_versions.register_resolver()
     register_resolver("fingerprint", _fingerprint, replace=True)
     register_resolver("folder_name", _folder_name, replace=True)

@@ -426,29 +426,60 @@ def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged,
         assert results(tmp_path / f"sweep{k}") == first
 
 
+SLURM = {  # commands of a cluster that is this computer
+    "sbatch": """
+script = pathlib.Path(sys.argv[-1])
+last = int(re.search(r"--array=0-([0-9]+)", script.read_text())[1])
+one = dict.fromkeys(("NODEID", "PROCID", "LOCALID"), "0")
+one |= {"JOB_NUM_NODES": "1", "NTASKS": "1", "JOB_NODELIST": "here", "ARRAY_JOB_ID": "9"}
+for k in range(last + 1):
+    own = {**one, "ARRAY_TASK_ID": str(k), "JOB_ID": str(9 + k)}
+    names = {f"SLURM_{name}": text for name, text in own.items()}
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    subprocess.Popen(["bash", script], env={**os.environ, **names}, **silent)
+print("Submitted batch job 9")
+""",
+    "srun": """
+options = {"--unbuffered": 1, "--output": 2, "--error": 2}
+words = sys.argv[1:]
+while words[0] in options:
+    del words[:options[words[0]]]
+os.execv(words[0], words)
+""",
+    "sacct": 'print("JobID|State|NodeList")',
+}
+
+
 @needs_submitit
-def test_submitit_runs_a_sweep_isolates_a_failure_and_logs_below_the_parent(site, tmp_path, uri):
-    launcher = ["hydra/launcher=submitit_local", "hydra.launcher.timeout_min=3"]
-    if shutil.which("sinfo") and subprocess.run(["sinfo", "-h"], capture_output=True).stdout:
-        launcher = [
-            "hydra/launcher=submitit_slurm",
-            "hydra.launcher.timeout_min=3",
-            "hydra.launcher.cpus_per_task=1",
-        ]
-    sweep = ("-m", "budget=200", *launcher, "optimizer=stumbles", "seed=1,2", HERE)
-    done = tractexp(*sweep, cwd=tmp_path, site=site)
+def test_slurm_runs_jobs_in_tasks_isolates_a_failure_and_logs_below_the_parent(
+    site, tmp_path, uri, monkeypatch
+):
+    """Three jobs in two tasks; one that fails does not touch the next in its task."""
+    commands = tmp_path / "commands"
+    commands.mkdir()
+    for name, body in SLURM.items():
+        head = f"#!{sys.executable}\nimport os, pathlib, re, subprocess, sys\n"
+        (commands / name).write_text(head + body)
+        (commands / name).chmod(0o755)
+    monkeypatch.setenv("PATH", os.pathsep.join([str(commands), os.environ["PATH"]]))
+    launcher = ("hydra/launcher=slurm", "hydra.launcher.timeout_min=3")
+    sweep = ("-m", "budget=200", *launcher, "hydra.launcher.jobs_per_task=2", HERE)
+    done = tractexp(*sweep, "optimizer=stumbles", "seed=2,1,4", cwd=tmp_path, site=site)
     from numpy.random import default_rng
 
-    failed = sum(default_rng(seed).random() < 0.5 for seed in (1, 2))
-    assert failed == 1
-    assert f"{failed} of 2 jobs failed" in done.stderr, done.stderr
+    failed = [default_rng(seed).random() < 0.5 for seed in (2, 1, 4)]
+    assert failed == [True, False, False]
+    assert "1 of 3 jobs failed" in done.stderr, done.stderr
     assert "the third step divides by the width of nothing" in done.stdout
-    assert len(results(tmp_path / "sweep")) == 2 - failed
+    ends = statuses(tmp_path / "sweep")
+    assert [ends[k]["status"] == "failed" for k in range(3)] == failed
+    tasks = {path.name for path in (tmp_path / "sweep" / ".submitit").glob("*/*_result.pkl")}
+    assert tasks == {"9_0_0_result.pkl", "9_1_0_result.pkl"}
     parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
     children = ask(
         tmp_path, f"select 1 from tags where key = 'mlflow.parentRunId' and value = '{parent}'"
     )
-    assert len(children) == 2 - failed
+    assert len(children) == 2
 
 
 @pytest.mark.parametrize(("way", "logged"), [(signal.SIGTERM, True), (signal.SIGINT, False)])
