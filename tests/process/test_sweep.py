@@ -451,7 +451,7 @@ os.execv(words[0], words)
 
 
 @needs_submitit
-def test_slurm_runs_jobs_in_tasks_isolates_a_failure_and_logs_below_the_parent(
+def test_submitit_runs_jobs_in_tasks_isolates_a_failure_and_logs_below_the_parent(
     site, tmp_path, uri, monkeypatch
 ):
     """Three jobs in two tasks; one that fails does not touch the next in its task."""
