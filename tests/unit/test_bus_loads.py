@@ -83,6 +83,12 @@ class TestNegativePower:
         assert loads["F3"]["said"] == [said]
         assert said in " ".join(page.split())
 
+    def test_a_sum_that_is_nearly_zero_by_accident_turns_nothing_round(self, tmp_path):
+        groups = ("F1 I", currents(20, 8)), ("F2 I", currents(12, 5)), ("F3 I", -currents(9, 3))
+        loads, _, _ = station(tmp_path, ("U ", voltages()), *groups)
+        assert not any(load["reverse_current"] for load in loads.values())
+        assert loads["F2"]["P"] == pytest.approx(12, rel=0.01)
+
     @pytest.mark.parametrize("own", [-currents(32, 13), -currents(36, 14.5)])
     def test_what_feeds_the_bus_is_not_to_be_turned(self, tmp_path, own):
         loads, _, page = station(tmp_path, *self.bus, ("T1 I", own))

@@ -162,7 +162,7 @@ class TestRailways:
         loads, _ = self.loads(tmp_path, ("U_CAT", V), ("I_CAT", 0.6 * I), ("I_FEED", -0.4 * I))
         assert all("half" in load["name"] for load in loads)
 
-    @pytest.mark.parametrize("name", ["I_RC", "I return", "I Rückleiter", "I BT"])
+    @pytest.mark.parametrize("name", ["I_RC", "I return", "I Rückleiter", "I BT", "I Schiene"])
     def test_a_return_conductor_is_no_load(self, tmp_path, name):
         V, I = 15 / 27.5 * self.V, self.I
         [load], _ = self.loads(tmp_path, ("U FL", V), ("I FL", I), (name, -0.8 * I), f=50 / 3)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from tractexp.recording.feeder import Feeder
 
 CLOSED_SUM = "add up to"  # in the note of a sum that closes
+# the same where one is left out or turned round, of which some are near zero by accident
+CLOSES_CHANGED = 0.02
 CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
 
 
@@ -48,9 +50,11 @@ def _find_closed_sum(
         return None
     tried = _signs(len(loaded))
     closes = _closures(X.reshape(len(X), -1), tried)
-    if closes.min() >= CLOSES:
+    closed = closes < np.where((tried == 1).all(axis=1), CLOSES, CLOSES_CHANGED)
+    if not closed.any():
         return None
-    simple = int(np.argmax(closes < max(CLOSES / 3, 2 * closes.min())))
+    enough = max(CLOSES / 3, 2 * closes[closed].min())
+    simple = int(np.argmax(closed & (closes < enough)))
     return tried[simple], float(closes[simple])
 
 

@@ -21,7 +21,10 @@ OPPOSITE = 0.15  # of a phasor: two that are nearer to adding up to zero are opp
 TURNED = 40.0  # degrees off 180 that the currents of the two conductors are at most
 BETWEEN = (45.0, 62.0)  # kV: a voltage between contact line and negative feeder, of 2x25 kV
 EACH = (20.0, 31.0)  # kV: a voltage of either of them to the rail
-RETURN = re.compile(r"return|retour|rück|(?<![a-z])(?:rc|ret|rail|rl|bt)(?![a-z])|обратн|回流|回线")
+RETURN = re.compile(
+    r"return|retour|retorno|ritorno|rück|schien|carril|binari|(?:ground|earth) wire"
+    r"|(?<![a-z])(?:rc|ret|rail|rails|riel|rl|bt|aew)(?![a-z])|обр|рельс|回流|回线|钢轨"
+)
 CONTACT = re.compile(
     r"cat|contact|cont|ocl|ohl|trolley|oberleit|fahrleit|(?<![a-z])[tck](?![a-z])|контакт|接触|кс"
 )
