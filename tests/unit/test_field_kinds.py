@@ -346,3 +346,31 @@ def test_other_tables_without_q_are_not_direct(tmp_path):
     path = write_direct(tmp_path / "ac.csv", {"U [V]": "U", "P [kW]": "P"}, volts=27500.0)
     with pytest.raises(UserError, match="column Q is missing"):
         look(path)
+
+
+@pytest.mark.parametrize(
+    ("rate", "seconds", "unit", "why"),
+    [
+        (400.0, 1.0, "kV", "sampled at 400 Hz: no waveform"),
+        (RATE, 0.03, "kV", "it lasts 0.03 s"),
+        (RATE, 0.047, "kV", "fewer than four half cycles"),
+        (RATE, 1.0, "%", "no channel is a voltage by its unit"),
+    ],
+)
+def test_what_nobody_can_tell_is_not_examined(tmp_path, rate, seconds, unit, why):
+    t = np.arange(0, seconds, 1 / rate)
+    rows = [
+        (name, unit if own == "kV" else own, x) for name, own, x in station(t, [(0.5, 0.1, 0.3)])
+    ]
+    path = written(tmp_path, t, rows, [Segment(0, len(t), rate, 0.0)])
+    seen, first = look(path)
+    assert first.startswith("not examined: ")
+    assert why in first
+    assert "nothing happened" not in str(seen.summary())
+
+
+def test_a_record_that_begins_inside_a_dip_has_phases_by_what_follows(tmp_path):
+    t = np.arange(0, 1, 1 / RATE)
+    [event] = look(written(tmp_path, t, station(t, [(0.0, 0.3, 0.4)])))[0].events
+    assert event["phases"] == pytest.approx([0.6] * 3, abs=0.02)
+    assert "the lowest phase to 60 %" in event["why"]

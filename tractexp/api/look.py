@@ -24,6 +24,7 @@ from tractexp.record.wave_event import COARSEST, describe_smearing
 from tractexp.recording.event_views import join_event, propose_joining
 from tractexp.recording.feeder import can_be_named, explain_unrecognized
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
+from tractexp.recording.railway import direct_voltage
 from tractexp.recording.recording import unit_of
 from tractexp.wording import count_noun
 
@@ -392,7 +393,8 @@ def _content(view: View) -> dict[str, Any]:
             ],
             "channels": [_channel(view, number) for number in range(len(recording.channels))],
         }
-        content |= {"lacks": lacks, "can_be_named": can_be_named(recording)}
+        direct = bool(lacks and direct_voltage(recording))
+        content |= {"lacks": lacks, "can_be_named": can_be_named(recording), "direct": direct}
     content["measured_frequency"] = view.frequency
     return content | {"feeders": [_feeder(view, shown) for shown in view.sights]}
 

@@ -43,6 +43,7 @@ BLOWN = 0.1  # of a phase: less is left where a fuse has blown
 LOST_VOLTAGE, UNTOUCHED = 0.7, 0.03
 FUSE_CYCLES = 3.0  # so long at least
 FUSE_SAMPLES = 50  # half cycles before it, whose median it is compared with
+FEWEST_HALF_CYCLES = 4  # of a trace that shows what happened
 FALLEN_SHARE = 0.5  # of the deepest fall of a phase: the others that fell as well fall farther
 CARRIES = 0.05  # of the record's greatest current: what is less is no load
 
@@ -97,7 +98,7 @@ def happenings_of(record: Record) -> list[Happening]:
 
 def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]:
     """The events in a trace, in order of time; `trigger` [s] is that of the recorder."""
-    if len(trace.t) < 4:
+    if len(trace.t) < FEWEST_HALF_CYCLES:
         return []
     if _no_system(trace):
         whole = Excursion(
@@ -423,10 +424,13 @@ def _measure_phases(trace: Trace, e: Excursion, first: int) -> tuple[float, ...]
     """
     if len(trace.phases) != 3:
         return ()
-    before, inside = (
-        trace.phases[:, a : max(b, a + 1)] for a, b in ((first, e.start), (e.start, e.end))
+    inside, around = (
+        trace.phases[:, e.start : max(e.end, e.start + 1)],
+        trace.phases[:, first : e.start],
     )
-    usual = np.median(before, axis=1)
+    if not around.shape[1]:  # it begins with the record: then by what follows
+        around = trace.phases[:, e.end :] if e.end < len(trace.t) else inside
+    usual = np.median(around, axis=1)
     farthest = inside.max(axis=1) if e.worst > 0 else inside.min(axis=1)
     alive = usual > DEAD_VOLTAGE_SHARE * usual.max()
     return tuple(np.divide(farthest, usual, out=np.ones(3), where=alive).tolist())

@@ -16,6 +16,7 @@ from tractexp.record.phasor import Phasors, join_phasors
 from tractexp.recording.arrangement import arrange_feeder
 from tractexp.recording.feeder import Feeder, buses_alone, propose
 from tractexp.recording.happening import (
+    FEWEST_HALF_CYCLES,
     OF_LOADS,
     Happening,
     find_dead_phases,
@@ -31,6 +32,7 @@ from tractexp.recording.trace import join_traces as joined_traces
 from tractexp.recording.trace import of_waves
 from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
 
+TOO_SHORT = "fewer than four half cycles are measured: too few to tell what happened"
 LEAST_MEASURED_VOLTAGE = 0.5  # of the greatest voltage: at less the frequency is not measured
 LATEST_START = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
 
@@ -291,7 +293,7 @@ def sight(
     What loads of the same `bus` share is measured once.
     """
     bus = bus or _Bus()
-    phasors, changes, said, dead = [], [], [], list[int]()
+    phasors, changes, said, dead, brief = [], [], [], list[int](), list[bool]()
     blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
     if feeder.currents and any(
         in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)
@@ -322,6 +324,7 @@ def sight(
             trace = joined_traces(traces)
             changes += happenings_in(trace, recording.trigger)
             dead = dead or find_dead_phases(trace)
+            brief.append(len(trace.t) < FEWEST_HALF_CYCLES)
     dips, refused = [], ""
     try:
         streams = [(p, ()) for p in phasors]
@@ -330,7 +333,8 @@ def sight(
     except UserError as error:
         refused = str(error)
     numbered = _number_events(changes, dips, reader.path, refused)
-    unexamined = "; ".join(said) if said and not phasors else ""
+    said += [TOO_SHORT] if brief and all(brief) else []
+    unexamined = "; ".join(said) if said and (not phasors or TOO_SHORT in said) else ""
     secondary = secondary_of(recording, feeder.channels)
     shown = replace(
         blank,

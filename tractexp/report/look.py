@@ -234,6 +234,11 @@ def describe_dead_phases(entry: Mapping[str, Any]) -> str:
     return f"no voltage in phase {dead} from first to last" if dead else ""
 
 
+def is_unexamined(entry: Mapping[str, Any]) -> bool:
+    """Whether a file shows no load, nothing that settings mend, and no direct voltage either."""
+    return bool(entry.get("lacks")) and not entry["can_be_named"] and not entry.get("direct")
+
+
 def explain_unnamed(entry: Mapping[str, Any]) -> str:
     """Why a file shows no load, and what would help, if anything does."""
     if entry.get("lacks") and not entry["can_be_named"]:

@@ -13,12 +13,14 @@ from tractexp.recording.transformer import SAME_CURRENT
 from tractexp.report import unfitted
 from tractexp.report.look import (
     NO_LOAD,
+    NOT_EXAMINED,
     SECONDARY,
     channels,
     describe_dead_phases,
     events,
     explain_unnamed,
     frequency,
+    is_unexamined,
     quiet,
     size,
     starts,
@@ -112,6 +114,8 @@ def _refuse(files: Sequence[Entry]) -> str:
     unexamined = [quiet(feeder) for feeder in feeders if feeder.get("unexamined")]
     if not happened and unexamined:
         return unexamined[0]
+    if not feeders and all(is_unexamined(entry) for entry in files):
+        return f"{NOT_EXAMINED}: {files[0]['lacks']}"
     if not happened:
         return (
             "nothing is worth fitting:"
