@@ -68,12 +68,17 @@ def members(archive: Path) -> Mapping[str, zipfile.ZipInfo]:
 @functools.lru_cache(maxsize=64)
 def _members(path: str, changed: int, size: int) -> Mapping[str, zipfile.ZipInfo]:
     """Those of an archive in the state it has."""
-    _check_directory(path, size)
+    stated = _check_directory(path, size)
     try:
         with zipfile.ZipFile(path) as archive:
             entries = archive.infolist()
     except (*DAMAGE, ValueError) as error:
         raise UserError(f"{path}: not a whole .zip ({error}); get it again") from error
+    if len(entries) != stated:
+        raise UserError(
+            f"{path}: not a whole .zip: it says that it has {stated} files, and lists"
+            f" {len(entries)}; get it again"
+        )
     found = {
         name: entry
         for entry in entries
@@ -83,12 +88,14 @@ def _members(path: str, changed: int, size: int) -> Mapping[str, zipfile.ZipInfo
     return found
 
 
-def _check_directory(path: str, size: int) -> None:
-    """Raise `UserError` where the table of contents is missing or too large to be read at all."""
+def _check_directory(path: str, size: int) -> int:
+    """How many files an archive says it has; raises `UserError` where its table of contents is
+    missing, or too large to be read at all.
+    """
     if size > LARGEST_ZIP:
         raise UserError(
             f"{path} has {size / 1e6:.4g} MB, and a .zip that is read at most"
-            f" {LARGEST_ZIP / 1e6:.4g} MB: unpack it, and give a file of it"
+            f" {LARGEST_ZIP / 1e6:.4g} MB: extract it, and give a file of it"
         )
     with open(path, "rb") as file:
         file.seek(max(0, size - LONGEST_END))
@@ -96,12 +103,13 @@ def _check_directory(path: str, size: int) -> None:
     at = tail.rfind(END_MARK)
     if at < 0 or len(tail) - at < END.size:
         raise UserError(f"{path}: not a whole .zip: it has no table of contents; get it again")
-    directory = END.unpack_from(tail, at)[5]
+    stated, directory = END.unpack_from(tail, at)[4:6]
     if directory > LARGEST_DIRECTORY or tail[max(0, at - 20) : at].startswith(WIDE_MARK):
         raise UserError(
-            f"{path} lists more files than records have, at most {MOST_MEMBERS}: unpack it, and"
+            f"{path} lists more files than records have, at most {MOST_MEMBERS}: extract it, and"
             " give a file of it"
         )
+    return stated
 
 
 def _check_sizes(path: str, found: Mapping[str, zipfile.ZipInfo]) -> None:
@@ -109,25 +117,25 @@ def _check_sizes(path: str, found: Mapping[str, zipfile.ZipInfo]) -> None:
     if len(found) > MOST_MEMBERS:
         raise UserError(
             f"{path} holds {len(found)} files, and a .zip that is read at most {MOST_MEMBERS}:"
-            " unpack it, and give its folder"
+            " extract it, and give its folder"
         )
     for name, entry in found.items():
         large = max(entry.compress_size, 1) * LARGEST_RATIO < entry.file_size > LEAST_BOMB
         if entry.flag_bits & 1:
             raise UserError(
-                f"{path}: '{name}' is encrypted: unpack it with its password, and give the file"
+                f"{path}: '{name}' is encrypted: extract it with its password, and give the file"
             )
         if entry.file_size > LARGEST_MEMBER or large:
             raise UserError(
-                f"{path}: '{name}' unpacks from {entry.compress_size / 1e6:.3g} to"
-                f" {entry.file_size / 1e6:.4g} MB, and at most {LARGEST_MEMBER / 1e6:.4g} MB and"
-                f" {LARGEST_RATIO} times are read: unpack it, and give the file"
+                f"{path}: '{name}' has {entry.file_size / 1e6:.4g} MB, packed as"
+                f" {entry.compress_size / 1e6:.3g} MB, and at most {LARGEST_MEMBER / 1e6:.4g} MB"
+                f" and {LARGEST_RATIO} times are read: extract it, and give the file"
             )
     whole = sum(entry.file_size for entry in found.values())
     if whole > LARGEST_WHOLE:
         raise UserError(
-            f"{path} unpacks to {whole / 1e6:.4g} MB, and at most {LARGEST_WHOLE / 1e6:.4g} MB are"
-            " read: unpack it, and give its folder"
+            f"{path} holds {whole / 1e6:.4g} MB, and at most {LARGEST_WHOLE / 1e6:.4g} MB are"
+            " read: extract it, and give its folder"
         )
 
 
@@ -178,7 +186,7 @@ def open_member(archive: Path, name: str) -> Iterator[IO[bytes]]:
     if entry.compress_type not in METHODS:
         raise UserError(
             f"{archive}: '{name}' is packed in a way that is not read here (method"
-            f" {entry.compress_type}); unpack it, and give the file"
+            f" {entry.compress_type}); extract it, and give the file"
         )
     try:
         with zipfile.ZipFile(archive) as opened, opened.open(entry) as file:

@@ -122,16 +122,24 @@ def lying(data):
     return bytes(changed)
 
 
+def swallowing(data):
+    """The name of the first file so long that it takes in the others' entries."""
+    changed, at = bytearray(data), data.index(b"PK\x01\x02")
+    struct.pack_into("<H", changed, at + 28, 255)
+    return bytes(changed)
+
+
 REFUSED = [
-    ({"a.csv": TABLE}, flagged, "'a.csv' is encrypted: unpack it with its password"),
+    ({"a.csv": TABLE, "b.csv": TABLE}, swallowing, "it says that it has 2 files, and lists 1"),
+    ({"a.csv": TABLE}, flagged, "'a.csv' is encrypted: extract it with its password"),
     ({"a.csv": TABLE}, lying, "'a.csv' is damaged"),
     ({"a.csv": TABLE}, lambda data: data[: len(data) // 2], "not a whole .zip"),
     ({"a.csv": TABLE}, lambda data: b"", "not a whole .zip"),
     ({"a.csv": TABLE}, lambda data: data[:99] + b"\xff" * 9 + data[108:], "'a.csv' is damaged"),
     ({}, lambda data: data, "there is no record in r.zip: it is empty"),
     ({"a.pdf": b"%PDF"}, lambda data: data, "no record in r.zip: it holds a.pdf; endings"),
-    ({"b.zip": b""}, lambda data: data, "holds another archive, 'b.zip': unpack it"),
-    ({"a.csv": bytes(40 << 20)}, lambda data: data, "unpacks from .* to 41.94 MB, and at most"),
+    ({"b.zip": b""}, lambda data: data, "holds another archive, 'b.zip': extract it"),
+    ({"a.csv": bytes(40 << 20)}, lambda data: data, "has 41.94 MB, packed as .* MB, and at most"),
     ({f"{k}.csv": b"" for k in range(2001)}, lambda data: data, "holds 2001 files"),
 ]
 
@@ -157,8 +165,8 @@ def test_another_way_of_packing_is_named(pack):
     [
         ("LARGEST_ZIP", "has .* MB, and a .zip that is read at most"),
         ("LARGEST_DIRECTORY", "lists more files than records have"),
-        ("LARGEST_MEMBER", "'a.csv' unpacks from"),
-        ("LARGEST_WHOLE", "r.zip unpacks to"),
+        ("LARGEST_MEMBER", "'a.csv' has .* packed as"),
+        ("LARGEST_WHOLE", "r.zip holds .* MB"),
     ],
 )
 def test_limits_hold(pack, monkeypatch, limit, words):

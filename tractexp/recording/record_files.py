@@ -59,7 +59,7 @@ def find_packed(archive: Path) -> list[Path]:
         if path.suffix.lower() == archive.suffix.lower():
             within = path.relative_to(archive)
             raise UserError(
-                f"{archive} holds another archive, '{within}': unpack it, and give a file of it"
+                f"{archive} holds another archive, '{within}': extract it, and give a file of it"
             )
     beside = {
         path.parent: {p.name.lower() for p in inside if p.parent == path.parent} for path in inside
