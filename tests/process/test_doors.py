@@ -106,6 +106,10 @@ SHAPES: dict[str, Callable[[Path], object]] = {
     "archive within an archive": lambda path: path.write_bytes(packed().replace(b".csv", b".zip")),
     "archive with nothing": lambda path: path.write_bytes(b"PK\x05\x06" + bytes(18)),
     "archive with a lie": lambda path: path.write_bytes(packed()[:-12] + b"\xff" * 12),
+    "many columns": lambda path: path.write_text(3 * (",".join(["1"] * 300_000) + "\n")),
+    "a name of brackets": lambda path: path.write_text(
+        f"t,{'U [' * 30_000},P,Q\n" + "".join(f"{k},1,1,1\n" for k in range(9))
+    ),
     "no text": lambda path: path.write_bytes(bytes(range(128, 256)) * 50),
 }
 

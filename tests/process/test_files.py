@@ -9,6 +9,7 @@ import resource
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -40,16 +41,21 @@ IN_MEMORY = {"savez_compressed"}  # into a buffer, which is then written
 MODES = set("wax+")
 
 
-def written(path: Path) -> set[str]:
+def calls(path: Path) -> Iterator[tuple[ast.Call, str, str]]:
+    """The calls of a module: each, the name that is called, and what it is called on ("" for
+    nothing).
+    """
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            yield node, node.func.attr, ast.unparse(node.func.value)
+        elif isinstance(node, ast.Call):
+            yield node, getattr(node.func, "id", ""), ""
+
+
+def find_writing_calls(path: Path) -> set[str]:
     """The calls of a module that write a file."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if not isinstance(node, ast.Call):
-            continue
-        name = (
-            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-        )
-        owner = ast.unparse(node.func.value) if isinstance(node.func, ast.Attribute) else ""
+    for node, name, owner in calls(path):
         given = [
             a.value
             for a in (*node.args, *(k.value for k in node.keywords if k.arg == "mode"))
@@ -75,8 +81,8 @@ def test_nothing_but_the_one_door_opens_a_file_to_write():
         if p not in others
     ]
     assert len(sources) > 200
-    assert set().union(*map(written, sources)) == set()
-    assert len(written(DOOR)) >= 6  # what is looked for is found where it is
+    assert set().union(*map(find_writing_calls, sources)) == set()
+    assert len(find_writing_calls(DOOR)) >= 6  # what is looked for is found where it is
 
 
 @pytest.mark.parametrize(
@@ -93,7 +99,7 @@ def test_nothing_but_the_one_door_opens_a_file_to_write():
 def test_the_door_is_missed_by_none_of_these(line, tmp_path, monkeypatch):
     monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
     (tmp_path / "a.py").write_text(line)
-    assert len(written(tmp_path / "a.py")) == 1
+    assert len(find_writing_calls(tmp_path / "a.py")) == 1
 
 
 def test_a_run_opens_files_to_write_by_the_door_only(tmp_path):
@@ -187,7 +193,7 @@ def test_a_full_disk_is_nothing_for_what_is_printed(tmp_path):
 def test_a_lock_is_waited_for_no_longer_than_told(tmp_path):
     script = """
 import sys, time; from pathlib import Path; from tractexp import files
-with files.held(Path(sys.argv[1]), 1):
+with files.lock_file(Path(sys.argv[1]), 1):
     print("held", flush=True); time.sleep(60)"""
     holder = subprocess.Popen(
         [sys.executable, "-c", script, str(tmp_path / "lock")], stdout=-1, text=True
@@ -359,16 +365,10 @@ READ = {  # {module: {call: why it may}}; all else that is read goes through `tr
 }
 
 
-def read_by(path: Path) -> set[str]:
+def find_reading_calls(path: Path) -> set[str]:
     """The calls of a module that read."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if not isinstance(node, ast.Call):
-            continue
-        name = (
-            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
-        )
-        owner = ast.unparse(node.func.value) if isinstance(node.func, ast.Attribute) else ""
+    for _, name, owner in calls(path):
         if name in PARSERS.get(owner, ()):
             found.add(f"{owner}.{name}")
         elif (
@@ -387,5 +387,9 @@ def test_one_door_reads_what_others_may_have_written():
     sources = {p for place in ("tractexp", "plugins") for p in (ROOT / place).rglob("*.py")} - {
         DOOR
     }
-    found = {str(path.relative_to(ROOT)): calls for path in sources if (calls := read_by(path))}
+    found = {
+        str(path.relative_to(ROOT)): names
+        for path in sources
+        if (names := find_reading_calls(path))
+    }
     assert found == {name: set(calls) for name, calls in READ.items()}

@@ -70,6 +70,7 @@ BRACKETED = (
     r"(.+?)\s*/\s*(\S+)",
     r"(.+?)\s+in\s+(\S+)",
 )
+LONGEST_NAME_END = 80  # letters at the end of a name among which its unit is
 UNMISTAKABLE = frozenset(
     (  # as units after a space or an underscore, where V and A may be phases
         "kV",
@@ -321,16 +322,20 @@ class Role:
 def split_unit(name: str) -> tuple[str, str]:
     """A header's name and its unit, "" where it has none: "Voltage [kV]", "U/kV", "Zeit in ms",
     "P_MW".
+
+    A unit stands at the end: before its last letters nothing is looked for, which would take hours
+    in a name of a million brackets.
     """
     name = name.strip().strip('"').strip("'").strip()
+    before, end = name[:-LONGEST_NAME_END], name[-LONGEST_NAME_END:]
     for pattern in BRACKETED:
-        if (match := re.fullmatch(pattern, name)) and is_unit(match[2]):
-            return match[1].strip(), match[2]
-    match = re.fullmatch(r"(.+?)(?:\s*,\s*|\s+|_)(\S+)", name)
+        if (match := re.fullmatch(pattern, end)) and is_unit(match[2]):
+            return before + match[1].strip(), match[2]
+    match = re.fullmatch(r"(.+?)(?:\s*,\s*|\s+|_)(\S+)", end)
     sure = match is not None and (
         match[2] in UNMISTAKABLE or (not match[2].isascii() and is_unit(match[2]))
     )
-    return (match[1], match[2]) if match and sure else (name, "")
+    return (before + match[1], match[2]) if match and sure else (name, "")
 
 
 def is_unit(text: str) -> bool:

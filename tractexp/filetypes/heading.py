@@ -11,6 +11,7 @@ from tractexp.filetypes.cells import is_gap, is_grouped, is_number
 from tractexp.filetypes.clock import is_date, is_time
 from tractexp.filetypes.columns import is_unit, split_unit
 
+MOST_COLUMNS = 4096
 FEWEST_ALIKE_ROWS = 3  # rows of numbers of one length make sure that a table has begun
 
 
@@ -30,8 +31,9 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     """The heading of a table's first rows; `header` is the row of the names, from 0, None to search
     for it.
 
-    Raises `UserError` where there are no rows of numbers, or no names above them.
+    Raises `UserError` where there are no rows of numbers, no names above them, or too many columns.
     """
+    check_column_count(max(map(len, rows), default=0), source)
     begin = 0 if header is None else header + 1
     first = next((i for i in range(begin, len(rows)) if _begins(rows, i)), None)
     if first is None:
@@ -59,6 +61,15 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     groups = named - 2 if beside == named - 1 else named - 1
     names = _join_group_names(rows[groups] if groups >= 0 else [], [name for name, _ in parted])
     return TableHeading(_pad_texts(names, width), _pad_texts(units, width), first, named)
+
+
+def check_column_count(count: int, source: str) -> None:
+    """Raise `UserError` for more columns than can be looked at: what each may be takes time."""
+    if count > MOST_COLUMNS:
+        raise UserError(
+            f"{source} has {count:,} columns; a table has at most {MOST_COLUMNS:,}: leave out those"
+            " that are not of the load"
+        )
 
 
 def is_value(cell: Any) -> bool:

@@ -18,7 +18,7 @@ from tractexp.files import locate_file
 from tractexp.filetypes.cells import BadCell, find_group_mark, is_number, numbers
 from tractexp.filetypes.clock import is_time, times
 from tractexp.filetypes.columns import split_unit
-from tractexp.filetypes.heading import TableHeading, heading
+from tractexp.filetypes.heading import TableHeading, check_column_count, heading
 from tractexp.filetypes.workbook import BadWorkbook, Workbook
 
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
@@ -250,6 +250,7 @@ def _parquet(path: str, data: bytes) -> TableFile:
 
     try:
         file = parquet.ParquetFile(pyarrow.BufferReader(data))
+        check_column_count(file.metadata.num_columns, path)
         if (values := file.metadata.num_rows * file.metadata.num_columns) > MOST_TABLE_VALUES:
             raise UserError(
                 f"{path}: {values:,} values are more than the {MOST_TABLE_VALUES:,} that can be"
