@@ -8,6 +8,7 @@ in.
 import contextlib
 import dataclasses
 import errno
+import functools
 import importlib.resources
 import io
 import itertools
@@ -220,19 +221,19 @@ def parse_json(text: str, path: Path | str) -> Any:
         raise UserError(f"{path}: a whole number in it has more digits than can be read") from error
 
 
-def read_yaml(path: Path | str) -> Any:
-    """What a configuration in YAML holds: plain data. Raises `UserError` for what is none, and as
-    `read`.
+def read_yaml(path: Path | str, largest: int = CONFIGURATION) -> Any:
+    """What a configuration in YAML holds: plain data, in which 1e-3 is a number. Raises `UserError`
+    for what is none, and as `read`.
 
     An alias repeats what it stands for, so that a few lines of aliases of aliases fill any memory.
     What they come to is counted before anything is made of it.
     """
     import yaml
 
-    text = read_text(path, CONFIGURATION)
+    text = read_text(path, largest)
     try:
         _count_nodes(text, path)
-        return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        return yaml.load(text, _yaml_loader())
     except yaml.MarkedYAMLError as error:
         line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
         raise UserError(
@@ -241,6 +242,19 @@ def read_yaml(path: Path | str) -> Any:
     # a sign that YAML has not, a date that the calendar has not
     except (yaml.YAMLError, ValueError) as error:
         raise UserError(f"{path}: not valid YAML ({str(error).splitlines()[0]:.200})") from error
+
+
+@functools.cache
+def _yaml_loader() -> Any:
+    """YAML's safe loader, for which 1e-3 is a number, as for people."""
+    import yaml
+
+    class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
+        pass
+
+    number = re.compile(r"[-+]?\d[\d_]*[eE][-+]?\d+$")
+    Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+0123456789"))
+    return Loader
 
 
 def _count_nodes(text: str, path: Path | str) -> None:
@@ -252,7 +266,7 @@ def _count_nodes(text: str, path: Path | str) -> None:
     sizes: dict[str, int] = {}
     # collections that are open: anchor, nodes so far
     within: list[tuple[str | None, int]] = [(None, 0)]
-    for event in yaml.parse(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
+    for event in yaml.parse(text, _yaml_loader()):
         if isinstance(event, yaml.CollectionStartEvent):
             within.append((event.anchor, 1))
         elif isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent):

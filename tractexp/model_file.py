@@ -6,8 +6,6 @@ here for both the command line (`tractexp.config`) and Python (`tractexp.composi
 model, names of its parts, and values.
 """
 
-import functools
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import fields
@@ -20,7 +18,6 @@ from tractexp.schema import ModelConfig
 
 ENDINGS = (".yaml", ".yml")
 LARGEST = 1 << 20  # bytes
-DEEPEST_VALUES = 20  # levels of values within one another
 # characters of the name of a choice: a system takes no file's name of more than some 250
 LONGEST_CHOICE_NAME = 100
 DEFAULTS, SELF = "defaults", "_self_"
@@ -41,7 +38,12 @@ def read_model_file(path: Path | str) -> dict[str, Any]:
     Raises `UserError` where the file is missing, too large, not YAML, or holds anything else than
     values of a model.
     """
-    content = _parse(path, _read_text(path))
+    try:
+        content = files.read_yaml(path, LARGEST) or {}
+    except FileNotFoundError:
+        raise UserError(f"model={path}: there is no such file") from None
+    if not isinstance(content, dict):
+        raise UserError(f"{path} must hold keys and values of a model")
     keys = [DEFAULTS, *(field.name for field in fields(ModelConfig))]
     for key in content:
         if key not in keys:
@@ -50,62 +52,6 @@ def read_model_file(path: Path | str) -> dict[str, Any]:
         content[DEFAULTS] = _check_defaults(path, content[DEFAULTS])
     _check_values(path, "model", {key: value for key, value in content.items() if key != DEFAULTS})
     return content
-
-
-def _read_text(path: Path | str) -> str:
-    try:
-        if files.there(path) and os.stat(path).st_size > LARGEST:
-            raise UserError(f"{path} has more than {LARGEST >> 20} MB: it is no file of a model")
-        return files.read(path, LARGEST).decode("utf-8-sig")
-    except FileNotFoundError:
-        raise UserError(f"model={path}: there is no such file") from None
-    except UnicodeDecodeError as error:
-        raise UserError(
-            f"{path}: byte {error.start + 1} is not UTF-8 text; a model's file is YAML in UTF-8"
-        ) from error
-
-
-def _parse(path: Path | str, text: str) -> dict[str, Any]:
-    import yaml
-
-    try:
-        content = yaml.load(text, Loader=_loader()) or {}
-    except yaml.YAMLError as error:
-        raise UserError(
-            f"{path} is not the YAML of a model: {' '.join(str(error).split()):.200}"
-        ) from error
-    except ValueError as error:  # what Python's reader of numbers and dates refuses
-        raise UserError(f"{path}: it holds a value that cannot be read ({error})") from error
-    if not isinstance(content, dict):
-        raise UserError(f"{path} must hold keys and values of a model")
-    return content
-
-
-@functools.cache
-def _loader() -> Any:
-    """YAML's safe loader, for values that stand where they are written, few levels deep; 1e-3 is a
-    number.
-    """
-    import yaml
-
-    class Loader(yaml.SafeLoader):
-        level = 0
-
-        def compose_node(self, parent: Any, index: Any) -> Any:
-            if self.check_event(yaml.AliasEvent):
-                raise yaml.YAMLError("it has an alias (*name); write the value itself")
-            if self.level > DEEPEST_VALUES:
-                raise yaml.YAMLError(
-                    f"its values lie more than {DEEPEST_VALUES} levels within one another"
-                )
-            self.level += 1
-            node = super().compose_node(parent, index)
-            self.level -= 1
-            return node
-
-    number = re.compile(r"[-+]?\d[\d_]*[eE][-+]?\d+$")
-    Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+0123456789"))
-    return Loader
 
 
 def _check_defaults(path: Path | str, defaults: Any) -> list[Any]:

@@ -335,7 +335,6 @@ READ = {  # {module: {call: why it may}}; all else that is read goes through `tr
     },
     "tractexp/texts.py": {"read_bytes": "code"},
     "tractexp/provenance.py": {"read_bytes": "code"},
-    "tractexp/model_file.py": {"yaml.load": "a text that `files` has read"},
     "tractexp/model/model.py": {"json.loads": "the store, whose entries are its own"},
     "tractexp/kernel/kernel.py": {"json.loads": "the store"},
     "tractexp/store.py": {"np.load": "the store; nothing is unpickled"},

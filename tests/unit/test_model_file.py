@@ -7,7 +7,8 @@ import pytest
 import tractexp
 from tractexp.composition import read_choice
 from tractexp.errors import UserError
-from tractexp.model_file import DEEPEST_VALUES, LARGEST, read_model_file
+from tractexp.files import DEEPEST
+from tractexp.model_file import LARGEST, read_model_file
 from tractexp.overrides import overrides
 
 GOOD = """\
@@ -63,18 +64,18 @@ def test_a_file_may_begin_with_a_shipped_choice(write):
         ("defaults: [../other]", "its defaults have ../other"),
         ("fixed: {C: '${oc.env:SECRET}'}", r"model\.fixed\.C is \$\{oc\.env"),
         ("effects: ['???']", "no references to others"),
-        ("effects: !!python/object/apply:os.system [ls]", "not the YAML of a model"),
-        ("a: &a [1]\nb: *a", "alias"),
+        ("effects: !!python/object/apply:os.system [ls]", "not valid YAML"),
+        ("fixed: &a {C: *a}", "aliases written out"),
         (
-            "fixed: " + "[" * (DEEPEST_VALUES + 5) + "]" * (DEEPEST_VALUES + 5),
-            f"more than {DEEPEST_VALUES} levels",
+            "fixed: " + "[" * (DEEPEST + 5) + "]" * (DEEPEST + 5),
+            f"more than {DEEPEST} deep",
         ),
-        ("fixed: " + "[" * 100_000, f"more than {DEEPEST_VALUES} levels"),
+        ("fixed: " + "[" * 100_000, f"more than {DEEPEST} deep"),
         ("fixed: {1: 2}", "keys are names"),
         ("- a list", "must hold keys and values"),
-        ("fixed: {C", "not the YAML of a model"),
-        ("fixed: {C: 2026-13-45}", "a value that cannot be read"),
-        ("# " + "x" * LARGEST, "more than 1 MB"),
+        ("fixed: {C", "not valid YAML"),
+        ("fixed: {C: 2026-13-45}", "not valid YAML"),
+        ("# " + "x" * LARGEST, "a file of its kind at most"),
     ],
 )
 def test_what_is_no_model_is_refused(write, text, sentence):
