@@ -37,7 +37,8 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from tractexp import files
+from tractexp import files, tracking
+from tractexp.api.task import Job
 from tractexp.cli.again import build_repeat_command
 from tractexp.errors import UserError
 from tractexp.run_folder import CONFIGURATION, GOES, LOCK, NEXT, WHOLE, run_folder
@@ -46,7 +47,7 @@ from tractexp.tracking import TrackedRun, runfile, sync
 # of `os`: each changes what is on the disk
 CALLS = ("replace", "mkdir", "unlink", "rmdir", "open", "fsync")
 URI = "sqlite:////nowhere/mlflow.db"
-SEEDS, MOMENTS = st.integers(1, 4), st.integers(1, 160)
+SEEDS, MOMENTS = st.integers(1, 4), st.integers(1, 120)
 COUNTS: collections.Counter[str] = collections.Counter()
 STATES: set[tuple[bool, ...]] = set()
 
@@ -148,14 +149,17 @@ class RunMachine(RuleBasedStateMachine):
     # What is done
 
     def perform(self, seed: int) -> None:
-        with run_folder(self.folder, configuration_of(self.folder, seed), frozenset()) as place:
-            place.place(write(seed))
-            entry = runfile.save(
-                self.folder,
-                TrackedRun("e", str(seed), artifacts=[self.folder / "result.json"]),
-                URI,
-            )
-            entry.logged(self.shelf.log(entry.run, URI))
+        def track(paths: list[Path]) -> TrackedRun:
+            return TrackedRun("e", str(seed), artifacts=paths)
+
+        with (
+            run_folder(self.folder, configuration_of(self.folder, seed), frozenset()) as place,
+            mock.patch.object(tracking, "log", self.shelf.log),
+            contextlib.redirect_stdout(io.StringIO()),
+        ):
+            config = {"tracking": {"enabled": True, "uri": URI}}
+            job = Job(config, {}, self.folder, placed=place.place)
+            job.send(track(job.write(write(seed), track)))
 
     @initialize(seed=st.none() | SEEDS)
     def begin(self, seed):
@@ -235,7 +239,9 @@ class RunMachine(RuleBasedStateMachine):
         with mock.patch.multiple(sync, **stand_ins):
             counts = sync.sync(self.root)
         assert counts[sync.NOT] == 0
-        if (one := runfile.read(self.folder)) is not None:
+        one = runfile.read(self.folder)
+        assert (one is not None) == (self.folder / "result.json").exists()
+        if one is not None:  # a whole result is in the store, whatever ended its run
             keys = [content["key"] for content in self.shelf.runs().values()]
             assert keys.count(one.run.key) == 1
             assert one.run.name == str(self.seed())
@@ -287,8 +293,8 @@ class RunMachine(RuleBasedStateMachine):
 
 RunMachine.TestCase.settings = settings(deadline=None)
 SHORT = settings(
-    max_examples=12,
-    stateful_step_count=15,
+    max_examples=40,
+    stateful_step_count=12,
     deadline=None,
     suppress_health_check=[*HealthCheck],
     database=None,

@@ -399,6 +399,19 @@ def claim_file(path: Path, claimant: str) -> Iterator[None]:
                 path.unlink()
 
 
+def read_claim(path: Path) -> str:
+    """By whom a file is held that `claim_file` made; "" where nobody holds it."""
+    try:
+        with open_ordinary_file(path) as file:
+            return "" if _try_lock(file) else _read_claimant(file)
+    except OSError:
+        return ""
+
+
+def _read_claimant(file: IO[bytes]) -> str:
+    return file.read(200).decode(errors="replace") or "another process"
+
+
 def _take_lock(path: Path) -> IO[bytes]:
     """The file of a lock, locked. What was removed between opening and locking it is
     none any more.
@@ -410,9 +423,8 @@ def _take_lock(path: Path) -> IO[bytes]:
             if not _try_lock(file):
                 file.seek(0)
                 raise UserError(
-                    f"{path.parent} is in use by"
-                    f" {file.read(200).decode(errors='replace') or 'another process'}: wait"
-                    " until that has ended, or give another folder"
+                    f"{path.parent} is in use by {_read_claimant(file)}: wait until that has"
+                    " ended, or give another folder"
                 )
             if os.name == "nt" or (
                 path.exists() and os.path.samestat(os.fstat(file.fileno()), os.stat(path))

@@ -152,6 +152,25 @@ def settle(folder: Path) -> bool:
         return _settle(folder)
 
 
+def find_run(folder: Path) -> Path | None:
+    """The folder of the run whose files lie in a folder: itself, but where they have not their
+    places yet; None where that run is not whole.
+    """
+    if folder.name.startswith(f"{NEXT}."):
+        return None
+    return folder.parent if folder.name == WHOLE else folder
+
+
+def find_holder(folder: Path) -> str:
+    """Which other process is at work in a folder; "" where none is."""
+    holder = files.read_claim(folder / LOCK)
+    return "" if holder.startswith(_describe_process()) else holder
+
+
+def _describe_process() -> str:
+    return f"process {os.getpid()} on {socket.gethostname()}, "
+
+
 @contextlib.contextmanager
 def hold(folder: Path) -> Iterator[None]:
     """Hold a folder, created where there is none, for this process alone. Raises `UserError` where
@@ -159,9 +178,7 @@ def hold(folder: Path) -> Iterator[None]:
     """
     since = time.strftime("%Y-%m-%d %H:%M:%S")
     try:
-        with files.claim_file(
-            folder / LOCK, f"process {os.getpid()} on {socket.gethostname()}, since {since}"
-        ):
+        with files.claim_file(folder / LOCK, f"{_describe_process()}since {since}"):
             yield
     finally:
         with contextlib.suppress(OSError):  # where it is not empty

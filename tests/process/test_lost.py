@@ -169,6 +169,62 @@ def test_what_an_attempt_left_half_done_goes_when_the_run_is_brought_in(tmp_path
     assert [r.info.run_id for r in runs(uri)] == [whole.run_id]
 
 
+KILLED_BEFORE_IT_IS_LOGGED = """
+import os, sys
+from tractexp.__main__ import main
+from tractexp.api.task import Job
+Job.send = lambda *_: os.kill(os.getpid(), 9)
+main(sys.argv[1:])"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="ends a process by a signal")
+def test_a_run_killed_with_its_result_whole_is_brought_in_from_its_folder_once(tmp_path, uri):
+    script = [sys.executable, "-c", KILLED_BEFORE_IT_IS_LOGGED]
+    settings = (*SIMULATE, "seed=3", f"tracking.uri={uri}")
+    done = subprocess.run([*script, *settings], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert sync(tmp_path) == {BROUGHT: 1}
+    assert sync(tmp_path) == {THERE: 1}
+    (found,) = runs(uri)
+    assert (found.info.status, found.data.params["seed"]) == ("FINISHED", "3")
+    listed = {one.path for one in open_store(uri).list_artifacts(found.info.run_id)}
+    assert listed == {"response.csv", ".hydra"}
+
+
+def test_what_is_not_whole_or_has_not_its_places_yet_is_no_run_of_its_own(tmp_path, uri):
+    from tractexp.run_folder import NEXT, WHOLE
+
+    for place in (f"{NEXT}.17.abc", WHOLE):
+        save(tmp_path / "run", run(place), uri, place=tmp_path / "run" / place)
+    assert sync(tmp_path) == {BROUGHT: 1}
+    assert [one.info.run_name for one in runs(uri)] == [WHOLE]
+    assert (tmp_path / "run" / FILE).exists()
+
+
+def test_a_run_that_is_at_work_logs_itself(tmp_path, uri):
+    from tractexp.run_folder import LOCK
+    from tractexp.tracking.sync import WORKS
+
+    script = """
+import sys, time; from pathlib import Path; from tractexp.run_folder import hold
+with hold(Path(sys.argv[1])):
+    print("held", flush=True); time.sleep(60)"""
+    save(tmp_path / "sweep", TrackedRun("e", "a sweep"), uri, sweep=True)
+    (tmp_path / "sweep" / "multirun.yaml").touch()
+    save(tmp_path / "sweep" / "0", run("its job"), uri)
+    holder = subprocess.Popen(
+        [sys.executable, "-c", script, str(tmp_path / "sweep")], stdout=-1, text=True
+    )
+    try:
+        assert holder.stdout.readline() == "held\n"
+        assert sync(tmp_path) == {WORKS: 2}
+    finally:
+        holder.kill()
+        holder.communicate()
+    assert (tmp_path / "sweep" / LOCK).exists()  # a killed one leaves it, and holds nothing
+    assert sync(tmp_path) == {BROUGHT: 2}
+
+
 def test_a_run_deleted_in_mlflow_stays_so_and_a_damaged_file_hides_no_other(tmp_path, uri):
     for name in ("a", "b"):
         save(tmp_path / name, run(name), uri)

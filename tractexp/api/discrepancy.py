@@ -36,6 +36,7 @@ from tractexp.wording import join_words, shown_in_words, with_error
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.investigate import Findings as Steps
+    from tractexp.tracking import TrackedRun
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -511,7 +512,10 @@ class Discrepancy(Task, call=investigate):
     def conclude(self, job: Job, result: Written) -> None:
         """The page's path and the command that uses the extended model end what is printed."""
         assert isinstance(result, Investigation)
-        results = job.write(functools.partial(result.write_results, home=job.folder))
+        results = job.write(
+            functools.partial(result.write_results, home=job.folder),
+            lambda paths: self.track(job, result, paths),
+        )
         paths = {path.name: path for path in (*results, *result.write_drawings(job.folder))}
         say()
         show(result.summary(), console())
@@ -523,13 +527,15 @@ class Discrepancy(Task, call=investigate):
         say(f"beside it: {', '.join(beside)}")
         for line in _next_commands(result, paths):
             say(line)
-        conf, model = job.folder / "conf", paths.get("extended.yaml")
-        artifacts = [
-            *(p for p in paths.values() if conf not in p.parents),
-            *([conf] if model else []),
-        ]
-        content = {"values": {}, "artifacts": [*artifacts, job.folder / ".hydra"]}
-        job.log(**content | self.logged(job, result))
+        self.log(job, result, [*paths.values()])
+
+    def track(self, job: Job, result: Any, paths: list[Path]) -> "TrackedRun | None":
+        """The folder of the extended model is one artifact."""
+        conf = job.folder / "conf"
+        artifacts = [path for path in paths if conf not in path.parents]
+        if len(artifacts) < len(paths):
+            artifacts.append(conf)
+        return super().track(job, result, artifacts)
 
     def logged(self, job: Job, result: Investigation) -> dict[str, Any]:
         """Verdict, gap and page, and below this run one for every set of effects that

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import inspect
 import re
+import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from tractexp.run_folder import Write
 
 if TYPE_CHECKING:
     from tractexp.record.identity import Identity
+    from tractexp.tracking import TrackedRun
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
 # The equations of a model, without what is known of its parameters but that they may be held to
@@ -156,7 +158,7 @@ class Task(Plugin):
 
     def conclude(self, job: "Job", result: Written) -> None:
         """Write a result, show it, draw it, log it."""
-        paths = job.write(result.write_results)
+        paths = job.write(result.write_results, lambda paths: self.track(job, result, paths))
         say()
         show(result.summary(), console())
         say()
@@ -166,8 +168,13 @@ class Task(Plugin):
         self.log(job, result, paths)
 
     def log(self, job: "Job", result: Any, paths: list[Path]) -> None:
+        if (run := self.track(job, result, paths)) is not None:
+            job.send(run)
+
+    def track(self, job: "Job", result: Any, paths: list[Path]) -> "TrackedRun | None":
+        """The run as it is logged, with files of its folder; None where none is."""
         content = {"name": self.name, "artifacts": [*paths, job.folder / ".hydra"]}
-        job.log(**content | self.logged(job, result))
+        return job.track(**content | self.logged(job, result))
 
     def logged(self, job: "Job", result: Any) -> dict[str, Any]:
         """What is logged of a result: fields of `tractexp.tracking.TrackedRun`, and `values` that
@@ -293,11 +300,31 @@ class Job:
             self.events.train, self.config["model"], objective=self.config["objective"]
         ).problem
 
-    def write(self, results: Write) -> list[Path]:
+    def write(
+        self, results: Write, track: "Callable[[list[Path]], TrackedRun | None]"
+    ) -> list[Path]:
         """Write the results of a run into its folder: an earlier run's are there until these are
         whole. Their paths.
+
+        What is to be logged of them is written beside them before they have their places. So
+        whoever ends this process leaves no result that `tractexp sync` would not bring in.
         """
-        return results(self.folder) if self.placed is None else self.placed(results)
+
+        def write_whole(folder: Path) -> list[Path]:
+            from tractexp.tracking.runfile import save
+
+            paths = results(folder)
+            run = track([self.folder / path.relative_to(folder) for path in paths])
+            if run is not None:
+                save(self.folder, replace(run, key=self.key), self.store, place=folder)
+            return paths
+
+        return write_whole(self.folder) if self.placed is None else self.placed(write_whole)
+
+    @functools.cached_property
+    def key(self) -> str:
+        """What identifies its run in the store."""
+        return uuid.uuid4().hex
 
     def tell(self, line: str) -> None:
         """Print a line of a call's progress. The first comes once the input is found right: then
@@ -380,14 +407,15 @@ class Job:
         if self.config["tracking"]["enabled"] and not self.in_sweep:
             _ = self._logger
 
-    def log(
+    def track(
         self,
         name: str,
         values: Mapping[str, float] | None = None,
         tags: Mapping[str, str] | None = None,
         **content: Any,
-    ) -> None:
-        """Log this job in MLflow with its configuration and tags, and say how to look at it.
+    ) -> "TrackedRun | None":
+        """This job as it is logged in MLflow, with its configuration and tags; None where it is not
+        to be.
 
         `values` are numbers that were given beside the configuration, `tags` are added to the job's
         own; `content` are further fields of `tractexp.tracking.TrackedRun`.
@@ -395,7 +423,7 @@ class Job:
         node = self.config["tracking"]
         self.measured.update(content.get("metrics", {}))
         if not node["enabled"]:
-            return
+            return None
         from tractexp import tracking
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
@@ -405,7 +433,7 @@ class Job:
             LABEL: self.label,
             **(tags or {}),
         }
-        run = tracking.TrackedRun(
+        return tracking.TrackedRun(
             experiment=self.experiment,
             name=", ".join(filter(None, (self.label, name))),
             parameters={**tracking.flatten(self.config), **(values or {})},
@@ -414,7 +442,6 @@ class Job:
             parent=self.sweep,
             **content,
         )
-        self.send(run)
 
     @property
     def look(self) -> str:
@@ -424,8 +451,8 @@ class Job:
         uri = tracking.chosen_uri(self.config["tracking"]["uri"])
         return quoting.shell("tractexp", "ui", *(["--uri", uri] if uri else []))
 
-    def send(self, run: Any) -> None:
-        """Log a run (`tracking.TrackedRun`), and say how to look at it.
+    def send(self, run: "TrackedRun") -> None:
+        """Log a run, and say how to look at it.
 
         It is kept in the folder first. Where the store cannot be used, that is a sentence: the
         results are there.
@@ -436,7 +463,7 @@ class Job:
 
         entry = None
         try:
-            entry = save(self.folder, run, self.store)
+            entry = save(self.folder, replace(run, key=self.key), self.store)
             if not self.logs or (
                 self.in_sweep and sweepfile.waits(sweepfile.folder_of(self.folder))
             ):

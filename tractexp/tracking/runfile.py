@@ -16,7 +16,7 @@ from typing import Any
 
 from tractexp import files
 from tractexp.errors import UserError
-from tractexp.run_folder import settle
+from tractexp.run_folder import find_run, settle
 from tractexp.tracking.run import Line, TrackedRun, choose_curve_points, flatten
 
 FILE = "mlflow.json"
@@ -62,8 +62,10 @@ class RunFile:
     run_id: str = ""
     sweep: bool = False
 
-    def write(self) -> "RunFile":
-        """Write it. Raises `UserError` where that is impossible."""
+    def write(self, place: Path | None = None) -> "RunFile":
+        """Write it, into another `place` where its folder is still to get it. Raises `UserError`
+        where that is impossible.
+        """
         content = {
             "uri": self.uri,
             "run_id": self.run_id,
@@ -71,7 +73,7 @@ class RunFile:
             "run": _plain(self.run, self.folder),
         }
         files.write(
-            self.folder / FILE,
+            (place or self.folder) / FILE,
             json.dumps(content, ensure_ascii=False, default=str) + "\n",
             private=True,
         )
@@ -82,12 +84,14 @@ class RunFile:
         return replace(self, run_id=run_id, uri=uri or self.uri).write()
 
 
-def save(folder: Path, run: TrackedRun, uri: str, sweep: bool = False) -> RunFile:
+def save(
+    folder: Path, run: TrackedRun, uri: str, sweep: bool = False, place: Path | None = None
+) -> RunFile:
     """Write down what is to be logged, with a key that identifies it, and the time at which the run
-    ended.
+    ended; into another `place` where the folder is still to get it.
     """
     key, ended = run.key or uuid.uuid4().hex, run.ended or time.time()
-    return RunFile(folder, replace(run, key=key, ended=ended), uri, sweep=sweep).write()
+    return RunFile(folder, replace(run, key=key, ended=ended), uri, sweep=sweep).write(place)
 
 
 def read(folder: Path) -> RunFile | None:
@@ -112,9 +116,8 @@ def read(folder: Path) -> RunFile | None:
 
 def below(root: Path) -> list[Path]:
     """The folders at `root` and below that have such a file, those above first."""
-    return sorted(
-        (path.parent for path in root.rglob(FILE)), key=lambda folder: (len(folder.parts), folder)
-    )
+    found = {run for path in root.rglob(FILE) if (run := find_run(path.parent)) is not None}
+    return sorted(found, key=lambda folder: (len(folder.parts), folder))
 
 
 def _plain(run: TrackedRun, folder: Path) -> dict[str, Any]:

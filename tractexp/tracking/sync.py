@@ -11,6 +11,7 @@ from typing import Any
 
 from tractexp import files, quoting
 from tractexp.errors import UserError
+from tractexp.run_folder import find_holder
 from tractexp.tracking import runfile
 from tractexp.tracking.run import (
     KEY,
@@ -25,10 +26,11 @@ from tractexp.tracking.runfile import RunFile
 from tractexp.tracking.store import address, open_store, sentences
 from tractexp.tracking.sweepfile import FILE, PAGES, folder_of, parent_of
 
-THERE, BROUGHT, DELETED, NOT = (
+THERE, BROUGHT, DELETED, WORKS, NOT = (
     "already there",
     "brought in",
     "deleted in MLflow and left so",
+    "still at work",
     "not logged",
 )
 
@@ -48,7 +50,8 @@ def sync(
 
     `tell` hears a sentence for each that could not be. Sending twice is harmless: its key
     identifies a run. Where the folder may be somebody else's, `own` is the only store that what
-    stands in it may name. Of a run nothing is sent that does not lie in its folder.
+    stands in it may name. Of a run nothing is sent that does not lie in its folder, and nothing of
+    one that is still at work.
     """
     counts: Counter[str] = Counter()
     said: set[str] = set()
@@ -61,6 +64,9 @@ def sync(
             counts[NOT] += 1
             continue
         if one is None:
+            continue
+        if find_holder(folder) or (not one.sweep and find_holder(folder_of(folder))):
+            counts[WORKS] += 1  # which logs it itself
             continue
         where = uri or one.uri
         try:

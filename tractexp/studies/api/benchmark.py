@@ -19,6 +19,7 @@ from tractexp.progress import count_parts
 
 if TYPE_CHECKING:
     from tractexp.studies.bbob.runs import BbobRuns
+    from tractexp.tracking import TrackedRun
 
 FUNCTIONS, INSTANCES, DIMENSIONS = tuple(range(1, 25)), (1, 2, 3), (5,)
 MULTIPLIER = 3000
@@ -225,11 +226,11 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
                 optimizers[f"{name} by default" if name == chosen else name] = {"name": name}
         return optimizers
 
-    def log(self, job: Job, result: BenchmarkResult, paths: list[Path]) -> None:
+    def track(self, job: Job, result: BenchmarkResult, paths: list[Path]) -> "TrackedRun | None":
         """The experiment is named after the benchmark: it has no data of the user's."""
         node = job.config["tracking"]
         if not node["enabled"]:
-            return
+            return None
         from tractexp import tracking
 
         metrics = {
@@ -240,7 +241,7 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
             for d in result.bbob.plan.dimensions
         }
         optimizer, seed = job.choices["optimizer"], str(job.seed)
-        run = tracking.TrackedRun(
+        return tracking.TrackedRun(
             experiment=node["experiment"] or "benchmark bbob",
             name=f"{optimizer} on BBOB",
             parameters=tracking.flatten(
@@ -256,4 +257,3 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
             artifacts=paths,
             parent=job.sweep,
         )
-        job.send(run)

@@ -347,6 +347,9 @@ class Compare(Task, call=compare, given=("uri", "experiment")):
         if job.config["tracking"]["enabled"]:
             _track(job, result, paths)
 
+    def track(self, job: Job, result: ComparisonResult, paths: list[Path]) -> None:
+        """Nothing is kept of it: the page is for the run of the sweep, which is in the store."""
+
 
 def _track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
     """Add the page to the sweep's run, or log a run of its own where there is no such run."""

@@ -21,6 +21,7 @@ from tractexp.progress import NEXT_LINES, Pace, say, tell_stages
 if TYPE_CHECKING:
     from tractexp.studies.paper.claims import Claim
     from tractexp.studies.paper.study import Study
+    from tractexp.tracking import TrackedRun
 
 PARTS = (
     "table1",
@@ -257,5 +258,8 @@ class Paper(Task, call=paper):
     def log(self, job: Job, result: PaperResult, paths: list[Path]) -> None:
         if self.docs is not None:
             print_paths(files.copy(path, Path(self.docs)) for path in paths if path.suffix == ".md")
+        super().log(job, result, paths)
+
+    def track(self, job: Job, result: PaperResult, paths: list[Path]) -> "TrackedRun | None":
         metrics = {verdict.replace(" ", "_"): float(n) for verdict, n in result.counts.items()}
-        job.log(name="the paper", metrics=metrics, artifacts=paths)
+        return job.track(name="the paper", metrics=metrics, artifacts=paths)
