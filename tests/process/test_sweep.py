@@ -285,6 +285,98 @@ def test_redo_runs_finished_jobs_again_under_a_new_parent(logged, tmp_path):
     assert (sweep / "sweep.json").read_text() != old
 
 
+ENDS_IN_THE_SECOND_JOB = """
+import os, sys
+from pathlib import Path
+from tractexp.__main__ import main
+from tractexp.api.task import Job
+write = Job.write
+def ends(job, results, track):
+    if job.config["seed"] == 1:
+        print(*sorted(p.name for p in job.folder.iterdir()), file=sys.__stdout__, flush=True)
+        os.kill(os.getpid(), 9)
+    return write(job, results, track)
+Job.write = ends
+main(sys.argv[1:])"""
+
+
+def stay(folder):
+    """What must stay of a job whose new time has not ended: all but what it prints."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != "output.txt" and ".tractexp" not in str(path)
+    }
+
+
+@pytest.mark.skipif(os.name == "nt", reason="ends a process by a signal")
+def test_who_is_killed_while_a_job_is_done_again_loses_nothing_of_the_earlier_time(
+    logged, tmp_path
+):
+    shutil.copytree(logged[1], tmp_path / "sweep")
+    before = {k: stay(tmp_path / "sweep" / str(k)) for k in range(4)}
+    sweep = (*QUICK, ONE, PLAIN, "tracking.enabled=false", "optimizer=ssa,pso", "seed=range(0,2)")
+    again = (*sweep, HERE, "hydra.sweeper.redo=true")
+    script = [sys.executable, "-c", ENDS_IN_THE_SECOND_JOB, "-m", *again]
+    done = subprocess.run(script, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    assert "result.json" in done.stdout.split()  # while the job was at work
+    after = {k: stay(tmp_path / "sweep" / str(k)) for k in range(4)}
+    assert {k: after[k] for k in (1, 2, 3)} == {k: before[k] for k in (1, 2, 3)}
+    assert after[0].keys() == before[0].keys() - {"mlflow.json"}
+    found = results(tmp_path / "sweep")
+    assert found == results(logged[1])
+    assert {end["status"] for end in statuses(tmp_path / "sweep").values()} == {"finished"}
+    done = run_command("-m", *again, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert results(tmp_path / "sweep") == found
+    assert [p for p in (tmp_path / "sweep").rglob(".tractexp*")] == []
+
+
+def test_a_job_that_fails_when_it_is_done_again_leaves_the_earlier_result(
+    logged, tmp_path, monkeypatch
+):
+    from tractexp.api.task import Job
+    from tractexp.errors import UserError
+
+    shutil.copytree(logged[1] / "0", tmp_path / "sweep" / "0")
+    before = stay(tmp_path / "sweep" / "0")
+
+    def fails(*_):
+        raise UserError("the disk has gone")
+
+    monkeypatch.setattr(Job, "write", fails)
+    again = (*QUICK, ONE, PLAIN, HERE, "optimizer=ssa", "seed=0", "hydra.sweeper.redo=true")
+    done = run_command("-m", *again, "tracking.enabled=false", cwd=tmp_path)
+    assert "the disk has gone" in done.stdout
+    after = stay(tmp_path / "sweep" / "0")
+    assert json.loads(after.pop("status.json"))["status"] == "failed"
+    before.pop("status.json")
+    assert after == before
+
+
+@pytest.mark.parametrize("launcher", ["cores", "basic"])
+def test_another_sweeper_finds_a_folder_held_or_another_sweeps(launcher, tmp_path):
+    from tractexp.run_folder import hold
+
+    others = ("hydra/sweeper=basic", f"hydra/launcher={launcher}", "tracking.enabled=false", HERE)
+    held = tmp_path / "sweep" / ("0" if launcher == "basic" else "")
+    with hold(held):
+        done = run_command("-m", *QUICK, *others, "optimizer=pso", "seed=1", cwd=tmp_path)
+    assert done.returncode == 2
+    assert f"{held} is in use by process {os.getpid()} on " in done.stderr
+    shutil.rmtree(tmp_path / "sweep")
+    done = run_command("-m", *QUICK, *others, "optimizer=pso", "seed=1", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = results(tmp_path / "sweep")
+    done = run_command("-m", *QUICK, *others, "optimizer=pso", "seed=2", cwd=tmp_path)
+    if launcher == "basic":  # Hydra names the folder of a job
+        assert "sweep/0 holds a job of another sweep; name another folder" in done.stderr
+        assert results(tmp_path / "sweep") == found
+    else:
+        assert results(tmp_path / "sweep").items() > found.items()
+
+
 def test_failing_jobs_are_isolated_listed_and_change_the_exit_code(site, tmp_path, uri):
     seeds = (0, 2, 3)
     sweep = ("-m", "budget=200", PLAIN, "optimizer=stumbles,pso", "seed=0,2,3", HERE)
@@ -677,7 +769,7 @@ def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp
 
     jobs = [Placed(tmp_path / str(k)) for k in range(4)]
     for job, status in zip(jobs, ("finished", "failed", "interrupted", "interrupted"), strict=True):
-        Status(status, "", "", "", 1.0, {}, 0).write(job.folder)
+        Status(status, "", "", "", 1.0, {}, 0).end(job.folder)
     assert metrics(jobs) == {"jobs": 4, "jobs_finished": 1, "jobs_failed": 1, "jobs_interrupted": 2}
 
 
@@ -707,7 +799,7 @@ def test_a_folder_that_a_full_disk_left_empty_is_the_jobs_again_and_nobody_elses
     jobs = [SweepJob({"seed": k}, {}, (), f"job {k}", "", Path()) for k in range(4)]
     (tmp_path / "0" / ".hydra").mkdir(parents=True)  # a kill before it said what it is
     (tmp_path / "1").mkdir()
-    jobs[2].status.write(tmp_path / "1")  # another job of an earlier sweep
+    jobs[2].status.begin(tmp_path / "1")  # another job of an earlier sweep
     (tmp_path / "2").mkdir()
     (tmp_path / "2" / "mine.txt").write_text("not a job")
     (tmp_path / "4").write_text("nor is this")

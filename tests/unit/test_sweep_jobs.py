@@ -42,7 +42,7 @@ def ended(job: SweepJob, status: str = FINISHED, value: float | None = None) -> 
     """The end of a job, as its worker leaves it."""
     metrics = {} if value is None else {"search_objective": value}
     end = replace(job.status, status=status, seconds=2.0, metrics=metrics)
-    end.write(job.folder)
+    end.end(job.folder)
     return end
 
 
@@ -137,7 +137,7 @@ def test_a_terminal_shows_each_variant_under_a_bar(jobs, monkeypatch):
 
 
 def test_the_end_of_a_job_whose_worker_did_not_answer_is_what_it_had_written(jobs):
-    jobs[0].status.write(jobs[0].folder)  # begun, not ended
+    jobs[0].status.begin(jobs[0].folder)  # begun, not ended
     ends = [ended(jobs[1], FAILED), ended(jobs[2])]
     assert [launcher._trace(one) for one in jobs] == [True, *ends, False]
 

@@ -9,8 +9,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from tractexp import files, tracking
-from tractexp.sweep.job import OUTPUT, SweepJob, prepare_folder, read_shared_events, work
-from tractexp.sweep.status import FILE, Status
+from tractexp.sweep.job import OUTPUT, SweepJob, open_folder, read_shared_events, work
+from tractexp.sweep.status import FILE, FINISHED, Status
 from tractexp.tracking import runfile
 
 CONFIGURATION = ".hydra"  # of a job's folder: written where that lies
@@ -53,13 +53,25 @@ def work_elsewhere(job: SweepJob) -> Delivery:
 
 
 def unpack_job(job: SweepJob, delivery: Delivery) -> Status:
-    """Write what a job left into its folder, its status last; returns how it ended."""
-    prepare_folder(job)
-    for name, content in delivery.contents.items():
-        place = PurePosixPath(name)
-        if place.is_absolute() or ".." in place.parts or place.parts[0] in (CONFIGURATION, FILE):
-            continue
-        path = job.folder.joinpath(*place.parts)
-        files.write(path, content, lasting=False, private=name == runfile.FILE)
-    delivery.end.write(job.folder)
+    """Write what a job left into its folder, its status last; returns how it ended.
+
+    Where it failed, results of an earlier time stay.
+    """
+
+    def write(folder: Path) -> list[Path]:
+        paths = []
+        for name, content in delivery.contents.items():
+            place = PurePosixPath(name)
+            outside = place.is_absolute() or ".." in place.parts
+            if not outside and place.parts[0] not in (CONFIGURATION, FILE):
+                path, private = folder.joinpath(*place.parts), name == runfile.FILE
+                paths.append(files.write(path, content, lasting=False, private=private))
+        return paths
+
+    with open_folder(job) as place:
+        if delivery.end.status == FINISHED:
+            place.place(write)
+        else:
+            write(job.folder)
+    delivery.end.end(job.folder)
     return delivery.end

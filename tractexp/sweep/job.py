@@ -1,8 +1,8 @@
 """One job of a sweep, and how it is run: isolated, silent, with its end on disk."""
 
+import contextlib
 import functools
 import json
-import shutil
 import time
 import traceback
 from collections.abc import Collection, Mapping, Sequence
@@ -13,8 +13,10 @@ from typing import Any
 from tractexp import credentials, files
 from tractexp.api.task import Job, read_events, variant
 from tractexp.cli.chosen import collect_chosen_settings
+from tractexp.cli.configuration import list_named_files
 from tractexp.errors import UserError
-from tractexp.sweep import identity
+from tractexp.run_folder import RunFolder, find_holder, run_folder
+from tractexp.sweep import identity, status
 from tractexp.sweep.output import printing_to
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status, select_returned_metrics
 from tractexp.sweep.surroundings import surround_job
@@ -130,31 +132,51 @@ def find_shared_overrides(jobs: Sequence[SweepJob]) -> set[str]:
 
 
 def work(job: SweepJob, logs: bool = False) -> Status:
-    """Run a job in its own folder, emptied before. Never raises: what goes wrong is in the status
-    returned.
+    """Run a job in its own folder. Never raises: what goes wrong is in the status returned.
 
-    Unless it `logs`, it leaves that to who reads its folder (`recorder`): to import MLflow takes
-    longer than many jobs.
+    Results of an earlier time are there until the new ones are whole, as those of a single run; a
+    job that fails leaves them. Unless it `logs`, it leaves that to who reads its folder
+    (`recorder`): to import MLflow takes longer than many jobs.
 
     What the task prints goes to `output.txt`; an unexpected error leaves its `traceback.txt`.
     """
-    prepare_folder(job)
-    job.status.write(job.folder)
+    try:
+        with open_folder(job) as place:
+            return _work_there(job, place, logs)
+    except UserError as error:
+        ended = replace(job.status, status=FAILED, message=str(error))
+        if not find_holder(job.folder):
+            with contextlib.suppress(UserError):
+                ended.end(job.folder)
+        return ended
+
+
+def open_folder(job: SweepJob) -> contextlib.AbstractContextManager[RunFolder]:
+    """The folder of a job, held for this process. Raises `UserError` where another one is at work
+    there.
+    """
+    return run_folder(job.folder, _describe_configuration(job), list_named_files(job.config))
+
+
+def _work_there(job: SweepJob, place: RunFolder, logs: bool) -> Status:
+    """Run a job in the folder that is held for it."""
+    job.status.begin(job.folder)
+    (job.folder / TRACEBACK).unlink(missing_ok=True)
     started = time.perf_counter()
     output = files.Transcript(job.folder / OUTPUT)
     measured: dict[str, float] = {}
     with output, printing_to(output), surround_job(job) as conclude:
-        message = _run(job, measured, logs)
-        status, seconds = FAILED if message else FINISHED, time.perf_counter() - started
+        message = _run(job, place, measured, logs)
+        seconds = time.perf_counter() - started
         ended = replace(
             job.status,
-            status=status,
+            status=FAILED if message else FINISHED,
             message=message,
             seconds=seconds,
             metrics=files.plain(measured),
         )
         conclude(ended)
-    ended.write(job.folder)
+    ended.end(job.folder)
     return ended
 
 
@@ -162,8 +184,8 @@ def run_job(config: Any) -> float | list[float] | None:
     """Run a job that another launcher of Hydra's has composed and placed, as on a cluster; returns
     what it is worth.
 
-    Raises `UserError` where it failed and the sweeper is not ours, which reads how jobs ended from
-    their folders.
+    Raises `UserError` where its folder is another job's, and where it failed and the sweeper is not
+    ours, which reads how jobs ended from their folders.
     """
     from hydra.core.hydra_config import HydraConfig
     from omegaconf import OmegaConf
@@ -175,13 +197,18 @@ def run_job(config: Any) -> float | list[float] | None:
     overrides: Any = OmegaConf.to_container(hydra.overrides.task)
     composed = Composed(plain, dict(hydra.runtime.choices), str(hydra.sweep.subdir))
     job = SweepJob.of(composed, overrides, Path(hydra.runtime.output_dir))
+    there = status.read(job.folder)
+    if there is not None and there.configuration != job.configuration:
+        raise UserError(
+            f"{job.folder} holds a job of another sweep; name another folder by hydra.sweep.dir"
+        )
     end = work(job, logs=True)
     if end.status == FAILED and not str(hydra.sweeper.get("_target_")).startswith(NAMESPACE):
         raise UserError(f"job {job.name}: {end.message}")
     return job.returned(end)
 
 
-def _run(job: SweepJob, measured: dict[str, float], logs: bool) -> str:
+def _run(job: SweepJob, place: RunFolder, measured: dict[str, float], logs: bool) -> str:
     """Run the task, which notes what it measures; returns what went wrong, in one line, or ""."""
     from tractexp.cli.run import perform
 
@@ -194,6 +221,7 @@ def _run(job: SweepJob, measured: dict[str, float], logs: bool) -> str:
             "given": job.given,
             "measured": measured,
             "read_events": functools.partial(_read_events, job),
+            "placed": place.place,
         }
         perform(Job(job.config, job.choices, job.folder, parent, **about))
         select_returned_metrics(measured, job.returns)
@@ -223,13 +251,10 @@ def _read_once(data: str, inputs: str) -> Any:
     return read_events(json.loads(data))
 
 
-def prepare_folder(job: SweepJob) -> None:
-    """An empty folder with the files a Hydra job has in `.hydra`."""
+def _describe_configuration(job: SweepJob) -> dict[str, str]:
+    """The files that a Hydra job has in `.hydra`, by their names."""
     import yaml
 
-    if job.folder.exists():
-        shutil.rmtree(job.folder)
-    hydra = job.folder / ".hydra"
     runtime = {"cwd": str(Path.cwd()), "output_dir": str(job.folder), "choices": dict(job.choices)}
     around = {
         "hydra": {
@@ -241,6 +266,7 @@ def prepare_folder(job: SweepJob) -> None:
     contents = {"config": dict(job.config), "overrides": list(job.overrides), "hydra": around}
     # ten times as fast, where PyYAML was built with it
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    for name, content in contents.items():
-        text = yaml.dump(content, Dumper=dumper, sort_keys=False, allow_unicode=True)
-        files.write(hydra / f"{name}.yaml", text, lasting=False)
+    return {
+        f"{name}.yaml": yaml.dump(content, Dumper=dumper, sort_keys=False, allow_unicode=True)
+        for name, content in contents.items()
+    }

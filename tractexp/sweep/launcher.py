@@ -16,16 +16,17 @@ from omegaconf import OmegaConf
 from tractexp.api.task import Job
 from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError, check_choice, check_range
+from tractexp.run_folder import hold
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.elsewhere import pack_job, unpack_job, work_elsewhere
 from tractexp.sweep.job import SweepJob, work
 from tractexp.sweep.live import LivePage, keep_live
 from tractexp.sweep.parent import parent_run
-from tractexp.sweep.placing import is_finished, place
+from tractexp.sweep.placing import await_end, is_finished, place
 from tractexp.sweep.progress import progress
 from tractexp.sweep.recorder import Recorder
-from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
+from tractexp.sweep.status import ENDED, FAILED, FINISHED, RUNNING, Status
 from tractexp.workers import Workers, backends
 
 # backends whose workers would inherit a half-done import of another thread
@@ -89,9 +90,12 @@ class Cores(Launcher):
         remaining = [job for job in of_batch if not is_finished(job)]
         page = self._show(folder, jobs, remaining)
         with (
+            hold(folder),
             parent_run(folder, [*self.launched.values()], asked, afresh=False) as recorder,
             keep_live(page, more=True),
         ):
+            for job in remaining:
+                await_end(job)
             self.run(remaining, recorder)
         return [_build_job_return(job, status.read(job.folder)) for job in jobs]
 
@@ -153,20 +157,21 @@ class Cores(Launcher):
             " memory for it?"
         )
         end = replace(job.status, status=FAILED, message=message)
-        job.folder.mkdir(parents=True, exist_ok=True)
-        end.write(job.folder)
+        end.end(job.folder)
         return end
 
 
 def _trace(job: SweepJob) -> Status | bool:
     """What a job has left whose worker did not answer: its end, or whether it had begun."""
-    state = status.read(job.folder)
-    return state if state is not None and state.status != RUNNING else state is not None
+    state = status.read_newest(job.folder)
+    if state is not None and state.status in ENDED:
+        return state
+    return state is not None and state.status == RUNNING
 
 
 def _has_ended(folder: Path) -> bool:
     """Whether the job in a folder has ended well."""
-    state = status.read(folder)
+    state = status.read_newest(folder)
     return state is not None and state.status == FINISHED
 
 

@@ -9,7 +9,7 @@ from tractexp import quoting
 from tractexp.errors import UserError
 from tractexp.sweep import status
 from tractexp.sweep.job import SweepJob
-from tractexp.sweep.status import FINISHED, RUNNING
+from tractexp.sweep.status import ENDED, FINISHED, INTERRUPTED, RUNNING
 
 
 def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
@@ -81,12 +81,23 @@ def is_finished(job: SweepJob) -> bool:
     return same and state.status == FINISHED  # type: ignore[union-attr]
 
 
+def await_end(job: SweepJob) -> None:
+    """Have the end of a job told from that of an earlier time, which stays until then."""
+    if (job.folder / status.FILE).exists():
+        replace(job.status, status=INTERRUPTED).begin(job.folder)
+
+
 def settle(job: SweepJob, end: str, problem: str) -> None:
-    """Write the end of a job that has not written its own."""
-    state = status.read(job.folder)
-    if state is None or state.status == RUNNING:
-        job.folder.mkdir(parents=True, exist_ok=True)
-        replace(job.status, status=end, message=problem).write(job.folder)
+    """Write the end of a job that has not written its own; where it is interrupted, an earlier end
+    stands.
+    """
+    newest, earlier = status.read_newest(job.folder), status.read(job.folder)
+    if newest is not None and newest.status in ENDED:
+        return
+    if end == INTERRUPTED and earlier is not None and earlier.status != RUNNING:
+        status.forget(job.folder)
+    else:
+        replace(job.status, status=end, message=problem).end(job.folder)
 
 
 def _of_jobs(folder: Path) -> list[Path]:

@@ -1,4 +1,9 @@
-"""The state of a job of a sweep: `status.json` in its folder."""
+"""The state of a job of a sweep: `status.json` in its folder.
+
+Where a job is done again, `status.json` tells of the earlier time until this one has ended: so
+whoever ends the process leaves a state that is true of the results beside it. Until then another
+file says how far it is.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -10,9 +15,11 @@ from tractexp.errors import UserError, among
 from tractexp.files import write_json
 
 FILE = "status.json"
+AGAIN = ".tractexp.next.status.json"  # of a job that is done again, until that has ended
 SEARCHED = "search_objective"  # the metric by which optimizers are compared
 ESTIMATED = "objective"
 RUNNING, FINISHED, FAILED, INTERRUPTED = "running", "finished", "failed", "interrupted"
+ENDED = (FINISHED, FAILED)
 KINDS: Mapping[str, Any] = {  # of the entries, which somebody else may have written
     "status": str,
     "message": str,
@@ -48,14 +55,33 @@ class Status:
         value = self.metrics.get(name)
         return float(value) if value is not None and self.status == FINISHED else None
 
-    def write(self, folder: Path) -> None:
+    def begin(self, folder: Path) -> None:
+        """Write the state of a job that has not ended; an earlier end stays."""
+        again = (folder / AGAIN).exists() or (folder / FILE).exists()
+        write_json(folder / (AGAIN if again else FILE), asdict(self))
+
+    def end(self, folder: Path) -> None:
+        """Write how a job has ended."""
         write_json(folder / FILE, asdict(self))
+        forget(folder)
 
 
-def read(folder: Path) -> Status | None:
+def forget(folder: Path) -> None:
+    """Let the earlier end stand, of a job that was to be done again."""
+    (folder / AGAIN).unlink(missing_ok=True)
+
+
+def read_newest(folder: Path) -> Status | None:
+    """The status of the newest time that the job in `folder` was done or is; None where there is
+    none.
+    """
+    return read(folder, AGAIN if (folder / AGAIN).exists() else FILE)
+
+
+def read(folder: Path, name: str = FILE) -> Status | None:
     """The status of the job in `folder`; None where there is none that can be read."""
     try:
-        state = Status(**files.read_json(folder / FILE, files.CONFIGURATION))
+        state = Status(**files.read_json(folder / name, files.CONFIGURATION))
     except (OSError, TypeError, UserError):
         return None
     fits = all(isinstance(getattr(state, name), kinds) for name, kinds in KINDS.items())

@@ -2,7 +2,6 @@
 
 import itertools
 import os
-import shutil
 import sys
 import webbrowser
 from collections.abc import Mapping, Sequence
@@ -32,7 +31,7 @@ from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.live import PAGE, LivePage, keep_live
 from tractexp.sweep.parent import parent_run
-from tractexp.sweep.placing import is_finished, place, placement, settle
+from tractexp.sweep.placing import await_end, is_finished, place, placement, settle
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, INTERRUPTED
 from tractexp.tracking.sweepfile import MULTIRUN, PAGES
@@ -152,8 +151,7 @@ class Grid(Sweeper):
 
     def _run(self, jobs: Sequence[SweepJob], recorder: Recorder) -> None:
         for job in jobs:
-            if job.folder.exists():
-                shutil.rmtree(job.folder)
+            await_end(job)
         end, problem = FAILED, "it ended without a word: its worker was killed or never started"
         try:
             if isinstance(self.launcher, Cores):
