@@ -399,6 +399,18 @@ def test_the_door_is_light():
     assert done.stdout.strip() == "[]", done.stderr
 
 
+def test_a_fitted_model_is_measured_by_the_same_names_whichever_task_fitted_it(found, fit):
+    from tractexp.api.logged import GRADES, measure_model
+
+    for made in (fit, found.fit):
+        metrics = measure_model(made)
+        assert metrics["model_error"] == made.model_error.value
+        assert GRADES[int(metrics["grade"])] == made.grade
+        for name, one in made.parameters.items():
+            assert metrics[name] == one.value
+    assert measure_model(fit)["M_low"] == fit.parameters["M"].interval[0]
+
+
 def test_every_public_name_is_there_and_says_what_it_does():
     from tractexp import PUBLIC
 
