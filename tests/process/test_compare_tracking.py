@@ -189,7 +189,9 @@ def viewed(uri, mode="CHART"):
     """The view that is stored in the newest experiment."""
     page = comparison_view(uri)
     experiment = re.fullmatch(
-        rf"#/experiments/(\d+)/runs\?viewStateShareKey=tractexp&compareRunsMode={mode}", page
+        rf"#/experiments/(\d+)/runs\?viewStateShareKey=tractexp&compareRunsMode={mode}"
+        r"&workflowType=machine_learning",
+        page,
     )[1]
     from mlflow import MlflowClient
 
@@ -229,7 +231,7 @@ def test_the_view_of_a_station_is_a_table_of_its_loads_that_sorts_by_model_error
         strict=True,
     ):
         log(uri, run, load=feeder)
-    assert comparison_view(uri).endswith("&compareRunsMode=TABLE")
+    assert comparison_view(uri).endswith("&compareRunsMode=TABLE&workflowType=machine_learning")
     state = viewed(uri, "TABLE")
     assert state["groupBy"] is None
     assert state["orderByKey"] == "metrics.`model_error`"

@@ -97,7 +97,7 @@ def test_a_new_experiment_leads_to_the_columns_that_matter_from_any_page_of_mlfl
     experiment = client(uri).get_experiment(found.info.experiment_id)
     address = (
         f"#/experiments/{experiment.experiment_id}/runs"
-        "?viewStateShareKey=tractexp&compareRunsMode=TABLE"
+        "?viewStateShareKey=tractexp&compareRunsMode=TABLE&workflowType=machine_learning"
     )
     assert f"]({address})" in experiment.tags["mlflow.note.content"]
     assert experiment.tags["mlflow.experimentKind"] == "custom_model_development"

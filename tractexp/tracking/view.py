@@ -16,7 +16,9 @@ from tractexp.tracking.run import tag_experiment
 from tractexp.tracking.store import open_store, sentences
 
 KEY = "tractexp"
-# a tag, and its value: else MLflow shows an experiment as one of language models
+# Else MLflow's page is one for language models: in earlier versions by this tag of an experiment,
+# in later ones by the address.
+WORKFLOW = "workflowType=machine_learning"
 KIND, MODELS = "mlflow.experimentKind", "custom_model_development"
 TAG = f"mlflow.sharedViewState.{KEY}"
 SECTION = "tractexp-charts"
@@ -157,7 +159,8 @@ def _of_loads() -> dict[str, Any]:
 
 def page(experiment_id: str, mode: str) -> str:
     """The address of the view within MLflow's page."""
-    return f"#/experiments/{experiment_id}/runs?viewStateShareKey={KEY}&compareRunsMode={mode}"
+    view = f"viewStateShareKey={KEY}&compareRunsMode={mode}"
+    return f"#/experiments/{experiment_id}/runs?{view}&{WORKFLOW}"
 
 
 def tags_of_new(experiment_id: str) -> dict[str, str]:
