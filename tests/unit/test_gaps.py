@@ -142,6 +142,22 @@ class TestTables:
         assert np.flatnonzero(np.isnan(record.P)).tolist() == [BEFORE, INSIDE]
         assert f"'{name}' marks 2 single rows as bad: left out" in record.notes
 
+    @pytest.mark.parametrize("fill", [0.0, -9999.0, 1e30])
+    def test_a_frame_that_was_filled_in_is_as_missing(self, tmp_path, fill):
+        table = {key: x.copy() for key, x in COLUMNS.items()}
+        for key in "UPQ":
+            table[key][[BEFORE, INSIDE]] = fill
+        record = only(written(tmp_path / "a.csv", table)).record
+        assert_allclose(record.U, U, atol=2e-5)
+        assert np.flatnonzero(np.isnan(record.P)).tolist() == [BEFORE, INSIDE]
+        assert any(f"2 single rows hold nothing but {fill:g}" in note for note in record.notes)
+
+    def test_a_voltage_of_zero_alone_is_no_lost_frame(self, tmp_path):
+        table = {key: x.copy() for key, x in COLUMNS.items()}
+        table["U"][BEFORE] = 0.0
+        with pytest.raises(tractexp.UserError, match="U = 0, but voltage must be above zero"):
+            only(written(tmp_path / "a.csv", table))
+
     def test_rows_marked_in_a_row_are_said_and_used(self, tmp_path):
         marks = ["Good"] * len(TIMES)
         marks[300:320] = ["Bad"] * 20

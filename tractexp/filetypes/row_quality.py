@@ -1,5 +1,5 @@
 """Rows that a table itself marks as bad: by a word, by the data error of a synchrophasor's status
-word (IEEE C37.118.2, bits 15 and 14 of STAT), or by OPC's quality code.
+word (IEEE C37.118.2, bits 15 and 14 of STAT), by OPC's quality code, or by one number everywhere.
 """
 
 import re
@@ -22,6 +22,7 @@ BAD = {
     *("false", "schlecht", "ungültig", "mala", "malo", "inválido", "mauvais", "invalide"),
     *("плохое", "недостоверно", "坏", "无效"),
 }
+FEWEST_FILLED = 3  # columns that one number in all of them says to be filled in
 DATA_ERROR = 0xC000  # of STAT: any of these bits says that the values are not to be used
 HEX_WORD = re.compile(r"(0x)?[0-9a-f]{4}h?", re.IGNORECASE)
 OPC_GOOD, OPC_QUALITY = 192, 0xC0  # the code of good values; the bits that are 0 of bad ones
@@ -48,6 +49,22 @@ def find_bad_rows(table: TableFile, count: int) -> tuple[np.ndarray, tuple[str, 
             said.append(f"'{name}' marks {rest} rows as bad, one after another: used as they stand")
         bad |= alone
     return bad, tuple(said)
+
+
+def find_filled_rows(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, tuple[str, ...]]:
+    """(which rows of columns (N,) stand alone and hold one number in all of them, what is said).
+
+    Zeros, or -9999, are what a concentrator writes where a frame did not come.
+    """
+    rows = np.array(columns)
+    filled = (rows == rows[0]).all(axis=0) if len(rows) >= FEWEST_FILLED else rows[0] != rows[0]
+    lost = np.zeros(len(filled), dtype=bool)
+    lost[find_single_gaps(filled)] = True
+    if not lost.any():
+        return lost, ()
+    numbers = ", ".join(f"{x:g}" for x in np.unique(rows[0][lost]))
+    count = np.count_nonzero(lost)
+    return lost, (f"{count} single rows hold nothing but {numbers}: lost frames, left out",)
 
 
 def _read_marks(cells: Sequence[Any], name: str) -> np.ndarray | None:

@@ -20,7 +20,7 @@ from tractexp.filetypes.mapping import (
     map_columns,
 )
 from tractexp.filetypes.moments import times_of
-from tractexp.filetypes.row_quality import find_bad_rows
+from tractexp.filetypes.row_quality import find_bad_rows, find_filled_rows
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar
 from tractexp.filetypes.table import TableFile, TableForm, instrument_of, open_table
 from tractexp.record.phasor import sequences
@@ -254,6 +254,7 @@ def _read(
     kinds = {"t": "time", "frac": "number"}
     cells = table.read({one.number: kinds.get(key, "gaps") for key, one in mapping.columns.items()})
     values = {key: cells[one.number].values for key, one in mapping.columns.items()}
+    lost, lost_said = find_filled_rows([values[key] for key in values.keys() - {"t", "frac"}])
     values |= {
         key: values[key] * by
         for key, one in mapping.columns.items()
@@ -266,8 +267,8 @@ def _read(
     values["t"] = read.t
     bad, said = find_bad_rows(table, len(read.t))
     for key in values.keys() - {"t"}:
-        values[key] = np.where(bad, np.nan, values[key])
-    return values, read.start, (*read.notes, *said)
+        values[key] = np.where(bad | lost, np.nan, values[key])
+    return values, read.start, (*read.notes, *said, *lost_said)
 
 
 def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
