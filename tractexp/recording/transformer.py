@@ -5,7 +5,6 @@ which one is a load's.
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,14 +41,8 @@ def mark_other_sides(
     load, and both say so.
     """
     marked = list(feeders)
-    for a, b in combinations(range(len(marked)), 2):
-        pair = marked[a], marked[b]
-        if not all(f.loaded and len(f.currents) == 3 == len(f.voltages) for f in pair):
-            continue
-        if pair[0].voltages != pair[1].voltages or any(CLOSED_SUM in " ".join(f.why) for f in pair):
-            continue
-        high, low = (a, b) if _size(phasors, pair[0]) < _size(phasors, pair[1]) else (b, a)
-        if not _is_same_current(recording, phasors, marked[high], marked[low]):
+    for high, low in _find_same_currents(recording, phasors, feeders):
+        if not (marked[high].loaded and marked[low].loaded):
             continue
         kept, other = (
             (high, low)
@@ -75,27 +68,49 @@ def _size(phasors: Snapshots, feeder: "Feeder") -> float:
     return phasors.size(feeder.currents)
 
 
-def _is_same_current(
-    recording: Recording, phasors: Snapshots, high: "Feeder", low: "Feeder"
-) -> bool:
-    """Whether the currents are one at all times, but for a ratio and the turn of a vector group.
+def _find_same_currents(
+    recording: Recording, phasors: Snapshots, feeders: "Sequence[Feeder]"
+) -> list[tuple[int, int]]:
+    """Pairs (high, low side) of feeders at the same voltages whose currents are one at all times,
+    but for a ratio and the turn of a vector group.
 
     Where no name says the sides, only a turn of 30 degrees tells them from two feeders of like
     loads.
     """
-    small, large = _size(phasors, high), _size(phasors, low)
-    if not UNLOADED * large < small < large / LEAST_RATIO:
-        return False
-    X, Y = (phasors.of(f.currents) for f in (high, low))
-    there = np.isfinite(X).all(axis=0) & np.isfinite(Y).all(axis=0)
-    x, y = (sequences(each[:, there])[0] for each in (X, Y))
-    named = _find_sides(recording, high, low) is not None
-    by = np.vdot(x, y) / max(float(np.vdot(x, x).real), 1e-300)
-    rest = float(np.linalg.norm(y - by * x) / max(np.linalg.norm(y), 1e-300))
-    turned = float(np.degrees(np.angle(by)))
-    if rest > LARGEST_REST[named] or abs(turned - 30 * round(turned / 30)) > LARGEST_TURN[named]:
-        return False
-    return named or round(turned / 30) % 2 == 1
+    buses: dict[tuple[int, ...], list[int]] = {}
+    for k, f in enumerate(feeders):
+        closes = CLOSED_SUM in " ".join(f.why)
+        if f.loaded and len(f.currents) == 3 == len(f.voltages) and not closes:
+            buses.setdefault(f.voltages, []).append(k)
+    pairs = []
+    for bus in (np.array(bus) for bus in buses.values() if len(bus) > 1):
+        rest, turned = _compare_currents(phasors, [feeders[k] for k in bus])
+        for a, b in zip(*np.nonzero(rest < LARGEST_REST[True]), strict=True):
+            high, low = int(bus[a]), int(bus[b])
+            small, large = (_size(phasors, feeders[k]) for k in (high, low))
+            steps = round(turned[a, b] / 30)
+            named = _find_sides(recording, feeders[high], feeders[low]) is not None
+            alike = rest[a, b] < LARGEST_REST[named]
+            alike &= abs(turned[a, b] - 30 * steps) < LARGEST_TURN[named]
+            if alike and UNLOADED * large < small < large / LEAST_RATIO and (named or steps % 2):
+                pairs.append((high, low))
+    return pairs
+
+
+def _compare_currents(
+    phasors: Snapshots, feeders: "Sequence[Feeder]"
+) -> tuple[np.ndarray, np.ndarray]:
+    """(share of the current of feeder b that is no multiple of that of a, angle of the multiple
+    [degrees]), (F, F) each; of a feeder and itself all of it.
+    """
+    X = np.array([sequences(phasors.of(f.currents))[0] for f in feeders])  # (F, M)
+    X = X[:, np.isfinite(X).all(axis=0)]
+    products = X.conj() @ X.T
+    energy = np.maximum(np.real(np.diag(products)), 1e-300)
+    left = 1 - np.abs(products) ** 2 / (energy[:, None] * energy)
+    rest = np.sqrt(np.clip(left, 0.0, 1.0))
+    np.fill_diagonal(rest, 1.0)
+    return rest, np.degrees(np.angle(products))
 
 
 def _find_sides(recording: Recording, high: "Feeder", low: "Feeder") -> tuple[float, float] | None:
