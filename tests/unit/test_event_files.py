@@ -1,5 +1,6 @@
 """Files of one event: one a phase, voltages and currents apart; in a folder and in a .zip."""
 
+import shlex
 import zipfile
 from datetime import datetime, timedelta
 
@@ -7,6 +8,7 @@ import field_waves
 import made_recordings
 import numpy as np
 import pytest
+from command_line import run_command
 
 import tractexp
 from tractexp.errors import UserError
@@ -278,3 +280,24 @@ def test_dead_channels_of_one_name_are_not_one_channel(tmp_path):
     ]
     seen = tractexp.look(*map(str, paths), progress=False)
     assert [row["name"] for row in seen.channels] == ["U A", "I A", "U B", "I B", "U C", "I C"]
+
+
+def test_the_command_of_look_reads_the_files_together(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    marks = ("L1", "L2", "L3")
+    pack(tmp_path / "my event.zip", *phase_tables(tmp_path, marks, name="1 März {} (bay).csv"))
+    _, load = look("my event.zip")
+    words = shlex.split(load["command"])[1:]
+    run = run_command("task=convert", "task.to=parquet", "task.what=events", *words, cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert [*tmp_path.rglob("*.parquet")]
+
+
+def test_a_survey_says_which_files_belong_together(tmp_path):
+    write_comtrade(tmp_path / "e_U.cfg", slice(0, 3), ["UA", "UB", "UC"])
+    write_comtrade(tmp_path / "e_I.cfg", slice(3, 6), ["IA", "IB", "IC"])
+    rows = tractexp.survey(str(tmp_path), cores=1, progress=False).content["rows"]
+    assert {row["file"] for row in rows} == {"e_U.cfg", "e_I.cfg"}
+    assert all(
+        "beside it, of the same event, it shows a load: tractexp look" in row["why"] for row in rows
+    )

@@ -13,7 +13,7 @@ from tractexp import files
 from tractexp.api.look import command, event_row, hide_secondary, series
 from tractexp.errors import UserError
 from tractexp.recording import archive
-from tractexp.recording.event_views import list_within
+from tractexp.recording.event_views import list_within, propose_joining, shows_load
 from tractexp.recording.overview import LoadEvent, Sight, View
 from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
 from tractexp.store import key
@@ -68,23 +68,31 @@ def rows_of(folder: str, file: str) -> Rows:
         return [_blank(file) | {"kind": UNREAD, "why": str(error)}]
 
 
+def _with_proposal(rows: Rows, path: Path) -> Rows:
+    """The rows of a file without a load, with what says that files beside it are of its event."""
+    proposed = propose_joining(str(path))
+    why = (filter(None, (row["why"], proposed)) for row in rows)
+    return [{**row, "why": "; ".join(said)} for row, said in zip(rows, why, strict=True)]
+
+
 def _blank(file: str) -> dict[str, Any]:
     return dict.fromkeys(COLUMNS) | {"file": file, "worth": False, "why": ""}
 
 
 def _rows_of_one(folder: str, file: str) -> Rows:
     """The rows of one file that is no .zip, or of a .zip that holds the files of one event."""
-    row = _blank(file)
+    row, path = _blank(file), Path(folder, file)
     try:
-        view = archive.look_at_file(Path(folder, file))
+        view = archive.look_at_file(path)
         rows = [
             row | _event(view, file, number, shown, event)
             for number, shown in enumerate(view.sights, 1)
             for event in shown.events
         ]
-        return files.plain(rows or [row | _common(view) | _without_events(view)])
+        rows = rows or [row | _common(view) | _without_events(view)]
+        return files.plain(rows if shows_load(view) else _with_proposal(rows, path))
     except UserError as error:
-        return [row | {"kind": UNREAD, "why": str(error)}]
+        return _with_proposal([row | {"kind": UNREAD, "why": str(error)}], path)
     except Exception as error:  # a survey of thousands of files does not end with one of them
         why = (
             f"the program failed at this file, which is its mistake: {type(error).__name__}:"

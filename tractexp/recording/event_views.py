@@ -10,7 +10,7 @@ from tractexp.overrides import format_assignment
 from tractexp.quoting import shell
 from tractexp.record import endings, reader_of
 from tractexp.recording.event_files import MOST_FILES, PART, name_one_event, say_several
-from tractexp.recording.overview import view_of
+from tractexp.recording.overview import View, view_of
 from tractexp.recording.record_files import find_packed
 from tractexp.wording import join_words
 
@@ -68,17 +68,22 @@ def join_event(paths: Sequence[str]) -> dict[str, Any] | None:
     named = name_one_event(paths)
     if not (alike and 1 < len(paths) <= (MOST_FILES if named else MOST_UNNAMED)):
         return None
-    if not named and any(_shows_load(path) for path in paths):
+    if not named and any(_show_load(path) for path in paths):
         return None
-    return settings_of(*paths) if _shows_load(*paths) else None
+    return settings_of(*paths) if _show_load(*paths) else None
 
 
-def _shows_load(*paths: str) -> bool:
-    """Whether files show a load by themselves: voltages with currents, or a table of powers."""
+def _show_load(*paths: str) -> bool:
+    """Whether files can be read together, and show a load."""
     try:
         view = view_of(paths[0], settings_of(*paths))
     except UserError:
         return False
+    return shows_load(view)
+
+
+def shows_load(view: View) -> bool:
+    """Whether a file shows a load by itself: voltages with currents, or a table of powers."""
     return any(s.record is not None or (s.feeder and s.feeder.currents) for s in view.sights)
 
 
