@@ -4,7 +4,8 @@ import argparse
 import contextlib
 import functools
 import hashlib
-from collections.abc import Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,6 +21,7 @@ from tractexp.compat import hydra_config_store, hydra_plugins, hydra_versions
 from tractexp.composition import MODEL
 from tractexp.model_file import is_model_path, read_model_file
 from tractexp.schema import Config
+from tractexp.store import TEXTS, environment, key
 
 
 class PluginSearchPath(SearchPathPlugin):
@@ -77,11 +79,10 @@ def register(arguments: Sequence[str] = ()) -> None:
     hydra_config_store.share()
     store = ConfigStore.instance()
     store.store(name="config_schema", node=Config)
-    for group, classes in plugin.discover().items():
-        for name, cls in classes.items():
-            if cls.chosen:
-                where = f"schema/{group}" if _is_configured(group, name) else group
-                hydra_config_store.store_later(where, name, functools.partial(plugin.schema, cls))
+    for group, names in _list_offered().items():
+        for name in names:
+            where = f"schema/{group}" if _is_configured(group, name) else group
+            hydra_config_store.store_later(where, name, functools.partial(_schema_of, group, name))
     store.store(group="hydra/sweeper", name="grid", node=GridConfig)
     store.store(group="hydra/launcher", name="cores", node=CoresConfig)
     Plugins.instance().register(PluginSearchPath)
@@ -97,6 +98,29 @@ def register(arguments: Sequence[str] = ()) -> None:
     register_resolver = hydra_versions.register_resolver()
     register_resolver("fingerprint", _fingerprint, replace=True)
     register_resolver("folder_name", _folder_name, replace=True)
+
+
+def _list_offered() -> dict[str, set[str]]:
+    """{group: names} of the plugins that Hydra offers.
+
+    All are imported for it where the code of any has changed since, and else those that are chosen
+    alone, when Hydra reads their schemas. What this process has registered itself comes, too.
+    """
+
+    def ask() -> bytes:
+        return json.dumps({group: [*names] for group, names in offered(plugin.discover())}).encode()
+
+    def offered(classes_of: Mapping[str, Any]) -> Iterator[tuple[str, set[str]]]:
+        for group, classes in classes_of.items():
+            yield group, {name for name, cls in classes.items() if cls.chosen}
+
+    kept = json.loads(TEXTS.get(key(environment(), "plugins that Hydra offers"), ask))
+    here = dict(offered(plugin.registered()))
+    return {group: {*kept.get(group, ()), *here.get(group, ())} for group in {*kept, *here}}
+
+
+def _schema_of(group: str, name: str) -> type:
+    return plugin.schema(plugin.get(group, name))
 
 
 def _own_folders(arguments: Sequence[str]) -> list[Path]:

@@ -175,6 +175,11 @@ def discover() -> Mapping[str, Mapping[str, type[Plugin]]]:
     return _registry
 
 
+def registered() -> Mapping[str, Mapping[str, type[Plugin]]]:
+    """{group: {name: class}} of what was imported so far."""
+    return _registry
+
+
 def import_all(packages: Iterable[ModuleType]) -> None:
     """Import every module of some packages that does not start with an underscore.
 

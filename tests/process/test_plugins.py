@@ -1,6 +1,7 @@
 """Registration, refusals at registration, and a stranger's package installed for real."""
 
 import ast
+import functools
 import importlib
 import importlib.metadata
 import json
@@ -569,3 +570,19 @@ def test_of_the_plugins_that_are_named_alone_the_files_are_imported():
     )
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert run.stdout.split() == ["tractexp_plugins.optimizers.pso"]
+
+
+def test_what_can_be_chosen_is_known_without_importing_plugins_again(tmp_path):
+    script = (
+        "import sys; from tractexp.config import register; register();"
+        " print('tractexp_plugins.motors.electromechanical' in sys.modules)"
+    )
+    run = functools.partial(
+        subprocess.run,
+        [sys.executable, "-c", script],
+        env={**os.environ, "TRACTEXP_CACHE_DIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert [run().stdout, run().stdout] == ["True\n", "False\n"]
