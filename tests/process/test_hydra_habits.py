@@ -165,6 +165,7 @@ def test_a_folder_of_configurations_of_ones_own_adds_to_every_group_and_override
         "data/tibet_50pct.yaml": "# Ours.\ndefaults: [csv]\ntrain: [mine.csv]\n",
         "experiment/quick.yaml": "# @package _global_\ndefaults:\n  - override /optimizer:"
         " mine\nbudget: 300\n",
+        "own.yaml": "defaults: [config, _self_]\nbudget: 400\noptimizer: {population: 12}\n",
         "data/dips.yaml": "# Two dips.\ndefaults: [csv]\ntrain: [a.csv, b.csv]\n",
     }.items():
         path = tmp_path / "mine" / name
@@ -179,6 +180,9 @@ def test_a_folder_of_configurations_of_ones_own_adds_to_every_group_and_override
     assert "- mine.csv" in run_command(*own, "--cfg", "job", cwd=tmp_path).stdout, (
         "the one by default is replaced"
     )
+    configured = run_command(*own, "-cn", "own", "optimizer=mine", "--cfg", "job", cwd=tmp_path)
+    for line in ("budget: 400", "population: 12", "cognitive: "):
+        assert line in configured.stdout
     nowhere = run_command("list", "-cd", "nowhere", cwd=tmp_path)
     assert (
         nowhere.stderr
