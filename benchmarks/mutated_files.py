@@ -153,8 +153,8 @@ def event_report(made, every=1):
     ]
     lines += [
         row(3, 14, 2023, 15, 9, 26, 535),
-        row('"FREQ"', '"SAM/CYC_A"', '"SAM/CYC_D"', '"EVENT"'),
-        row(50, 32 // every, 4, '"ER"'),
+        row('"FREQ"', '"SAM/CYC_A"', '"SAM/CYC_D"', '"NUM_OF_CYC"', '"EVENT"'),
+        row(50, 32 // every, 4, 40, '"ER"'),
     ]
     lines += [
         row(

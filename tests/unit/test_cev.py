@@ -80,6 +80,17 @@ def write(tmp_path):
     return written
 
 
+@pytest.mark.parametrize("change", ["lost", "double"])
+def test_a_row_that_is_lost_or_double_is_noted(write, change):
+    """Rows have checksums and no numbers: the cycles that are announced tell."""
+    lines = report()
+    assert not any("NUM_OF_CYC" in note for note in cev.load(write(lines)).notes)
+    lines[600:601] = [] if change == "lost" else 2 * [lines[600]]
+    count = 1919 if change == "lost" else 1921
+    said = f"{count} samples, and NUM_OF_CYC announces 1920: rows are missing or double"
+    assert any(said in note for note in cev.load(write(lines)).notes)
+
+
 def test_the_checksum_is_that_of_the_manual():
     assert cev.checksum('"FID",') == "0143"  # printed in the manual of the SEL-311L
     assert cev.checksum('"MONTH","DAY","YEAR","HOUR","MIN","SEC","MSEC",') == "0ACA"

@@ -186,6 +186,7 @@ def _open_report(path: Path, encoding: str | None) -> _Opened:
     report = _report(path, text, remarks)
     values, marks, words = _samples(path, report, remarks)
     per_cycle, frequency = _rate(path, report)
+    _note_lost_rows(report, per_cycle, remarks)
     marked = next((i for sign in (">", "*") for i, mark in enumerate(marks) if sign in mark), None)
     if marked is None:
         remarks.add(
@@ -203,6 +204,19 @@ def _open_report(path: Path, encoding: str | None) -> _Opened:
     return _Opened(
         report, values, words, t, tracked, per_cycle, nominal, marked, gain, remarks, encoding
     )
+
+
+def _note_lost_rows(report: EventReport, per_cycle: float, remarks: Remarks) -> None:
+    """Note rows that are missing or double by the cycles that the summary announces: each has its
+    checksum, and none a number.
+    """
+    cycles = number(report.about.get("NUM_OF_CYC", ""))
+    announced = round(per_cycle * cycles) if cycles and abs(cycles) < HUGE else 0
+    if announced > 0 and announced != len(report.rows):
+        remarks.add(
+            f"{len(report.rows)} samples, and NUM_OF_CYC announces {announced}: rows are missing or"
+            " double, and times after them off by as many steps; get the report again"
+        )
 
 
 def _read_tracked_frequency(
