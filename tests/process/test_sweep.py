@@ -655,6 +655,11 @@ for _ in Workers(1, apart=True).completed(time.sleep, [0, 600], 2):
             ["hydra.launcher.n_jobs=0"],
             "hydra.launcher.n_jobs=0 is out of range: it must be at least 1",
         ),
+        pytest.param(
+            ["hydra/launcher=slurm", "hydra.launcher.jobs_per_task=0"],
+            "hydra.launcher.jobs_per_task=0 is out of range: it must be at least 1",
+            marks=needs_submitit,
+        ),
         (["optimizer=issa,isa"], "optimizer=isa: there is no such choice; did you mean 'issa'?"),
         (["seed=1,abc"], "seed=abc is not a whole number"),
         (

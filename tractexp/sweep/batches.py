@@ -46,8 +46,11 @@ class Batches(BaseSubmititLauncher):
 
     def __init__(self, jobs_per_task: int, **params: Any):
         super().__init__(**params)
-        check_range("hydra.launcher.jobs_per_task", jobs_per_task, 1)
         self.jobs_per_task = jobs_per_task
+
+    def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
+        check_range("hydra.launcher.jobs_per_task", self.jobs_per_task, 1)
+        super().setup(hydra_context=hydra_context, task_function=task_function, config=config)
 
     def launch(
         self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
@@ -60,12 +63,17 @@ class Batches(BaseSubmititLauncher):
         return [one for of_task in returned for one in of_task]
 
     def __call__(
-        self, sweep_overrides: list[str], job_dir_key: str, job_num: int, *place: Any
+        self,
+        sweep_overrides: list[str],
+        job_dir_key: str,
+        job_num: int,
+        job_id: str,
+        singleton_state: Any,
     ) -> Any:
         run = super().__call__
         returned = []
         for number, overrides in map(json.loads, sweep_overrides):
-            returned.append(run(overrides, job_dir_key, number, *place))
+            returned.append(run(overrides, job_dir_key, number, job_id, singleton_state))
         return returned
 
     def __reduce__(self) -> Any:
