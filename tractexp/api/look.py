@@ -293,7 +293,9 @@ def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
         if proposed := propose_joining(source):
             raise UserError(f"{error}; {proposed}") from None
         raise
-    return view if files.is_archive(source) else replace(view, proposed=propose_joining(source))
+    return (
+        view if files.is_archive(source) else replace(view, proposed=propose_joining(source, view))
+    )
 
 
 def series(shown: Sight) -> dict[str, np.ndarray]:

@@ -7,10 +7,13 @@ from typing import Any
 from tractexp import files
 from tractexp.errors import UserError
 from tractexp.overrides import format_assignment
+from tractexp.plugin import build
 from tractexp.quoting import shell
 from tractexp.record import endings, reader_of
 from tractexp.recording.event_files import MOST_FILES, PART, name_one_event, say_several
+from tractexp.recording.feeder import propose
 from tractexp.recording.overview import View, view_of
+from tractexp.recording.reader import WaveformReader
 from tractexp.recording.record_files import find_packed
 from tractexp.wording import join_words
 
@@ -76,10 +79,13 @@ def join_event(paths: Sequence[str]) -> dict[str, Any] | None:
 def _show_load(*paths: str) -> bool:
     """Whether files can be read together, and show a load."""
     try:
-        view = view_of(paths[0], settings_of(*paths))
+        node = settings_of(*paths)
+        reader = build("data", node)
+        if isinstance(reader, WaveformReader):
+            return any(feeder.currents for feeder in propose(reader.opened()))
+        return shows_load(view_of(paths[0], node))
     except UserError:
         return False
-    return shows_load(view)
 
 
 def shows_load(view: View) -> bool:
@@ -87,11 +93,17 @@ def shows_load(view: View) -> bool:
     return any(s.record is not None or (s.feeder and s.feeder.currents) for s in view.sights)
 
 
-def propose_joining(path: str) -> str:
+def propose_joining(path: str, view: View | None = None) -> str:
     """That files beside one belong to its event, with the command that looks at them together; ""
     where none do.
+
+    `view` is what the file shows alone: where that is a load, names alone say that others belong
+    to it.
     """
+    alone = view is not None and shows_load(view)
     for group in _named_alike(path):
+        if alone and not name_one_event(group):
+            continue
         node = join_event(group)
         if node is not None:
             names = join_words([Path(one).name for one in node["join"]])
