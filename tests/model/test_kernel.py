@@ -84,6 +84,12 @@ def test_a_power_of_a_number(p):
     assert np.isnan(computed(X**p, np.array([-1.0, np.nan]))).all()
 
 
+def test_a_power_whose_exponent_is_no_number():
+    """A steady state and a constant may have one: a term of the library before a static load."""
+    x, y = np.linspace(0.01, 3.0, 101), np.linspace(-2.0, 2.0, 101)
+    assert np.abs(computed((1 + X) ** Y, x, y) / (1 + x) ** y - 1).max() < 1e-12
+
+
 @pytest.mark.parametrize("name", ["sin", "cos"])
 def test_waves(name):
     x = ANGLES

@@ -11,12 +11,11 @@ from test_discrepancy import FEW, base, events, steady
 
 from tractexp.discrepancy import criteria, disagreement, judgement
 from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
-from tractexp.discrepancy.decide import beats, decide, holds
+from tractexp.discrepancy.decide import decide, holds, needs_all_events
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, SetEvidence
 from tractexp.discrepancy.families import worth
 from tractexp.discrepancy.gap import GapTest
-from tractexp.discrepancy.held_out import closes_enough
 from tractexp.discrepancy.investigate import Findings, investigate
 from tractexp.discrepancy.judgement import assessment
 from tractexp.discrepancy.next_event import choose
@@ -25,6 +24,7 @@ from tractexp.discrepancy.next_event.imagined import ImaginedDip
 from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.discrepancy.proposal import judge
 from tractexp.discrepancy.proposal.judge import TermAssessment
+from tractexp.discrepancy.ranking import beats
 from tractexp.errors import UserError
 from tractexp.inference import catalogue, chance
 from tractexp.inference.catalogue import candidate, missing_channel
@@ -212,7 +212,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "further_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "rejected": (0.06, lambda c: c.rejects(5.9), False),
     "shown": (9.0, lambda c: word_of(c, judged_by(c, gain=10.0, expected=11.0)), "candidate"),
-    "divides": (2.0, lambda c: closes_enough(judged_by(c, closed=0.78)), False),
+    "divides": (2.0, lambda c: needs_all_events([judged_by(c, closed=0.78)], c), True),
     "ahead": (1.4, lambda c: beats(deviance(100.0), deviance(200.0), c), False),
 }
 FURTHER = [  # decisions by a criterion that has one above, too

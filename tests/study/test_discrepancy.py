@@ -23,11 +23,11 @@ from tractexp import store
 from tractexp.discrepancy import explanations
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.decide import holds
+from tractexp.discrepancy.decide import holds, needs_all_events
 from tractexp.discrepancy.disagreement import disagreement, examine_fit
 from tractexp.discrepancy.discrepancy_json import content, recommendation, write_left, write_model
 from tractexp.discrepancy.explanations import beneath, search_effect_sets, without_needless
-from tractexp.discrepancy.held_out import assess, carry_fits, closes_enough, compare_on
+from tractexp.discrepancy.held_out import assess, carry_fits, compare_on
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.errors import UserError
@@ -779,7 +779,7 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
         return row
 
     (clean,) = events("stator_resistance", size=2.0, count=3)[2:]
-    assert closes_enough(judged_on([clean]))
+    assert not needs_all_events([judged_on([clean])], criteria)
     assert holds(judged_on([clean]), criteria)
     record = clean.record
     later = record.t > record.t[clean.end] + 0.2
@@ -787,7 +787,7 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
         [replace(clean, record=replace(record, P=record.P + 0.05 * clean.P0 * later))]
     )
     assert stepped.gap.is_shown
-    assert not closes_enough(stepped)
+    assert needs_all_events([stepped], criteria)
     assert not holds(stepped, criteria)
 
 

@@ -305,7 +305,6 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
         bare=fit(500.0, 0),
         plain=SimpleNamespace(cost=500.0),
         compare=lambda *_: joint,
-        is_undoubted=lambda fits: False,
         without_each=lambda fit: {},
         fit_to_all=lambda fits: fits,
     )

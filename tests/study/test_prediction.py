@@ -14,7 +14,7 @@ import tractexp
 from hidden_effects import Case, Recorder, make
 from tractexp.blocks import Report
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.decide import beats, decide, find_nearest, find_predicting
+from tractexp.discrepancy.decide import decide, find_predicting
 from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, PredictedError, SetEvidence
 from tractexp.discrepancy.explain import explain, find_nearest_sets
 from tractexp.discrepancy.investigate import investigate
@@ -22,6 +22,7 @@ from tractexp.discrepancy.least_squares import least_squares_tests, residual_noi
 from tractexp.discrepancy.precision import standard_errors
 from tractexp.discrepancy.prediction import SHARING
 from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.ranking import beats, find_nearest
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.effort import Effort
@@ -82,7 +83,7 @@ def test_a_set_whose_lead_may_be_chance_hides_none_that_is_clear():
     clear = off("a", "c", error=0.42)
     clear.prediction.squares[3] += 1.5
     assert best.prediction.left < clear.prediction.left
-    assert not best.prediction.is_clear_of(bare.prediction)
+    assert best.prediction.compute_lead(bare.prediction) <= 0
     assert named(bare, best, clear) == [("a", "c")]
     assert find_nearest(table(bare, best), Criteria()) is best
     assert find_nearest(table(off(error=0.1), off("a", error=0.2)), Criteria()).names == ()
@@ -139,8 +140,8 @@ def test_what_one_block_decides_is_chance():
     """Without its loudest block the rival is as good."""
     one, other = off("a", error=0.1).prediction, off("b", error=0.1).prediction
     other.squares[3] += 1.0
-    assert not one.is_clear_of(other)
-    assert one.is_clear_of(off("c", error=0.2, uneven=0.5).prediction)
+    assert one.compute_lead(other) <= 0
+    assert one.compute_lead(off("c", error=0.2, uneven=0.5).prediction) > 0
 
 
 def test_few_blocks_tell_less_of_chance_and_one_tells_nothing():
@@ -153,7 +154,7 @@ def test_few_blocks_tell_less_of_chance_and_one_tells_nothing():
         return PredictedError(*rows, one.unit)
 
     one, other = off("a", error=0.1).prediction, off("b", error=0.2, uneven=0.8).prediction
-    assert [first(one, blocks).is_clear_of(first(other, blocks)) for blocks in (1, 3, 20)] == [
+    assert [first(one, blocks).compute_lead(first(other, blocks)) > 0 for blocks in (1, 3, 20)] == [
         False,
         False,
         True,
@@ -163,8 +164,8 @@ def test_few_blocks_tell_less_of_chance_and_one_tells_nothing():
 def test_a_model_that_diverges_is_behind_any_that_does_not():
     lost, sound = off("b", error=0.1).prediction, off("a", error=0.5).prediction
     lost.squares[2] = np.inf
-    assert sound.is_clear_of(lost)
-    assert not lost.is_clear_of(sound)
+    assert sound.compute_lead(lost) > 0
+    assert lost.compute_lead(sound) <= 0
 
 
 @pytest.mark.parametrize(("error", "name"), [(0.09, "trip"), (0.05, "trip_in_stages")])
@@ -201,8 +202,8 @@ def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not()
     one, other = (
         by_deviance("a", left=50.0, rejected=rejected).prediction for rejected in (False, True)
     )
-    assert one.is_clear_of(other)
-    assert not other.is_clear_of(one)
+    assert one.compute_lead(other) > 0
+    assert other.compute_lead(one) <= 0
 
 
 @pytest.mark.parametrize(

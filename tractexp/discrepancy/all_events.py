@@ -93,15 +93,6 @@ class AllEvents:
         fits = best_of(itertools.chain(*refitted))
         return each_apart(lambda fit: self._measure(fit, by_name[fit.names], seed), fits, effort)
 
-    def is_undoubted(self, fits: Sequence[Refit]) -> bool:
-        """Whether there is one explanation only, a single effect by the textbook's law."""
-        names = fits[0].names
-        return (
-            len(fits) == 1
-            and len(names) + len(self.faults) == 1
-            and names == self.fitted.catalogue.textbook(names)
-        )
-
     def compare(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
         """Explanations fitted to all events from where they were, and what leaves something there
         from every setting, too.

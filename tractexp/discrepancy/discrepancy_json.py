@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tractexp import files, quoting
-from tractexp.discrepancy.decide import CANDIDATE, NAMED, TIED, UNEXPLAINED, is_too_mild, shows_more
+from tractexp.discrepancy.decide import CANDIDATE, NAMED, TIED, UNEXPLAINED, shows_more
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.explain import find_status
 from tractexp.discrepancy.forms import by_name, forms
@@ -83,7 +83,7 @@ def recommendation(investigation: Findings) -> str:
         sentence = f"ask what on site acts like {proposal.term.words}; {PLUGIN} adds it to a model"
         return sentence if chosen is None else f"{sentence}; {chosen.sentence()}"
     if investigation.verdict.word == UNEXPLAINED:
-        if is_too_mild(investigation.by_likelihood):
+        if investigation.by_likelihood.is_mild:
             return "hold out a deeper dip, one of those fitted or a new one"
         if shows_more(investigation.by_likelihood, investigation.context.criteria):
             return f"fit the held-out events, too ({DATA.train})"

@@ -51,20 +51,20 @@ class PredictedError:
         """The model's error, of the response."""
         return float(np.sqrt(self.left / max(self.response.sum(), 1e-30)))
 
-    def is_clear_of(self, other: "Prediction") -> bool:
-        """Whether it leaves less by more than chance: a jackknife of the ratio's logarithm over the
-        blocks.
+    def compute_lead(self, other: "Prediction") -> float:
+        """By how much it leaves less, beyond chance: of the ratio's logarithm, by a jackknife over
+        the blocks. Not above 0 where that may be chance.
         """
         assert isinstance(other, PredictedError)
         own_sum, other_sum = self.squares.sum(), other.squares.sum()
         if not np.isfinite(own_sum):
-            return False
+            return -np.inf
         if not np.isfinite(other_sum):
-            return True
+            return np.inf
         own_rest, other_rest = own_sum - self.squares, other_sum - other.squares
         without = np.log(np.maximum(other_rest, 1e-300) / np.maximum(own_rest, 1e-300))
         lead = float(np.log(other_sum / own_sum))
-        return lead > reach(without, lead)
+        return lead - reach(without, lead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,13 +90,14 @@ class PredictedDeviance:
         """The model's error, of the response."""
         return self.curves.error.value
 
-    def is_clear_of(self, other: "Prediction") -> bool:
-        """Whether it leaves less by more than chance, or the fitted events reject the
-        other alone.
+    def compute_lead(self, other: "Prediction") -> float:
+        """By how much it leaves less, beyond `least`; all there is where the fitted events reject
+        the other alone. Not above 0 where that may be chance.
         """
         assert isinstance(other, PredictedDeviance)
-        gain = other.curves.deviance - self.curves.deviance
-        return gain >= self.least or (other.is_rejected and not self.is_rejected)
+        if other.is_rejected and not self.is_rejected:
+            return np.inf
+        return other.curves.deviance - self.curves.deviance - self.least
 
 
 Prediction = PredictedError | PredictedDeviance
@@ -176,6 +177,12 @@ class Evidence:
         they predict.
         """
         return self.base.prediction is not None
+
+    @property
+    def is_mild(self) -> bool:
+        """Whether the held-out events are too mild for all that explains the fitted ones."""
+        gaps = [row.gap for row in self.rows if row.gap is not None]
+        return bool(gaps) and all(gap.is_mild for gap in gaps)
 
     def row_of(self, names: Names) -> SetEvidence | None:
         """The row of these effects, None where they were not fitted."""

@@ -14,19 +14,21 @@ from tractexp.discrepancy.decide import (
     TIED,
     UNEXPLAINED,
     Verdict,
-    divides,
     find_adequate,
-    find_leading,
-    find_nearest,
     is_confirmed,
-    needs_all,
-    rank_sets,
 )
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.gap import Curves, curves, measure_closed_share
 from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.ranking import (
+    compute_factor,
+    find_leading,
+    find_nearest,
+    needs_all,
+    rank_sets,
+)
 from tractexp.inference.chance import by_draws
 from tractexp.inference.context import Context
 from tractexp.inference.model_error import in_percent
@@ -269,7 +271,7 @@ def _describe_shared(chosen: SetEvidence, evidence: Evidence, context: Context) 
     """Of a name that does not divide the error by as much as names must: what the best of all sets
     misses, which has it, as the end of a sentence.
     """
-    if divides(chosen, evidence.base, context.criteria.divides):
+    if compute_factor(chosen, evidence.base) > context.criteria.divides:
         return ""
     best = min(
         (row for row in evidence.every if row.prediction is not None),
@@ -320,7 +322,7 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
         return f"{name} would be named, but {misses}, and {_describe_term(evidence)}"
     labels = join_words(label_effects(near.names, context))
     why = f"a name must divide that by {criteria.divides:g}"
-    if divides(near, evidence.base, criteria.divides):
+    if compute_factor(near, evidence.base) > criteria.divides:
         needed = needs_all(near, evidence, criteria)
         why = (
             "that may be chance in so few blocks"

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.discrepancy.all_events import AllEvents
-from tractexp.discrepancy.decide import find_adequate, holds
+from tractexp.discrepancy.decide import find_adequate, needs_all_events
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.gap import GapTest, beyond_chance, compute_pushed_changes, gap, share_gone
+from tractexp.discrepancy.gap import GapTest, beyond_chance, compute_pushed_changes, gap
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit, fit_initial_power, refit
 from tractexp.inference.noise_in_quiet import QuietNoise, white
@@ -92,20 +92,17 @@ def find_telling_faults(explained: Explanations, bare: Refit) -> Names:
 
 
 def assess(both: AllEvents, rows: Sequence[SetEvidence], seed: int) -> list[SetEvidence]:
-    """Rows judged on held-out events, and all that are doubtful or have a rival by a fit to all
-    events, too.
+    """Rows judged on held-out events, and by a fit to all events where `decide` needs that.
 
     Of several effects each is judged against the others alone as the whole is against the base
-    model. A single textbook effect that has no rival stands if it closes as much of the gap there
-    as a true one does. Any other must leave nothing in a fit to all events and not be rejected
-    there by the best one. That fit may also bear out what does not help as it was fitted, or leaves
-    more than chance does, since the fitted events may leave a part of it open; such a row is judged
-    and told as fitted to all.
+    model. A fit to all events may also bear out what does not help as it was fitted, or leaves more
+    than chance does, since the fitted events may leave a part of it open; such a row is judged and
+    told as fitted to all.
     """
     criteria, fits = both.fitted.criteria, [row.told for row in rows]
     without = {fit.names: both.without_each(fit) for fit in fits}
     judged = judge_fits(both, rows, fits, without)
-    if both.is_undoubted(fits) and closes_enough(judged[0]) and holds(judged[0], criteria):
+    if not needs_all_events(judged, criteria):
         return judged
     joint = {one.fit.names: one for one in both.compare(fits, seed)}
     best = min(one.fit.cost for one in joint.values())
@@ -155,13 +152,6 @@ def judge_fits(
         }
         judged.append(replace(row, final=fit, gap=gaps[fit.names], without=members))
     return judged
-
-
-def closes_enough(row: SetEvidence) -> bool:
-    """Whether a set closes as much of the gap on the held-out events as a true explanation does."""
-    assert row.gap is not None
-    assert row.gap.context is not None
-    return row.gap.explained >= share_gone(row.gap.context.criteria.divides)
 
 
 def exceeds_noise(both: AllEvents) -> bool:

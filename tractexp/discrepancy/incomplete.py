@@ -10,7 +10,7 @@ is far above the noise it is the squared error in S, with every set fitted by le
 from collections.abc import Sequence
 from dataclasses import replace
 
-from tractexp.discrepancy.decide import find_nearest, find_predicting, rank_sets
+from tractexp.discrepancy.decide import find_predicting
 from tractexp.discrepancy.disagreement import examine_fit
 from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
@@ -18,6 +18,7 @@ from tractexp.discrepancy.gap import curves
 from tractexp.discrepancy.held_out import carry_fits, compare_on
 from tractexp.discrepancy.least_squares import least_squares_tests
 from tractexp.discrepancy.prediction import predict_errors
+from tractexp.discrepancy.ranking import find_nearest, rank_sets
 from tractexp.inference.fitting import refit
 from tractexp.record import Event
 

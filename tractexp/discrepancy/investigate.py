@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.decide import NONE, UNEXPLAINED, Verdict, decide, is_too_mild, shows_more
+from tractexp.discrepancy.decide import NONE, UNEXPLAINED, Verdict, decide, shows_more
 from tractexp.discrepancy.disagreement import Disagreement, disagreement
 from tractexp.discrepancy.evidence import Evidence, PredictedError
 from tractexp.discrepancy.explain import Nearest, choose_next_event, explain, find_nearest_sets
@@ -385,7 +385,7 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grade
     evidence = compare_rivals(explained, seed)
     evidence = by_likelihood = judge_held_out(evidence, explained, validate, seed)
     verdict = decide(evidence, criteria)
-    if verdict.word == UNEXPLAINED and not is_too_mild(evidence):
+    if verdict.word == UNEXPLAINED and not evidence.is_mild:
         evidence = predict_held_out(evidence, explained, validate, seed)
         verdict = decide(evidence, criteria)
     tests = evidence.base.tests
@@ -420,7 +420,7 @@ def _proposal(findings: Findings, seed: int) -> ProposalResult:
     base, explained, evidence = findings.base, findings.explanations, findings.by_likelihood
     if findings.verdict.word != UNEXPLAINED:
         return ProposalResult()
-    if is_too_mild(evidence):
+    if evidence.is_mild:
         return ProposalResult(why="the held-out events are too mild to show a term")
     return propose(
         base, explained.steps[0], evidence.base.fit, explained.last.noise, findings.withheld, seed

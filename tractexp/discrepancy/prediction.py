@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from tractexp.discrepancy.decide import find_predicting, rank_sets
+from tractexp.discrepancy.decide import find_predicting
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.explanations import (
     WIDELY,
@@ -23,6 +23,7 @@ from tractexp.discrepancy.explanations import (
 from tractexp.discrepancy.families import member_fits
 from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.proposal.best_term import best_terms
+from tractexp.discrepancy.ranking import rank_sets
 from tractexp.inference.base_fit import minima_of
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart

@@ -147,9 +147,7 @@ class Expressions:
         if base == sympy.E:
             return lanes.exp(n, self(exponent))
         if not isinstance(exponent, sympy.Number):
-            raise UserError(
-                f"{base}**({exponent}) reached a kernel; powers of symbols are exponentials there"
-            )
+            return lanes.exp(n, n.multiply(self(exponent), lanes.log(n, self(base))))
         if exponent.is_negative:
             return n.divide(n.constant(1.0), self._power(base, -exponent))
         x, whole = self(base), math.floor(exponent)

@@ -1,0 +1,97 @@
+"""Which sets predict held-out events best, where every set leaves more than noise.
+
+A set *beats* another if it divides what that leaves, as a root of squares, by `ahead`, and by more
+than chance. A *rival* of a set is one of its size or smaller that beats the base model and that it
+does not beat.
+"""
+
+import itertools
+from collections.abc import Sequence
+
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.evidence import Evidence, SetEvidence
+from tractexp.inference.fitting import Names
+
+
+def find_leading(evidence: Evidence, criteria: Criteria, factor: float) -> list[SetEvidence]:
+    """The sets that predict best, where the best divides the error of the base model by the factor;
+    else none.
+    """
+    ahead = [row for row in rank_sets(evidence, criteria) if beats(row, evidence.base, criteria)]
+    dividing = [row for row in ahead if compute_factor(row, evidence.base) > factor]
+    if not dividing:
+        return []
+    alike = [row for row in ahead if not beats(dividing[0], row, criteria)]
+    common = frozenset.intersection(*(frozenset(row.family) for row in alike))
+    shared = [row for row in ahead if frozenset(row.family) == common][:1]
+    shared = [row for row in shared if needs_all(row, evidence, criteria)]
+    if shared and not find_rivals(shared[0], ahead, criteria):
+        return shared
+    needed = [row for row in dividing if row in alike and needs_all(row, evidence, criteria)]
+    if not needed:
+        return []
+    chosen = min(needed, key=lambda row: len(row.fit.names))
+    return [chosen, *find_rivals(chosen, ahead, criteria)]
+
+
+def find_nearest(evidence: Evidence, criteria: Criteria) -> SetEvidence:
+    """The set that is told where none is kept: the same of what divides the error by less, or what
+    leaves least.
+    """
+    leading = find_leading(evidence, criteria, criteria.ahead)
+    return leading[0] if leading else min(evidence.every, key=_rank)
+
+
+def rank_sets(evidence: Evidence, criteria: Criteria) -> list[SetEvidence]:
+    """The sets by what they leave, the least first; of one family the simplest that the best of it
+    does not beat.
+    """
+    families: dict[Names, list[SetEvidence]] = {}
+    for row in sorted(evidence.every, key=_rank):
+        if row.fit.names and row.prediction is not None:
+            families.setdefault(row.family, []).append(row)
+    simplest = [
+        min(
+            (row for row in rows if not beats(rows[0], row, criteria)),
+            key=lambda row: row.fit.parameters,
+        )
+        for rows in families.values()
+    ]
+    return sorted(simplest, key=_rank)
+
+
+def _rank(row: SetEvidence) -> tuple[float, int, Names]:
+    left = float("inf") if row.prediction is None else row.predicted.left
+    return left, len(row.fit.names), row.fit.names
+
+
+def find_rivals(
+    one: SetEvidence, ahead: Sequence[SetEvidence], criteria: Criteria
+) -> list[SetEvidence]:
+    """The rivals of a set among those that beat the base model, without needless supersets."""
+    rivals = [row for row in ahead if row is not one and len(row.fit.names) <= len(one.fit.names)]
+    rivals = [row for row in rivals if not beats(one, row, criteria)]
+    return [row for row in rivals if not any({*r.fit.names} < {*row.fit.names} for r in rivals)]
+
+
+def needs_all(one: SetEvidence, evidence: Evidence, criteria: Criteria) -> bool:
+    """Whether more is left without any of the members of a set, by the factor of a lead, chance
+    aside.
+    """
+    subsets = itertools.combinations(one.fit.names, len(one.fit.names) - 1)
+    fewer = [row for row in map(evidence.row_of, subsets) if row is not None]
+    return all(compute_factor(one, row) > criteria.ahead for row in fewer if row.prediction)
+
+
+def beats(one: SetEvidence, other: SetEvidence, criteria: Criteria) -> bool:
+    """Whether a set divides what another leaves by the factor of a lead, and by more
+    than chance.
+    """
+    is_ahead = compute_factor(one, other) > criteria.ahead
+    return is_ahead and one.predicted.compute_lead(other.predicted) > 0
+
+
+def compute_factor(one: SetEvidence, other: SetEvidence) -> float:
+    """The factor by which a set divides what another leaves, as a root of squares."""
+    own, others = one.predicted.left, other.predicted.left
+    return (others / own) ** 0.5 if own > 0 else float("inf") if others > 0 else 1.0
