@@ -6,7 +6,7 @@ import functools
 import hashlib
 import re
 import subprocess
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -89,18 +89,38 @@ def digest(record: Any) -> str:
 OF_LOAD = ("data", "model", "domain")  # groups
 _started: list[str] = []
 _placed: list[Path] = []
+_roles: dict[str, list[Any]] = {}
 
 
 def remember_command(arguments: list[str]) -> None:
     """Remember the command line that this process was started by."""
     _started[:] = ["tractexp", *arguments]
     _placed.clear()
+    _roles.clear()
 
 
 def remember_folder(folder: Path) -> None:
     """Remember the folder of this run, which `tractexp again` takes."""
     here = Path.cwd()
     _placed[:] = [folder.relative_to(here) if folder.is_relative_to(here) else folder]
+
+
+def remember_roles(train: Sequence[Any] | None, validate: Sequence[Any] | None) -> None:
+    """Remember the dips that this run fits and those that it holds out, as its settings name
+    them.
+    """
+    _roles.update(train=list(train or ()), validate=list(validate or ()))
+
+
+def list_settings_of_all() -> list[str]:
+    """The settings by which a command fits the dips that this run holds out, too; none where it
+    holds out none.
+    """
+    train, validate = (_roles.get(role, []) for role in ("train", "validate"))
+    if not validate:
+        return []
+    dips = [quoting.hydra(dip) if isinstance(dip, str) else str(dip) for dip in (*train, *validate)]
+    return [*[f"data.train=[{','.join(dips)}]"] * bool(train), "data.validate=[]"]
 
 
 def build_again_command(*settings: str, of: Collection[str] = OF_LOAD) -> str:

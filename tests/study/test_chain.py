@@ -15,8 +15,10 @@ import pytest
 from command_line import run_command
 
 LONGEST = 5  # steps, the first command counted
-ADVICE = re.compile(r"(next|use [^:]*): ")
-EXTENDED, AS_BASE = "use the extended model", "use it as the base model"
+ADVICE = re.compile(r"(next|(use|see|investigate) [^:]*): ")
+# fitted anew, it has the grade that the investigation told
+EXTENDED = ("use the extended model", "see the extended model")
+AS_BASE = "investigate it as the base model"
 
 
 @dataclass

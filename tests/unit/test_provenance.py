@@ -77,6 +77,30 @@ def test_a_long_command_is_told_by_the_folder_of_its_run(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("train", "validate", "settings"),
+    [
+        ([1], [2], ["data.train=[1,2]", "data.validate=[]"]),
+        (
+            ["a dip.csv"],
+            ["pkg://x/it's.csv"],
+            ["data.train=['a dip.csv','pkg://x/it\\'s.csv']", "data.validate=[]"],
+        ),
+        ([], [2], ["data.validate=[]"]),  # all but those
+        ([1, 2], [], []),
+        (None, None, []),
+    ],
+)
+def test_the_dips_held_out_are_fitted_too(monkeypatch, train, validate, settings):
+    monkeypatch.setattr(provenance, "_roles", {})
+    provenance.remember_roles(train, validate)
+    assert provenance.list_settings_of_all() == settings
+    monkeypatch.setattr(provenance, "_started", ["tractexp", "data.train=[9]", "data.path=a.cfg"])
+    command = provenance.build_again_command("model=m", *settings, of=("data",))
+    assert ("data.train=[9]" in command) == (not train or not validate)
+    assert command.endswith("data.path=a.cfg")
+
+
+@pytest.mark.parametrize(
     ("package", "line"), [("tractexp_plugins", 2), ("tractexp.api", 0), ("", 0)]
 )
 def test_a_plugin_that_fails_is_named_by_file_and_line(tmp_path, package, line):

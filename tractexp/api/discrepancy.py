@@ -478,12 +478,18 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
     )
 
     lines, domain = [], result.question.model.domain
+    grade, fit_all = result.content["adequacy"]["grade"], result.gap.fitted_to_both
     if model := paths.get(MODEL_FILE.name):
+        use = use_of(domain, model, fit_all=fit_all)
         which = f", which has {join_words(result.names)}" if result.verdict == "tied" else ""
-        lines.append(f"use the extended model{which}: {use_of(domain, model)}")
-        if result.content["adequacy"]["grade"] != Grade.ADEQUATE:
-            lines.append(f"use it as the base model: {investigate_with(domain, model)}")
-    if result.content["adequacy"]["grade"] != Grade.ADEQUATE:
+        if grade == Grade.WRONG_MODEL:
+            lines.append(f"see the extended model, which does not describe this load: {use}")
+        else:
+            lines.append(f"use the extended model{which}: {use}")
+        if grade != Grade.ADEQUATE:
+            again = investigate_with(domain, model, fit_all=fit_all)
+            lines.append(f"investigate it as the base model: {again}")
+    if grade != Grade.ADEQUATE:
         context = result.steps.context
         better = [why for why in map(context.domain.better, context.events) if why][:1]
         in_waves = build_again_command("task=discrepancy", "domain=waves", of=("data", "task"))

@@ -34,6 +34,7 @@ def run(config: Any) -> None:
     ) as place:
         try:
             provenance.remember_folder(folder)
+            provenance.remember_roles(plain["data"].get("train"), plain["data"].get("validate"))
             perform(
                 Job(
                     plain,

@@ -26,7 +26,7 @@ from tractexp.errors import DATA
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.grade import Misfit
 from tractexp.inference.model_error import ModelError, in_percent
-from tractexp.provenance import build_again_command
+from tractexp.provenance import build_again_command, list_settings_of_all
 from tractexp.wording import join_words
 
 PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
@@ -346,18 +346,22 @@ def _singles(investigation: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def use_of(domain: str, model: Path | str) -> str:
-    """The command that fits the model of a file to the records of this run."""
-    return build_again_command(*DOMAINS[domain].setting.split(), f"model={model}", of=("data",))
-
-
-def investigate_with(domain: str, model: Path | str) -> str:
-    """The command that investigates the model of a file as the base model, by the records and
-    settings of this run.
+def use_of(domain: str, model: Path | str, *, fit_all: bool) -> str:
+    """The command that fits the model of a file to the records of this run; with `fit_all` to the
+    dips that it holds out, too.
     """
-    return build_again_command(
-        "task=discrepancy", *DOMAINS[domain].setting.split(), f"model={model}", of=("data", "task")
-    )
+    settings = [*DOMAINS[domain].setting.split(), f"model={model}"]
+    settings += list_settings_of_all() if fit_all else []
+    return build_again_command(*settings, of=("data",))
+
+
+def investigate_with(domain: str, model: Path | str, *, fit_all: bool) -> str:
+    """The command that investigates the model of a file as the base model, by the records and
+    settings of this run; with `fit_all` as `use_of`.
+    """
+    settings = ["task=discrepancy", *DOMAINS[domain].setting.split(), f"model={model}"]
+    settings += list_settings_of_all() if fit_all else []
+    return build_again_command(*settings, of=("data", "task"))
 
 
 def adopt_term(plugin: Path) -> str:
@@ -395,7 +399,11 @@ def write_model(
     }
     if window is not None:
         extended["window"] = window
-    command = use_of(investigation.context.load.domain, (home or path).absolute())
+    command = use_of(
+        investigation.context.load.domain,
+        (home or path).absolute(),
+        fit_all=investigation.fitted_to_both,
+    )
     lines = [command, *_explain_model(investigation, node, held)]
     comments = "".join(f"# {quoting.comment(line)}\n" for line in lines)
     return files.write(path, comments + quoting.yaml(extended))

@@ -107,7 +107,9 @@ def equations(page: Report, findings: Findings) -> None:
         page.text(
             f"It has {join_words(findings.names)}; {others} instead would fit these events as well."
         )
-    command = use_of(findings.context.load.domain, "conf/model/extended.yaml")
+    command = use_of(
+        findings.context.load.domain, "conf/model/extended.yaml", fit_all=findings.fitted_to_both
+    )
     page.text(
         f"conf/model/extended.yaml beside this page: {command}. Its equations that changed or came"
         " in:"
