@@ -468,6 +468,8 @@ def _estimate_extended_model(question: Question, steps: "Steps") -> Result:
 def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str]:
     """The commands that go on from the files of an investigation, {name: path}, each with what it
     does.
+
+    What is missing still is looked for in the domain that tells more, where there is one.
     """
     from tractexp.discrepancy.discrepancy_json import (
         MODEL_FILE,
@@ -479,6 +481,8 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
 
     lines, domain = [], result.question.model.domain
     grade, fit_all = result.content["adequacy"]["grade"], result.gap.fitted_to_both
+    context = result.steps.context
+    better = next(filter(None, map(context.domain.better, context.events)), "")
     if model := paths.get(MODEL_FILE.name):
         use = use_of(domain, model, fit_all=fit_all)
         which = f", which has {join_words(result.names)}" if result.verdict == "tied" else ""
@@ -486,14 +490,12 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
             lines.append(f"see the extended model, which does not describe this load: {use}")
         else:
             lines.append(f"use the extended model{which}: {use}")
-        if grade != Grade.ADEQUATE:
+        if grade != Grade.ADEQUATE and not better:
             again = investigate_with(domain, model, fit_all=fit_all)
             lines.append(f"investigate it as the base model: {again}")
-    if grade != Grade.ADEQUATE:
-        context = result.steps.context
-        better = [why for why in map(context.domain.better, context.events) if why][:1]
+    if grade != Grade.ADEQUATE and better:
         in_waves = build_again_command("task=discrepancy", "domain=waves", of=("data", "task"))
-        lines += [f"next: {why}: {in_waves}" for why in better]
+        lines.append(f"next: {better}: {in_waves}")
     if term := paths.get(PLUGIN):
         lines.append(f"use the proposed term: {adopt_term(term)}")
     return lines

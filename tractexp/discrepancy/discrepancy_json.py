@@ -133,9 +133,10 @@ def recommend_confirmation(findings: Findings) -> str:
 
 
 def parameters(investigation: Findings) -> dict[str, dict[str, float]]:
-    """Parameters of the extended model, each with its standard error where the fit gives one."""
+    """Parameters of the graded model, each with its standard error where the fit gives one."""
     return {
-        e.parameter.name: {"value": e.value, "standard_error": e.error} for e in investigation.after
+        e.parameter.name: {"value": e.value, "standard_error": e.error}
+        for e in investigation.graded_parameters
     }
 
 

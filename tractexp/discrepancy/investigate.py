@@ -19,7 +19,14 @@ from tractexp.discrepancy.grades import Grader
 from tractexp.discrepancy.held_out import judge_held_out
 from tractexp.discrepancy.incomplete import predict_held_out
 from tractexp.discrepancy.next_event.choose import NextEvent
-from tractexp.discrepancy.overlay import Overlay, find_remainder, of_fit, on_fitted, on_held_out
+from tractexp.discrepancy.overlay import (
+    Overlay,
+    draw_graded,
+    find_remainder,
+    of_fit,
+    on_fitted,
+    on_held_out,
+)
 from tractexp.discrepancy.places import DisagreementInterval, places
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult, propose
@@ -41,6 +48,8 @@ from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
 from tractexp.record import Event
 from tractexp.wording import join_words
+
+HELD = "held: these events cannot tell it"  # verdict on a parameter of the extended model
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +236,23 @@ class Findings:
             *on_fitted(self.context, self.train, near, self.places, extended=extended),
             *on_held_out(self.context, self.withheld, self.validate, self.bare, near),
         ]
+
+    @property
+    def graded_overlays(self) -> list[Overlay]:
+        """The same as the graded models calculate them."""
+        return draw_graded(self.overlays, self.base_grade, self.final_grade if self.names else None)
+
+    @functools.cached_property
+    def graded_parameters(self) -> list[ParameterEstimate]:
+        """The parameters of the model that the investigation ends with, as it is graded: those
+        searched, then those that it holds.
+        """
+        declared = {p.name: p for p in self.final_grade.problem.model.parameters}
+        held = [
+            ParameterEstimate(declared[name], value, np.nan, HELD)
+            for name, value in self.held.items()
+        ]
+        return [*self.final_grade.parameters, *held]
 
     @functools.cached_property
     def remainder(self) -> list[Remainder]:

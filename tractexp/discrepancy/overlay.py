@@ -1,7 +1,7 @@
 """Measured, before and after, event by event, on one time axis: what a page overlays."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.places import DisagreementInterval
 from tractexp.discrepancy.remainder import Remainder, remainders
 from tractexp.domain import domain_of
+from tractexp.identification.grade import GradedModel
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
 from tractexp.noise import Noise
@@ -84,6 +85,25 @@ def on_held_out(
         for unit, fit in zip(units, fits, strict=True)
     ]
     return _each(other, noise, (before, None, near[0] if near else None), (), held_out=True)
+
+
+def draw_graded(
+    overlays: Sequence[Overlay], base: GradedModel, extended: GradedModel | None
+) -> list[Overlay]:
+    """The same events as the graded models calculate them; as the fits do by which effects are
+    ranked where a graded model cannot be simulated.
+    """
+
+    def draw(overlay: Overlay) -> Overlay:
+        before = base.find_curves(overlay.event)
+        after = overlay.after if extended is None else extended.find_curves(overlay.event)
+        return replace(
+            overlay,
+            before=overlay.before if before is None else before,
+            after=overlay.after if after is None else after,
+        )
+
+    return [draw(overlay) for overlay in overlays]
 
 
 def of_fit(context: Context, fit: Refit, noise: Noise) -> list[Overlay]:

@@ -30,7 +30,8 @@ def advise(
     """Sentences, the most pressing first. `odd` events do not fit with the rest; `data` is the
     choice of data that holds further events of the load, where one is known.
 
-    Of a model that does not describe the load nothing is said that would only hold if it did.
+    Of a model that does not describe the load nothing is said that would only hold if it did. What
+    is missing is looked for in the domain that tells more, where there is one.
     """
     better = [
         f"{why}: {build_again_command('domain=waves')}"
@@ -41,8 +42,8 @@ def advise(
     search = build_again_command(*settings)
     if adequacy.grade is Grade.WRONG_MODEL:
         missing = f"find what is missing: {search}; or choose another model: tractexp list model"
-        return [*better, missing, *sentences]
-    if adequacy.grade is Grade.EFFECT_MISSING:
+        return [*(better or [missing]), *sentences]
+    if adequacy.grade is Grade.EFFECT_MISSING and not better:
         sentences.insert(0, f"find the missing effect: {search}")
     sentences += [
         f"widen model.bounds.{name}, or ask whether the model is the right one"

@@ -24,6 +24,7 @@ from tractexp.identification.result import (
     relative_errors,
 )
 from tractexp.identification.uncertainty import Uncertainty
+from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.model_error import ModelError, model_error
 from tractexp.inference.problem import Problem
 from tractexp.record import Event
@@ -54,6 +55,34 @@ class GradedModel:
     def doubt(self) -> str:
         """Why no load divides so into motor and static part, in words; "" where one may."""
         return doubt_estimate(self.problem, self.values)
+
+    @functools.cached_property
+    def parameters(self) -> list[ParameterEstimate]:
+        """What is known of each free parameter, with the interval and verdict of `result.json`."""
+        known = self.uncertainty
+        declared = {p.name: p for p in self.problem.parameters}
+        errors = np.where(
+            np.isfinite(known.information.standard_errors),
+            known.information.standard_errors,
+            np.nan,
+        )
+        columns = (known.names, known.values, errors, known.intervals)
+        return [
+            ParameterEstimate(
+                declared[name], value, error, str(known.verdicts[name]), ends=(ends[0], ends[1])
+            )
+            for name, value, error, ends in zip(*(map(list, columns)), strict=True)
+        ]
+
+    def find_curves(self, event: Event) -> np.ndarray | None:
+        """What it calculates of an event (C, N) [pu]: P and Q, or the currents of waveforms; None
+        where it cannot be simulated there.
+        """
+        named = (fit for fit in self.fits if fit.event.record.name == event.record.name)
+        fit = next(named, None)
+        if fit is None:
+            return None
+        return np.stack([fit.P, fit.Q]) if fit.currents is None else fit.currents
 
     @functools.cached_property
     def errors(self) -> dict[str, Any]:

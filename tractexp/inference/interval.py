@@ -28,7 +28,7 @@ class ParameterEstimate:
     """One parameter at a fit.
 
     `error` is its standard error: nan where it rests on a bound or is not computed. `freedom` is
-    that of the error.
+    that of the error; `ends` is the interval where that is not the error's alone.
     """
 
     parameter: Parameter
@@ -36,6 +36,7 @@ class ParameterEstimate:
     error: float
     verdict: str = ""
     freedom: float = np.inf
+    ends: tuple[float, float] | None = None
 
     def __str__(self) -> str:
         unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
@@ -49,6 +50,8 @@ class ParameterEstimate:
     @property
     def interval(self) -> tuple[float, float]:
         """95 %, inside the bounds; nan without a standard error."""
+        if self.ends is not None:
+            return self.ends
         ends = np.clip([self.value - self.half, self.value + self.half], *self.parameter.bounds)
         return float(ends[0]), float(ends[1])
 

@@ -153,7 +153,7 @@ def report(
     page.verdict(head, *sentences, f"Next: {recommendation(findings)}.", kind=kind)
     overlaid(
         page.heading("Measured, before, after" if findings.names else "Measured and calculated"),
-        findings.overlays,
+        findings.graded_overlays,
     )
     _smaller(page, findings, content)
     if findings.verdict.word == UNEXPLAINED:

@@ -67,8 +67,8 @@ def parameters(page: Report, findings: Findings) -> None:
     page.heading(
         "Parameters before and after" if findings.names else "Parameters of the base model"
     )
-    before = {e.parameter.name: e for e in findings.before}
-    rows, parameter_estimates = [], findings.after if findings.names else findings.before
+    before = {e.parameter.name: e for e in findings.base_grade.parameters}
+    rows, parameter_estimates = [], findings.graded_parameters
     for e in parameter_estimates:
         p, was = e.parameter, before.get(e.parameter.name)
         entries = [value(was) if was else "not in it"] if findings.names else []
@@ -76,12 +76,13 @@ def parameters(page: Report, findings: Findings) -> None:
             [p.name, p.about, p.unit, *entries, value(e), interval(*e.interval), brief(e.verdict)]
         )
     stages = ["before", "after"] if findings.names else ["value"]
-    how = "the curvature" if findings.tests.robust is None else "blocks of 0.1 s left out in turn"
+    is_exact = findings.final_grade.uncertainty.exact
+    how = "the curvature" if is_exact else "blocks of 0.1 s left out in turn"
     columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
     page.table(
         columns,
         rows,
-        f"± one standard error, from {how} in the fit to the fitted events.",
+        f"± one standard error, from {how} in the fit of the graded model.",
         words=(1, 2, len(columns) - 1),
     )
     if retained := findings.held:
