@@ -191,7 +191,8 @@ def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdic
     words, _ = page(named, tmp_path)
     assert "parameter meaning unit before after 95 % interval verdict" in words
     assert "R_s stator resistance on the record's base pu not in it" in words
-    before, after = ({e.parameter.name: e for e in group} for group in (named.before, named.after))
+    graded = named.base_grade.parameters, named.graded_parameters
+    before, after = ({e.parameter.name: e for e in group} for group in graded)
     assert before.keys() == after.keys() - {"R_s"}
     for e in after.values():
         low, high = e.interval
@@ -200,6 +201,23 @@ def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdic
         assert f"{low:.4g} to {high:.4g}" in words
     told = content(named)["parameters"]
     assert told == {n: {"value": e.value, "standard_error": e.error} for n, e in after.items()}
+
+
+def test_what_is_drawn_and_told_is_of_the_graded_model(named):
+    """The fits by which effects are ranked weigh otherwise: their curves and parameters are near,
+    and not the same.
+    """
+    known = named.final_grade.uncertainty
+    values = dict(zip(known.names, known.values, strict=True))
+    assert {e.parameter.name: e.value for e in named.graded_parameters} == values | named.held
+    for ranked, graded in zip(named.overlays, named.graded_overlays, strict=True):
+        (fit,) = (
+            one
+            for one in named.final_grade.fits
+            if one.event.record.name == graded.event.record.name
+        )
+        assert np.array_equal(graded.after, np.stack([fit.P, fit.Q]))
+        assert 0 < np.abs(graded.after - ranked.after).max() < 3 * ranked.deviation.max()
 
 
 def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_path):

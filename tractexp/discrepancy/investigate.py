@@ -49,7 +49,7 @@ from tractexp.model.model import Model
 from tractexp.record import Event
 from tractexp.wording import join_words
 
-HELD = "held: these events cannot tell it"  # verdict on a parameter of the extended model
+HELD = "held"  # the verdict on a parameter that the extended model does not search
 
 
 @dataclass(frozen=True, eq=False)

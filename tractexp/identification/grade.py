@@ -59,19 +59,17 @@ class GradedModel:
     @functools.cached_property
     def parameters(self) -> list[ParameterEstimate]:
         """What is known of each free parameter, with the interval and verdict of `result.json`."""
-        known = self.uncertainty
-        declared = {p.name: p for p in self.problem.parameters}
-        errors = np.where(
-            np.isfinite(known.information.standard_errors),
-            known.information.standard_errors,
-            np.nan,
+        known, declared = self.uncertainty, {p.name: p for p in self.problem.parameters}
+        errors = known.information.standard_errors
+        errors = np.where(np.isfinite(errors), errors, np.nan).tolist()
+        rows = zip(
+            known.names, known.values.tolist(), errors, known.intervals.tolist(), strict=True
         )
-        columns = (known.names, known.values, errors, known.intervals)
         return [
             ParameterEstimate(
-                declared[name], value, error, str(known.verdicts[name]), ends=(ends[0], ends[1])
+                declared[name], value, error, str(known.verdicts[name]), ends=(low, high)
             )
-            for name, value, error, ends in zip(*(map(list, columns)), strict=True)
+            for name, value, error, (low, high) in rows
         ]
 
     def find_curves(self, event: Event) -> np.ndarray | None:
