@@ -199,7 +199,9 @@ def _counted(found) -> dict:
         "gain_held": None
         if found.validate is None
         else [found.validate.gain, found.validate.expected],
-        "left_of_all": None if found.assessment is None else found.assessment.p_left,
+        "left_of_all": None if found.verdict.chosen is None else found.verdict.chosen.p_of_all,
+        "grade": found.final_grade.adequacy.grade,
+        "reason": found.reason,
         "left": [s.p_left for s in found.explanations.steps],
         "left_by": found.last.left,
         "samples": found.context.samples,
@@ -271,12 +273,12 @@ def _compared(found, trial: cases.Trial) -> dict:
         }
     made = scene(trial.case, trial.seed)
     clean = _powers(made.records())
-    if found.assessment is not None:
-        other = found.assessment.context
+    if found.validate is not None:
+        other = found.validate.context
         N = other.drive.samples
         sets = [(), found.names]  # members of families have kernels of their own
         got = (
-            other.residuals_of(np.array(found.assessment.units), sets)
+            other.residuals_of(np.array(found.validate.units), sets)
             + other.drive.measured
             - clean[:, -N:]
         )

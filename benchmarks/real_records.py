@@ -47,6 +47,7 @@ def row(name: str, fitted: str) -> dict[str, Any]:
         **verdict,
         "reason": found.reason,
         "sets": found.content["name_sets"],
+        "grade": found.content["adequacy"]["grade"],
         "nearest": near and near["effects"],
         "gap": found.content["gap"],
         "near_gap": near and near.get("gap"),

@@ -126,6 +126,17 @@ def test_sparse_regression_keeps_what_is_there_and_little_else():
     assert 2 <= alarms <= 22, "one in twenty of 200, and three standard deviations to either side"
 
 
+def test_a_row_is_counted_of_an_investigation(monkeypatch, planted):
+    """What the study reads of an investigation is there, clean curves' error included."""
+    monkeypatch.setattr(study.baselines, "sparse", lambda found: [])
+    made = study._counted(planted)
+    assert (made["verdict"], made["names"]) == (planted.verdict.word, ["stator_resistance"])
+    assert made["gain_held"][0] == planted.validate.gain
+    assert made["left_of_all"] == planted.verdict.chosen.p_of_all
+    assert made["grade"] == planted.final_grade.adequacy.grade
+    assert made["reason"] == planted.reason
+
+
 def row(**changes) -> dict:
     return {
         "group": "4 x",
