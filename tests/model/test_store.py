@@ -316,6 +316,18 @@ def behind_a_link_that_others_can_change(folder, monkeypatch):
     return "every user can put another in its place"
 
 
+def by_a_link_of_another_user_where_all_share(folder, monkeypatch):
+    if os.getuid():
+        pytest.skip("only root gives a link away")
+    (folder.parent / "shared").mkdir()
+    sound = folder.rename(folder.parent / "sound")
+    (folder.parent / "shared" / "link").symlink_to(sound)
+    os.lchown(folder.parent / "shared" / "link", 12345, 12345)
+    (folder.parent / "shared").chmod(0o1777)
+    folder.symlink_to(folder.parent / "shared" / "link")
+    return f"another user has put {folder.parent / 'shared' / 'link'} there"
+
+
 def no_folder(folder, monkeypatch):
     folder.rmdir()
     folder.write_text("a file")
@@ -340,7 +352,15 @@ FAULTS = [
     with_a_kind_that_is_open,
     with_a_kind_that_is_a_link,
     behind_a_link_that_others_can_change,
+    by_a_link_of_another_user_where_all_share,
 ]
+
+
+@WITHOUT_OWNERS
+def test_a_folder_of_ones_own_is_used_where_all_share_and_none_can_move_it(folder):
+    """As in /tmp: in a folder with the sticky bit only the owner of an entry moves it."""
+    folder.parent.chmod(0o1777)
+    assert store.cache_folder() == folder
 
 
 @WITHOUT_OWNERS

@@ -16,6 +16,7 @@ import pytest
 from tractexp.errors import UserError
 from tractexp.progress import FIRST_LINE
 from tractexp.sweep import launcher, progress, recorder
+from tractexp.sweep.elsewhere import Delivery, unpack_job
 from tractexp.sweep.job import SweepJob, find_shared_overrides, read_shared_events
 from tractexp.sweep.output import printing_to
 from tractexp.sweep.placing import place
@@ -187,6 +188,26 @@ def test_what_a_job_measured_comes_back_and_of_one_that_failed_nothing_counts(jo
     ended(jobs[0], value=3.0)
     ended(jobs[1], FAILED, 2.0)
     assert [objective(one.folder) for one in jobs[:3]] == [3.0, None, None]
+
+
+def test_what_comes_back_from_afar_takes_the_place_of_the_earlier_unless_it_failed(jobs):
+    one = replace(jobs[0], config={"seed": 0})
+    for end, content, left in (
+        (FINISHED, b"1", b"1"),
+        (FAILED, b"2", b"1"),
+        (FINISHED, b"3", b"3"),
+    ):
+        contents = {"output.txt": end.encode(), FILE: b"theirs", "../mine": b"x"}
+        if end == FINISHED:
+            contents["result.json"] = content
+        state = replace(one.status, status=end)
+        assert unpack_job(one, Delivery(state, contents)) == state
+        assert (one.folder / "result.json").read_bytes() == left
+        assert (one.folder / "output.txt").read_text() == end
+        assert read(one.folder) == state
+    names = {path.name for path in one.folder.iterdir()}
+    assert names == {".hydra", "output.txt", "result.json", FILE}
+    assert not (one.folder.parent / "mine").exists()
 
 
 def test_jobs_have_the_folders_that_are_named_and_keep_them(tmp_path):

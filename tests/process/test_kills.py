@@ -1,0 +1,19 @@
+"""`kill -9` of real commands at some moments; `benchmarks/kills.py` takes every one."""
+
+import os
+
+import pytest
+
+if os.name == "nt":
+    pytest.skip("forks", allow_module_level=True)
+
+
+@pytest.mark.parametrize("task", ["investigation", "export"])
+def test_who_kills_a_command_leaves_the_earlier_files_or_the_new_ones(task, tmp_path, monkeypatch):
+    import kills
+
+    monkeypatch.chdir(tmp_path)
+    counts = getattr(kills, f"kill_{task}")(every=20)
+    assert counts.keys() <= {kills.EARLIER, kills.NEWER}
+    assert counts.total() > 3
+    assert counts[kills.EARLIER] > 0
