@@ -2,6 +2,9 @@
 asked.
 """
 
+import re
+from pathlib import Path
+
 import hostile
 import pytest
 
@@ -42,6 +45,16 @@ def test_the_memory_of_the_reader_is_limited_and_not_ours(tmp_path, monkeypatch)
     with pytest.raises(UserError, match="of memory to read"):
         tractexp.read(str(path))
     assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+@pytest.mark.skipif(not Path("/proc/self/limits").exists(), reason="asks the system for limits")
+def test_the_time_of_the_reader_is_limited_and_not_ours(tmp_path):
+    before = resource.getrlimit(resource.RLIMIT_CPU)
+    path = hostile.workbook(tmp_path / "dip.xlsx", hostile.rows_of_cells(hostile.VALUES))
+    with workbook.Workbook(path.read_bytes()) as book:
+        limits = Path(f"/proc/{book._reader.pid}/limits").read_text()
+    assert re.search(rf"Max cpu time +{workbook.PATIENCE} ", limits)
+    assert resource.getrlimit(resource.RLIMIT_CPU) == before
 
 
 @pytest.mark.parametrize("name", ["no_book.xlsx", "no_book.xls", "empty_zip.xlsx", "repeated.ods"])

@@ -2,8 +2,8 @@
 
 A file of a few hundred bytes may have one cell in the last row and column: what reads it asks the
 system for the whole rectangle, and ends the process where there is no such memory. So that process
-is another one, whose memory is limited before it opens the file. It runs this file as a script, and
-needs no other of this package.
+is another one, whose memory and time are limited before it opens the file. It runs this file as a
+script, and needs no other of this package.
 """
 
 import contextlib
@@ -16,6 +16,8 @@ from typing import Any, Self
 
 # bytes of memory that a workbook may take, and more for each byte of its file
 ROOM, PER_BYTE = 2 << 30, 40
+# s of a processor that it may take, and bytes of its file for which it may take one more
+PATIENCE, BYTES_PER_SECOND = 120, 500_000
 
 
 class BadWorkbook(Exception):
@@ -31,7 +33,8 @@ class Workbook:
 
     def __init__(self, data: bytes) -> None:
         """Raises `BadWorkbook` for what is none."""
-        command = [sys.executable, "-P", __file__, str(ROOM + PER_BYTE * len(data))]
+        memory, seconds = ROOM + PER_BYTE * len(data), PATIENCE + len(data) // BYTES_PER_SECOND
+        command = [sys.executable, "-P", __file__, str(memory), str(seconds)]
         pipe = subprocess.PIPE
         self._reader = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL)
         try:
@@ -67,8 +70,8 @@ class Workbook:
             answer = pickle.load(stdout)
         except (EOFError, OSError, pickle.UnpicklingError):
             raise BadWorkbook(
-                f"it takes more than {ROOM >> 30} GB of memory to read, or its reader fails: a cell"
-                " far from the "
+                f"it takes more than {ROOM >> 30} GB of memory to read, or {PATIENCE} s, or its"
+                " reader fails: a cell far from the "
                 "table, such as one in the last row, counts as all the cells between; save the"
                 " workbook without it"
             ) from None
@@ -77,16 +80,17 @@ class Workbook:
         return answer
 
 
-def _serve(limit: int) -> None:
+def _serve(memory: int, seconds: int) -> None:
     """Answer what `Workbook` asks: the names of the sheets of a file, then the rows of each; None
     for what is none.
     """
     with contextlib.suppress(ImportError):  # a system that knows no such limits
         import resource
 
-        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-        limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
-        resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
+        for kind, limit in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, seconds)):
+            hard = resource.getrlimit(kind)[1]
+            own = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+            resource.setrlimit(kind, (own, hard))
     import python_calamine
 
     def tried(read: Callable[[Any], Any], question: Any) -> Any:
@@ -117,4 +121,4 @@ def _give(answer: Any) -> None:
 
 
 if __name__ == "__main__":
-    _serve(int(sys.argv[1]))
+    _serve(int(sys.argv[1]), int(sys.argv[2]))
