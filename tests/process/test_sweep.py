@@ -791,7 +791,7 @@ def test_what_an_earlier_sweep_came_to_goes_before_its_configuration(tmp_path):
     done = run_command("-m", *budget, "hydra.launcher.backend=threading", HERE, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     names = {p.name for p in (tmp_path / "sweep").iterdir()}
-    assert names == {"0", "1", "multirun.yaml", "notes.txt"}
+    assert names == {"0", "1", "multirun.yaml", "notes.txt", "sweep.html"}
     assert (tmp_path / "sweep" / "multirun.yaml").read_text() != "of an earlier sweep"
 
 
