@@ -12,6 +12,8 @@ import tractexp
 import tractexp.data
 from tractexp import files, zip_archive
 from tractexp.errors import UserError
+from tractexp.filetypes import comtrade
+from tractexp.plugin import build
 
 DATA = Path(tractexp.data.__file__).parent
 TABLE, CFG, DAT = (
@@ -44,6 +46,17 @@ def test_a_record_is_the_same_in_a_zip_and_beside_it(pack):
             np.testing.assert_array_equal(values, other.record.channels[name])
         assert one.record.source.startswith("r.zip/north/tibet_50pct.CFG")
     assert [p.name for p in Path.cwd().iterdir()] == ["r.zip"]
+
+
+def test_a_reader_finds_its_record_in_a_zip(pack, tmp_path):
+    recording = comtrade.load(DATA / "tibet_50pct.cfg")
+    comtrade.write(recording, tmp_path / "b.cff", "BINARY")
+    pack({"a.csv": TABLE, "notes.txt": b"of words\n", "b.cff": (tmp_path / "b.cff").read_bytes()})
+    read = build("data", {"name": "comtrade", "path": "r.zip"}).opened()
+    assert [c.name for c in read.channels] == [c.name for c in recording.channels]
+    assert read.source == "r.zip/b.cff"
+    with pytest.raises(UserError, match=r"r.zip holds no file that ends in .cev"):
+        build("data", {"name": "sel", "path": "r.zip"}).opened()
 
 
 def test_look_names_the_file_within(pack):

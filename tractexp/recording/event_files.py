@@ -67,7 +67,7 @@ def event_paths(path: str, join: Sequence[str], wanted: Sequence[str]) -> list[s
     """The files that `data.path` and `data.join` name: of a .zip the record in it, or those of one
     event.
 
-    `wanted` are the endings of the first files of records. Raises `UserError` for a .zip without
+    `wanted` are the endings that the reader takes. Raises `UserError` for a .zip without
     any, or with several.
     """
     if not files.is_archive(path):

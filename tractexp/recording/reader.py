@@ -72,7 +72,7 @@ class WaveformReader(Reader):
 
     def opened(self) -> Recording:
         """The files, their units and the nominal frequency that their voltages really have."""
-        path, *join = event_paths(self.path, self.join, self.parts[:1] or self.endings)
+        path, *join = event_paths(self.path, self.join, self.endings)
         recording = bridge_recording(replace(self, path=path, join=join).joined())
         keys = {"U": "voltages", "I": "currents"}
         numbers = {
