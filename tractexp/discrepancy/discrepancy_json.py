@@ -250,7 +250,8 @@ def _best_term(investigation: Findings) -> dict[str, Any] | None:
 
 
 def _error(error: ModelError) -> dict[str, Any]:
-    return files.plain({"value": error.value, "interval": error.interval})
+    own = {"stalls": error.stalls} if error.stalls else {}
+    return files.plain({"value": error.value, "interval": error.interval} | own)
 
 
 def write_left(investigation: Findings, path: Path) -> Path:
@@ -312,6 +313,8 @@ def sets(investigation: Findings) -> list[dict[str, Any]]:
         }
         predicted = set_evidence.prediction
         error = {} if predicted is None else {"model_error": predicted.error}
+        if predicted is not None and predicted.stalls:
+            error["stalls"] = predicted.stalls
         rows.append(row | files.plain(error | {"evidence": _evidence(set_evidence)}))
     return rows
 

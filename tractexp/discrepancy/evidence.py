@@ -32,13 +32,14 @@ class PredictedError:
 
     `squares` (b,) is what is left in each block [pu^2], noise included; `noise` (b,) of that is
     expected of the noise, and `response` (b,) is what the load did. `unit` (D,) are the coordinates
-    on the held-out events.
+    on the held-out events. `stalls` names those on which the motor stalls: there all is left.
     """
 
     squares: np.ndarray
     noise: np.ndarray
     response: np.ndarray
     unit: np.ndarray
+    stalls: tuple[str, ...] = ()
 
     @property
     def left(self) -> float:
@@ -82,7 +83,14 @@ class PredictedDeviance:
     least: float
 
     @property
+    def stalls(self) -> tuple[str, ...]:
+        """The held-out events on which the motor stalls."""
+        return self.curves.error.stalls
+
+    @property
     def left(self) -> float:
+        if not np.isfinite(self.curves.error.value):
+            return np.inf
         return self.beyond_chance if self.beyond_chance > self.least else 0.0
 
     @property

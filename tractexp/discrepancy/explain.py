@@ -31,7 +31,7 @@ from tractexp.discrepancy.ranking import (
 )
 from tractexp.inference.chance import by_draws
 from tractexp.inference.context import Context
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import describe_stall, in_percent
 from tractexp.record import Event
 from tractexp.wording import alternatives, join_words, list_figures, percent
 
@@ -348,7 +348,8 @@ def _describe_term(evidence: Evidence) -> str:
 
 def _size(row: SetEvidence) -> str:
     """The model's error on the held-out events, as a sentence tells it."""
-    return in_percent(row.predicted.error)
+    stalls = row.predicted.stalls
+    return f"all ({describe_stall(stalls)})" if stalls else in_percent(row.predicted.error)
 
 
 def _deny_all(context: Context, most: int = 1) -> str:

@@ -73,6 +73,8 @@ class GapTest:
         """The share of what could be explained: of what was gained and what is left. 0 where that
         is nothing.
         """
+        if self.gain == np.inf:  # the model diverges without it
+            return 1.0
         whole = self.gain + max(self.left, 0.0)
         return self.gain / whole if whole > 0 else 0.0
 
@@ -154,10 +156,11 @@ def gap(
     """
     before, after = curves(context, base, noise, without), curves(context, extended, noise, names)
     gained = before.deviance - after.deviance
-    changes = (
-        compute_pushed_changes(context, extended, names, noise) if changes is None else changes
-    )
-    left = beyond_chance(context, extended, names, noise, fitted, changes)
+    left = np.inf
+    if np.isfinite(after.deviance):
+        if changes is None:
+            changes = compute_pushed_changes(context, extended, names, noise)
+        left = beyond_chance(context, extended, names, noise, fitted, changes)
     apart = (after.calculated - before.calculated)[None] * context.valid
     rows = np.nan_to_num(context.whiten(noise, apart)[0], nan=np.inf).reshape(
         context.drive.channels, -1

@@ -148,9 +148,10 @@ def predict(there: Context, fit: Refit) -> PredictedError:
     left, noise, response = [], [], []
     for one, sums in zip(played, block_sums(played, SHARING), strict=True):
         own = noise_variance(one.event) * (one.event.record.samples - one.event.start) / len(sums)
-        left.append(sums[:, 0] + own)
+        left.append(np.full(len(sums), np.inf) if one.stalls else sums[:, 0] + own)
         noise.append(np.full(len(sums), own))
         response.append(sums[:, 1])
+    stalls = tuple(one.event.record.name for one in played if one.stalls)
     return PredictedError(
-        np.concatenate(left), np.concatenate(noise), np.concatenate(response), unit
+        np.concatenate(left), np.concatenate(noise), np.concatenate(response), unit, stalls
     )

@@ -13,6 +13,10 @@ from tractexp.record import Event, Record, WaveEvent
 from tractexp.record.phasor import Phasors, measure
 from tractexp.recording.estimator import estimator_of
 
+# Times the recorded apparent power, and that before the dip, which a load draws at a record's end
+# whose motor has stalled: at standstill a motor draws four to eight times its own (IEC 60034-12).
+STALLED_POWER = 2.0
+LAST_SHARE = 0.1  # of a record: its end
 AFTER = 0.15  # s after a dip's start in which the currents' error counts
 
 
@@ -36,6 +40,23 @@ class Playback:
     waves: WaveEvent | None = None
     currents: np.ndarray | None = None
     unsettled: float | None = None
+
+    @property
+    def stalls(self) -> bool:
+        """Whether the load that is calculated diverges, or does not run up again after the dip as
+        the recorded one did.
+        """
+        record, before = self.event.record, np.hypot(self.event.P0, self.event.Q0)
+        S, recorded = np.hypot(self.P, self.Q), np.hypot(record.P, record.Q)
+        valid = np.isfinite(recorded)
+        if not np.isfinite(S[valid]).all():
+            return bool(np.isfinite(S[0]))  # else it has no steady state
+        last = max(self.event.end, round((1 - LAST_SHARE) * record.samples))
+        valid[:last] = False
+        if not valid.any():
+            return False
+        usual = max(recorded[valid].mean(), before)
+        return bool(S[valid].mean() > STALLED_POWER * usual)
 
     @classmethod
     def of_power(cls, event: Event, P: np.ndarray, Q: np.ndarray) -> "Playback":

@@ -21,7 +21,7 @@ from tractexp.inference import goodness_of_fit
 from tractexp.inference.goodness_of_fit import PER_EVENT, GoodnessOfFit, compare_with_draws
 from tractexp.inference.least_squares import MOST_NUMBERS
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.model_error import ModelError
+from tractexp.inference.model_error import ModelError, describe_stall
 from tractexp.inference.observed import Observed
 from tractexp.inference.problem import Problem
 from tractexp.inference.sandwich import off_walls
@@ -236,6 +236,8 @@ def grade_errors(
         size = f"it leaves {fitted}" + (
             f", and of the held-out dips {held_out}" if held_out else ""
         )
+        if stalls := [name for e in errors for name in e.stalls]:
+            size = describe_stall(stalls)
         return Adequacy(
             Grade.WRONG_MODEL, f"this model does not describe this load: {size}{held}", surprise.p
         )

@@ -15,7 +15,7 @@ from tractexp.domain import domain_of
 from tractexp.errors import UserError
 from tractexp.identification.linear_network import best
 from tractexp.identification.result import TRAIN, Fit, model_errors
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import STALL, in_percent
 from tractexp.wording import count_noun
 
 
@@ -38,12 +38,12 @@ def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
     ]
     own, judged = model_errors(played), slice(split, None) if split < len(fits) else slice(split)
     left, model = (e["held_out"]["value"] if e["held_out"] else e["value"] for e in (own, error))
-    ratio = model / left if left > 0 else None
+    ratio = model / left if left > 0 and np.isfinite(model) else None
     dips = "dips" if len(fits[judged]) > 1 else "dip"
     on = f"on the {dips} it {'never saw' if own['held_out'] else 'was fitted to'}"
-    sentence = _sentence(ratio, model, len(box.poles), on) + _of_currents(
-        fits[judged], played[judged]
-    )
+    sentence = _sentence(ratio, model, len(box.poles), on)
+    if np.isfinite(model):
+        sentence += _of_currents(fits[judged], played[judged])
     return {
         "poles": box.poles,
         "chosen_by": box.chosen_by,
@@ -68,6 +68,8 @@ def network_in_words(poles: int) -> str:
 
 def _sentence(ratio: float | None, model: float, poles: int, on: str) -> str:
     network = network_in_words(poles)
+    if not np.isfinite(model):
+        return f"{STALL} in the physical model {on}, beside {network}"
     if ratio is None:
         return (
             f"{network} leaves no more than noise {on}, the physical model {in_percent(model)} of"

@@ -19,9 +19,11 @@ from tractexp.domain import Playback
 from tractexp.inference.blocks import LENGTH, reach
 from tractexp.noise.random_walk import WANDERING_COSINES, without_drift, without_slow
 from tractexp.record import Event
+from tractexp.wording import join_words
 
 BLOCKS = 10  # of short records: two or three would tell nothing of chance
 COHERENT_SECONDS = 0.02  # s: what is left within a phasor's window hangs together
+STALL = "the motor stalls"
 LARGEST_TOLD_PERCENT = 10_000  # percent: more tells no more
 
 
@@ -31,29 +33,51 @@ class ModelError:
     power.
 
     `square` is the square of it as reckoned, below zero where less is left than noise leaves in the
-    mean.
+    mean. `stalls` names the events on which the motor stalls: there it has no size.
     """
 
     value: float
     interval: tuple[float, float]
     of_S: float
     square: float = np.nan
+    stalls: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
-        return {"value": self.value, "interval": list(self.interval), "of_S": self.of_S}
+        own = {"stalls": list(self.stalls)} if self.stalls else {}
+        return {"value": self.value, "interval": list(self.interval), "of_S": self.of_S} | own
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "ModelError":
+        if stalls := content.get("stalls"):
+            return cls.of_stall(stalls)
         low, high = content["interval"]
         return cls(content["value"], (low, high), content["of_S"], content["value"] ** 2)
+
+    @classmethod
+    def of_stall(cls, events: Sequence[str]) -> "ModelError":
+        """Of a model whose motor stalls on these events: beyond that of any that does not."""
+        return cls(np.inf, (np.inf, np.inf), np.inf, np.inf, tuple(events))
 
     def __str__(self) -> str:
         return f"{in_percent(self.value)} of its response ({in_percent(self.of_S)} of S)"
 
 
+def describe_stall(events: Sequence[str]) -> str:
+    """What is said in place of a model's error where its motor stalls on these events."""
+    return f"{STALL} in this model on {join_words(events)}"
+
+
+def tell_error(entry: Mapping[str, Any]) -> str:
+    """The size of an error as `result.json` has it, or the words in its place."""
+    if entry.get("stalls"):
+        return STALL
+    value = entry["value"]
+    return "beyond all measure" if value is None or not np.isfinite(value) else in_percent(value)
+
+
 def in_percent(share: float) -> str:
-    """A share to two digits: '0.57 %', '12 %'; 'over 10000 %' where a model diverges."""
+    """A share to two digits: '0.57 %', '12 %'; 'over 10000 %' where that tells no more."""
     percent = 100 * share
     if percent > LARGEST_TOLD_PERCENT:
         return f"over {LARGEST_TOLD_PERCENT} %"
@@ -62,10 +86,12 @@ def in_percent(share: float) -> str:
 
 def model_error(played: Sequence[Playback]) -> ModelError:
     """The error of a model over some events together."""
+    if stalls := [one.event.record.name for one in played if one.stalls]:
+        return ModelError.of_stall(stalls)
     sums = np.concatenate(block_sums(played))  # (blocks, 3)
     left, response, power = sums.sum(axis=0)
     ratio = left / max(response, 1e-30)
-    if not np.isfinite(left):
+    if not np.isfinite(left):  # no steady state
         return ModelError(np.inf, (np.inf, np.inf), np.inf, np.inf)
     without = (left - sums[:, 0]) / np.maximum(response - sums[:, 1], 1e-30)
     half = reach(without, ratio)
@@ -100,7 +126,7 @@ def _block_sums(played: Playback, length: float) -> np.ndarray:
     )
     squares[:2] -= noise_variance(event)
     valid = np.isfinite(S)
-    squares[0, valid & ~np.isfinite(squares[0])] = np.inf  # what diverged
+    squares[0, valid & ~np.isfinite(squares[0])] = np.inf  # without a steady state, or diverged
     squares = np.where(valid, squares, 0.0)[:, event.start :]
     return np.add.reduceat(
         squares, np.arange(0, squares.shape[1], max(1, round(length / record.step))), axis=1

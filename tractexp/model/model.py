@@ -27,6 +27,9 @@ MOST_SUBSTEPS = 256
 MOST_STORED = 8_000_000  # numbers of responses that are held at once
 # Runge-Kutta steps of all candidates in one call: about a second, in which no signal is heard
 MOST_STEPS_A_CALL = 2e8
+# pu: no load draws as much; what is calculated beyond has diverged, as the flux of a motor that
+# stalls and turns backwards ever faster
+LARGEST_OUTPUT = 1e6
 # Runge-Kutta of order 4, or Eq. (4) as it stands
 CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")
 
@@ -219,7 +222,7 @@ class Model:
         substeps: Sequence[int] | np.ndarray | int = 1,
         before: np.ndarray | None = None,
     ) -> ModelResponse:
-        """P and Q of every candidate over every event, (n, N).
+        """P and Q of every candidate over every event, (n, N); nan where it has diverged.
 
         `before` (E, n, 2) are P0 and Q0 [pu] where candidates differ in them; by default the
         drive's own.
@@ -229,6 +232,7 @@ class Model:
         outputs = np.empty((drive.channels, n, drive.samples))
         outputs.fill(np.nan)
         _, miss = self._run(drive, candidates, substeps, outputs)
+        outputs[(outputs > LARGEST_OUTPUT) | (outputs < -LARGEST_OUTPUT)] = np.nan
         for e, window in enumerate(drive.windows):
             if window is not None:
                 part = drive.part(e)

@@ -15,7 +15,7 @@ from tractexp.discrepancy.explain import Nearest
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.remainder import Remainder
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import Identity, describe_identities, title
 from tractexp.report.candidates import candidates
 from tractexp.report.disagreement import noise, places
@@ -189,7 +189,8 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
     page.add(replace(table, rows=_with_nearest(near)) if near else table)
     if len(steps := content["contributions"]) > 2:
         rows = [
-            [join_words(s["effects"]) or "the base model", _size(s["model_error"])] for s in steps
+            [join_words(s["effects"]) or "the base model", tell_error({"value": s["model_error"]})]
+            for s in steps
         ]
         page.text("What each name contributes:")
         page.table(
@@ -219,14 +220,9 @@ def _with_nearest(near: Nearest) -> list[list[str]]:
 def _error(entry: Mapping[str, Any]) -> str:
     """A model's error with its interval, as a table has it."""
     ends = [in_percent(end) for end in entry["interval"] if end is not None and np.isfinite(end)]
-    return _size(entry["value"]) + (
+    return tell_error(entry) + (
         f" ({ends[0].removesuffix(' %')} to {ends[1]})" if len(ends) == 2 else ""
     )
-
-
-def _size(error: float | None) -> str:
-    """A model's error; none where the model diverges."""
-    return "beyond all measure" if error is None or not np.isfinite(error) else in_percent(error)
 
 
 def _off(misfit: Mapping[str, Any]) -> list[str]:

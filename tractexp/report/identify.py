@@ -18,7 +18,7 @@ from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES, brief
 from tractexp.identification.yardstick import poles_in_words
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.provenance import command
 from tractexp.record.identity import Identity, describe_identities, title
@@ -338,9 +338,9 @@ def error_table(events: Sequence[Any], of_events: Sequence[Any], epsilons: Seque
         [
             e["name"],
             ROLES[e["role"]],
-            in_percent(m["value"]),
-            " .. ".join(map(in_percent, m["interval"])),
-            in_percent(m["of_S"]),
+            tell_error(m),
+            "" if m.get("stalls") else " .. ".join(map(in_percent, m["interval"])),
+            "" if m.get("stalls") else in_percent(m["of_S"]),
             *(epsilon(e[key]) for key in epsilons),
         ]
         for e, m in zip(events, of_events, strict=True)

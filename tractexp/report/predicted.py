@@ -31,8 +31,9 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
     always = (evidence.base, *findings.verdict.kept, *best)
     rows = [row for k, row in enumerate(every) if k < MOST_SHOWN_SETS or row in always]
     page.heading("Candidates by what they predict")
+    page.items(_describe_stalls(findings))
     if not rows:
-        page.text("No set has a steady state on the held-out events.")
+        page.text("No set has a steady state and survives the held-out events.")
         return
     page.chart(
         _bars(findings, rows),
@@ -49,7 +50,7 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
             [
                 _label(findings, row),
                 in_percent(row.predicted.error),
-                f"{np.sqrt(evidence.base.predicted.left / row.predicted.left):.2f}",
+                _number(np.sqrt(evidence.base.predicted.left / row.predicted.left)),
                 _status(findings, row),
                 "; ".join(map(str, _sizes(findings, row))),
             ]
@@ -63,6 +64,24 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
         f" turn).{best}",
         words=(0, 3, 4),
     )
+
+
+def _number(factor: float) -> str:
+    """By what a set divides the base model's error; nothing where that has no size."""
+    return f"{factor:.2f}" if np.isfinite(factor) else ""
+
+
+def _describe_stalls(findings: Findings) -> list[str]:
+    """In which sets the motor stalls on held-out events: they are behind all others."""
+    labels: dict[tuple[str, ...], list[str]] = {}
+    for row in findings.evidence.every:
+        if row.predicted.stalls:
+            labels.setdefault(row.predicted.stalls, []).append(_label(findings, row))
+    return [
+        f"On {join_words(events)} the motor stalls in this model with {join_words(names)}: behind"
+        " all sets that survive."
+        for events, names in labels.items()
+    ]
 
 
 def _label(findings: Findings, row: SetEvidence) -> str:
