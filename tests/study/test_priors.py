@@ -4,10 +4,19 @@ moves.
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import wave_records as waves
 
 import tractexp
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.identification.estimate import held_to_usual
+from tractexp.inference.catalogue import catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.effort import Effort
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.records import Records
+from tractexp.noise import Noise
 
 STATION = Path(__file__).parents[3] / "shared" / "data" / "dfr220kv-shandong" / "xtz.cfg"
 LOADS = {
@@ -60,3 +69,61 @@ def test_no_motor_of_a_real_station_is_beyond_its_load(load):
         (note,) = [n for n in held.result.uncertainty["notes"] if "model.priors" in n]
         assert "standard deviations off where it is farthest" in note
         assert not any("model.priors=true" in sentence for sentence in held.advice)
+
+
+def contactors(**known):
+    """Two dips that the plain model misses by far, and the model that is asked of them."""
+    folder = Path(tractexp.__file__).parent / "data"
+    dips = [tractexp.read(folder / f"contactors_{depth}pct.csv")[0] for depth in (50, 30, 65)]
+    return dips, tractexp.compose().with_(priors=True, **known)
+
+
+def test_an_investigation_holds_the_motor_by_the_rows_of_an_identification():
+    """Eq. (8) with what machines usually are: the same rows at the same parameters."""
+    dips, model = contactors()
+    lacks = catalogue(model.model, dips, ["stator_resistance"])
+    records = Records.of(dips)
+    context = Context.of(
+        model.model, lacks, records, {}, {}, Criteria(), Effort(), None, priors=True
+    ).with_measured_power.held_to_usual
+    squares = held_to_usual(Likelihood.of_squares(context.kernels.bare, 0.02))
+    at, free = context.coordinates, np.linspace(0.3, 0.6, squares.free)[None]
+    unit = at.null[None].copy()
+    unit[:, at.base] = free
+    level = Noise(Noise.white(0.02, 0.02).pairs, np.eye(2))
+    ours, theirs = context.rows(unit, level, (), [()]), squares.rows(free)
+    assert context.prior > 1
+    assert ours.shape == theirs.shape
+    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+    held = squares.prior_rows(free)
+    np.testing.assert_allclose(ours[:, -held.shape[1] :], held)
+
+
+def test_an_investigation_without_priors_or_motor_has_no_such_rows():
+    dips, model = contactors()
+    context = Context.of(
+        model.model,
+        catalogue(model.model, dips, ["stator_resistance"]),
+        Records.of(dips),
+        {},
+        {},
+        Criteria(),
+        Effort(),
+    )
+    assert context.held_to_usual is context
+    assert context.prior == 0.0
+
+
+def test_the_base_model_of_an_investigation_is_that_of_an_identification_with_priors():
+    dips, model = contactors(fixed={"C": 0.9}, bounds={"T_m": (0.1, 0.8)})
+    alone = tractexp.identify(dips[:2], model, **QUICK)
+    found = tractexp.investigate(
+        dips[:2], model, validate=dips[2:], effects=["stator_resistance"], progress=False
+    )
+    context, fit = found.steps.context, found.steps.evidence.base.fit
+    assert found.steps.evidence.is_predicted
+    at = context.coordinates
+    assert "C" not in [at.names[k] for k in at.base]
+    for k in at.base:
+        own, width = at.box.from_unit(fit.unit)[k], at.box.width[k]
+        assert own == pytest.approx(alone.result.parameters[at.names[k]], abs=0.01 * width)

@@ -411,11 +411,6 @@ def _steps(question: Question, progress: Progress) -> "Steps":
     with tell_stages(progress) as tell:
         if base.shown:
             tell(shown_in_words(base.shown))
-        if base.priors:
-            tell(
-                f"{MODEL.priors} holds the models that are graded, and no fit by which effects are"
-                " ranked"
-            )
         return findings_of(
             base.model,
             q.train,

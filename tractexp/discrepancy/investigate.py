@@ -356,9 +356,10 @@ def investigate(
     `only` names the effects that are tested (none: all), `substeps` the Runge-Kutta steps per
     sample (None: as many as needed).
 
-    Of grades are `priors`, `shown`, effects that the base model has because its records show them,
-    and `search`, which gives the free values (d,) that an identification's search ends at. Raises
-    `UserError` for wrong events or names.
+    `priors` hold the motor where more than noise is left, as in an identification. Of grades are
+    `shown`, effects that the base model has because its records show them, and `search`, which
+    gives the free values (d,) that an identification's search ends at. Raises `UserError` for wrong
+    events or names.
     """
     criteria = criteria or Criteria()
     train, validate = (domain_of(model).events(events) for events in (train, validate))
@@ -370,7 +371,7 @@ def investigate(
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
 
         given = model, missing, Records.of(train), bounds or {}, fixed or {}, criteria, effort
-        context = Context.of(*given, substeps)
+        context = Context.of(*given, substeps, priors=priors)
         grader = Grader(
             model,
             missing,
@@ -386,7 +387,7 @@ def investigate(
         findings = _findings(base_fit(context), validate, seed, grader)
         if context.kernels.too_coarse(findings.base_values):
             effort.say("the fits lie where the motor is fast: again with shorter steps")
-            finer = Context.of(*given, context.kernels.box_substeps)
+            finer = Context.of(*given, context.kernels.box_substeps, priors=priors)
             findings = _findings(base_fit(finer), validate, seed, grader)
         return findings
 

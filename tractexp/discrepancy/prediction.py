@@ -8,6 +8,7 @@ predicts in events that it was not fitted to.
 import functools
 import itertools
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -45,9 +46,12 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
     by the model's error on the held-out events. The powers before events are those measured, as in
     an identification.
     """
-    context = explained.base.context.with_measured_power
+    plain = explained.base.context.with_measured_power
+    context, noise = plain.held_to_usual, residual_noise(plain, explained.chosen)
     criteria, family = context.criteria, context.catalogue.textbook
-    noise = residual_noise(explained.base.context, explained.chosen)
+    if context.prior:  # its rows stand beside what the base model leaves, as in an identification
+        start = plain.coordinates.at_measured_power(explained.steps[0].fit.unit)
+        noise = residual_noise(plain, refit(plain, noise, [((), start)], faults=())[0])
     there = context.on(Records.of(events, context.records.window))
 
     def fill(fits: Sequence[Refit]) -> list[SetEvidence]:
@@ -105,6 +109,7 @@ def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> li
         context.effort.say(f"{line}, by least squares")
 
     squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0])
+    squares = replace(squares, prior=context.prior)
     by_likelihood = map(at.at_measured_power, (explained.steps[0].fit.unit, *base.local_minima))
     bare = refit(
         context, noise, [((), unit) for unit in (*by_likelihood, *minima_of(context, squares))]

@@ -34,7 +34,7 @@ from tractexp.inference.multistart import (
     screen_points,
 )
 from tractexp.inference.observed import Observed
-from tractexp.inference.prior import held_in_words
+from tractexp.inference.prior import held_in_words, weigh_prior
 from tractexp.inference.problem import Problem
 from tractexp.noise.color import (
     FEWEST_NOISE_SAMPLES,
@@ -303,12 +303,7 @@ def held_to_usual(squares: Likelihood) -> Likelihood:
     samples counts as one.
     """
     problem = squares.problem
-    return replace(
-        squares,
-        prior=np.sqrt(
-            squares.samples / len(blocks_of(problem.events, problem.drive, squares.free))
-        ),
-    )
+    return replace(squares, prior=weigh_prior(problem.events, problem.drive, squares.free))
 
 
 def _find_prior_minima(likelihood: Likelihood, near: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from tractexp.inference.differences import finite, slopes, two_sided
 from tractexp.inference.effort import Effort
 from tractexp.inference.free_set import FreeSet
 from tractexp.inference.kernels import Family, Kernels, Key
+from tractexp.inference.prior import departures, weigh_prior
 from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records
 from tractexp.inference.separable import SeparableColumns
@@ -45,6 +46,7 @@ class Context:
     coordinates: FreeSet
     criteria: "Criteria"
     effort: Effort
+    prior: float = 0.0  # weight of rows that hold the motor to what machines usually are
 
     @classmethod
     def of(
@@ -58,12 +60,19 @@ class Context:
         effort: Effort,
         substeps: int | None = None,
         family: type[Family] = Family,
+        *,
+        priors: bool = False,
     ) -> "Context":
         """A context for these records; the load is simulated behind the recorder's window, where
         there is one.
         """
         kernels = Kernels(
-            family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps
+            family(load.behind(records.window), catalogue),
+            records.events,
+            bounds,
+            fixed,
+            substeps,
+            priors=priors,
         )
         coordinates = FreeSet.of_effects(kernels.bare, kernels.whole, catalogue, FAULT_PRIOR)
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
@@ -74,7 +83,10 @@ class Context:
         """
         kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
         same = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
-        there = Context.of(self.load, self.catalogue, records, *same, type(kernels.family))
+        priors = kernels.bare.priors
+        there = Context.of(
+            self.load, self.catalogue, records, *same, type(kernels.family), priors=priors
+        )
         return there if len(self.coordinates.before) else there.with_measured_power
 
     @property
@@ -83,6 +95,16 @@ class Context:
         of a fit.
         """
         return replace(self, coordinates=replace(self.coordinates, before=np.array([], dtype=int)))
+
+    @property
+    def held_to_usual(self) -> "Context":
+        """The same for residuals in units of what is left, with the prior of an identification
+        where `model.priors` asks for one.
+        """
+        bare = self.kernels.bare
+        if not bare.priors:
+            return self
+        return replace(self, prior=weigh_prior(self.events, self.drive, bare.space.dimension))
 
     @property
     def model(self) -> Model:
@@ -107,6 +129,7 @@ class Context:
             at.null,
             at.before,
             at.prior_deviation,
+            self.prior,
             sorted(self.kernels.fixed.items()),
         )
         return store.key(store.environment(), repr(parts), self.records.window, *content)
@@ -199,13 +222,17 @@ class Context:
         self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]
     ) -> np.ndarray:
         """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of
-        the free faults.
+        the free faults, and that of the motor.
         """
         raw = self.residuals_of(unit, sets)
         white = self.whiten(noise, raw)
         at = self.coordinates
-        prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]
-        return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)
+        prior = [(unit[:, k] - at.null[k])[:, None] / at.prior_deviation[k] for k in faults]
+        if self.prior:
+            bare = self.kernels.bare
+            values = bare.space.from_unit(unit[:, at.base])
+            prior.append(self.prior * departures(bare, values))
+        return np.concatenate([white, *prior], axis=1)
 
     def linearize(
         self, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]

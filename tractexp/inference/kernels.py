@@ -106,9 +106,11 @@ class Kernels:
         bounds: Mapping[str, Sequence[float]],
         fixed: Mapping[str, float],
         substeps: int | None = None,
+        *,
+        priors: bool = False,
     ):
         self.family, self.events, self.bounds, self.fixed = family, tuple(events), bounds, fixed
-        self.bare = Problem(family.model, events, bounds, fixed, substeps)
+        self.bare = Problem(family.model, events, bounds, fixed, substeps, priors=priors)
         self.substeps = self.box_substeps = int(self.bare.step.substeps.max())
         if substeps is None:
             self.bare = self.bare.with_steps_of(STEP_SHARE)

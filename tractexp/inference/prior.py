@@ -6,9 +6,14 @@ So a block of samples, as long as the residual remembers (`blocks`), counts as m
 the prior.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from tractexp.inference.blocks import blocks_of
 from tractexp.inference.problem import Problem
+from tractexp.model.drive import Drive
+from tractexp.record import Event
 
 
 def departures(problem: Problem, values: np.ndarray) -> np.ndarray:
@@ -25,6 +30,14 @@ def departures(problem: Problem, values: np.ndarray) -> np.ndarray:
             )
         ]
     return np.stack(rows, axis=1) if rows else np.empty((len(np.atleast_2d(values)), 0))
+
+
+def weigh_prior(events: Sequence[Event], drive: Drive, free: int) -> float:
+    """The weight of a prior's rows beside residuals in units of what is left, with which a block of
+    samples counts as one of them; `free` is the number of free parameters.
+    """
+    samples = int(np.count_nonzero(drive.weights > 0))
+    return float(np.sqrt(samples / len(blocks_of(events, drive, free))))
 
 
 def held_in_words(problem: Problem, values: np.ndarray) -> str:

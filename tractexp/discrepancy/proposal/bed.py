@@ -79,6 +79,7 @@ def context_of_terms(original: Context) -> Context:
         original.effort,
         kernels.substeps,
         Terms,
+        priors=kernels.bare.priors,
     )
 
 
