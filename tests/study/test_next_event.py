@@ -23,7 +23,7 @@ from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_event import rivals
-from tractexp.discrepancy.next_event.choose import DECIDED, next_event
+from tractexp.discrepancy.next_event.choose import DECIDED, LEAST_CHANCE, next_event
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, imagine_dips
 from tractexp.discrepancy.next_event.same import same
 from tractexp.discrepancy.next_event.separation import (
@@ -299,3 +299,21 @@ def test_the_docs_report_what_the_stored_study_holds():
     docs = (root / "docs" / "missing-effects.md").read_text()
     part = docs.partition("<!-- next event -->")[2].partition("<!-- end of next event -->")[0]
     assert part.strip() == study.table(rows)
+
+
+def test_what_rivals_miss_is_missed_in_each_of_its_like(alike):
+    """Twenty events of one kind leave one rival of noise alone; of a model's error they do not."""
+    bench, noise, bare, fits = alike
+    rivals = fits["stator_resistance"], fits["speed_dependent_torque"]
+    sides = [linearize_side(bench, noise, fit) for fit in (bare, *rivals)]
+    separation, event = Separation(sides, Criteria(), 200), ImaginedDip(0.4, 0.2)
+
+    def chance(error, times):
+        views = [seen(bench, noise, side, [event], error)[0] for side in sides]
+        denied = np.stack([separation.denied(views, truth, times) for truth in (1, 2)])
+        return Chances.of(denied, np.zeros((2, 2), bool)).least
+
+    assert chance(0.0, 20) > DECIDED
+    assert chance(1.0, 20) < LEAST_CHANCE
+    assert chance(1.0, 2000) == chance(1.0, 20)
+    assert chance(0.0, 1) > chance(1.0, 1)

@@ -6,6 +6,7 @@ import itertools
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -306,3 +307,30 @@ def test_a_dip_in_which_the_model_diverges_tells_nothing(problem, monkeypatch):
         add_information([known]).standard_errors * planned.half[0] / known.standard_errors[0]
     )
     assert not np.isfinite(alone.half).any()
+
+
+def test_what_a_model_misses_makes_a_plan_promise_less(problem):
+    """Every interval grows alike; where the model's error is all there is, to sample faster tells
+    no more.
+    """
+
+    def half(**changes):
+        return forecast(problem, study.TYPICAL, replace(SHAPE, **changes)).half
+
+    grown = half(error=0.05) / half()
+    assert grown.min() > 1.5
+    np.testing.assert_allclose(grown, grown[0], rtol=1e-6)
+    np.testing.assert_allclose(half(error=0.8, rate=1000.0), half(error=0.8), rtol=0.1)
+    np.testing.assert_allclose(half(error=0.8), 2 * half(error=0.4), rtol=0.02)
+
+
+def test_a_plan_says_what_the_model_missed_of_the_record_it_is_planned_at():
+    """Of a load that the model does not have the estimate misses something, and the plan counts
+    it.
+    """
+    folder = Path(public.__file__).parent / "data"
+    dips = public.read(folder / "contactors_50pct.csv")
+    planned = public.plan(dips, parameter="M")
+    assert re.search(r"a model that misses [\d.]+ % of its response", planned.content["dip"])
+    exact = public.plan(dips, parameter="M", values="default")
+    assert "misses" not in exact.content["dip"]

@@ -19,8 +19,10 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import MODEL, TASK, UserError, check_range, setting
 from tractexp.identification import plan as planning
+from tractexp.identification.adequacy import Grade
 from tractexp.identification.plan import ChosenEvent, DipShape
-from tractexp.identification.result import load
+from tractexp.identification.result import Result, load, play
+from tractexp.inference.model_error import ModelError, in_percent, model_error
 from tractexp.noise import Noise
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
@@ -130,7 +132,9 @@ def plan(
     setup = Setup.of(records, model, bounds=bounds, fixed=fixed, substeps=substeps, domain=domain)
     if rivals:
         return recommend_event(setup, rivals, progress)
+    error = 0.0
     if isinstance(values, Identification):
+        error = _missed_by(values.result)
         values = values.result.on_base_of(setup.train[0].record)
     asked = {
         "parameter": parameter,
@@ -144,6 +148,7 @@ def plan(
         "values": values,
         "least": least,
         "events": events,
+        "error": error,
     }
     planned = _forecast_plan(setup, **asked)
     return Forecasts(setup, asked, files.plain(_content(planned)), planned)
@@ -156,6 +161,7 @@ def _forecast_plan(
     values: Any,
     least: float,
     events: int | None,
+    error: float = 0.0,
     **given: Any,
 ) -> Planned:
     """Everything forecast: how deep, over what, and the best events."""
@@ -170,8 +176,8 @@ def _forecast_plan(
             where = f"{setting(f'task.{name}')}={given[name]:g}"
             raise UserError(f"{where} is of waveforms: add domain=waves, or leave it out")
     deepest = max(problem.events, key=lambda e: e.depth)
-    at, origin, noise = _guess(setup, deepest, values)
-    shape = _shape(deepest, seen=noise, **given)
+    at, origin, noise, missed = _guess(setup, deepest, values)
+    shape = replace(_shape(deepest, seen=noise, **given), error=missed or error)
     shape.check()
     scans = _scans(problem, at, shape)
     needed = planning.depth_needed(scans[DEPTH][1], parameter, within)
@@ -217,8 +223,10 @@ def _shape(
     return shape
 
 
-def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, Noise | None]:
-    """Free values (d,) to plan at, where they are from, and the noise that the fit showed."""
+def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, Noise | None, float]:
+    """Free values (d,) to plan at, where they are from, the noise that the fit showed, and what it
+    missed of the response beyond that.
+    """
     problem = setup.problem_of([event])
     if values == FIT:
         from tractexp.identification.estimate import estimate_without_search
@@ -227,19 +235,33 @@ def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, No
         origin = f"the estimate of {event.record.name}"
         if not fit.surprise.adequate:
             origin += ", though more than noise is left there, which the forecast counts as noise"
-        return fit.uncertainty.values, origin, fit.uncertainty.likelihood.noise.of(0)
+        at, noise = fit.uncertainty.values, fit.uncertainty.likelihood.noise.of(0)
+        missed = 0.0 if fit.surprise.adequate else model_error(play(problem, at)).value
+        return at, origin, noise, missed
     if values == DEFAULT:
         defaults = [p.default for p in problem.parameters if p.name in problem.space.names]
-        return np.array(defaults), "the model's default values", None
+        return np.array(defaults), "the model's default values", None, 0.0
     given = isinstance(values, Mapping)
-    by_parameter = values if given else load(Path(values)).on_base_of(setup.train[0].record)
+    result = None if given else load(Path(values))
+    by_parameter = values if result is None else result.on_base_of(setup.train[0].record)
     if missing := [name for name in problem.space.names if name not in by_parameter]:
         raise UserError(
             f"{TASK.values}={values}: that result has no {', '.join(missing)}; it is of another"
             " model"
         )
     origin = f"the values of {'an identification' if given else values}"
-    return np.array([by_parameter[n] for n in problem.space.names]), origin, None
+    missed = 0.0 if result is None else _missed_by(result)
+    return np.array([by_parameter[n] for n in problem.space.names]), origin, None, missed
+
+
+def _missed_by(result: Result) -> float:
+    """What an identified model misses of a response beyond the noise; 0 where noise alone leaves as
+    much.
+    """
+    told = result.model_error
+    if not told or result.adequacy.get("grade") == Grade.ADEQUATE:
+        return 0.0
+    return ModelError.of(told.get("held_out") or told).value
 
 
 def _scans(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
@@ -274,6 +296,8 @@ def _describe_shape(shape: DipShape) -> str:
         " Hz"
     )
     dip += shape.domain.describe_shape(shape)
+    if shape.error:
+        memory += f", and a model that misses {in_percent(shape.error)} of its response"
     return f"planned: {dip}, noise {first} in {names[0]} and {second} in {names[1]}, of P, {memory}"
 
 

@@ -32,6 +32,7 @@ from tractexp.discrepancy.ranking import (
 from tractexp.inference.chance import by_draws
 from tractexp.inference.context import Context
 from tractexp.inference.model_error import describe_stall, in_percent
+from tractexp.noise import Noise
 from tractexp.record import Event
 from tractexp.wording import alternatives, join_words, list_figures, percent
 
@@ -97,7 +98,19 @@ def choose_next_event(verdict: Verdict, evidence: Evidence, context: Context) ->
     assert evidence.noise is not None
     fits = [row.told for row in verdict.kept]
     labels = [join_words(label_effects(names, context)) for names in verdict.sets]
-    return next_event(context, evidence.noise, evidence.base.fit, fits, labels)
+    error = min(_measure_error(row, evidence.noise, context) for row in verdict.kept)
+    return next_event(context, evidence.noise, evidence.base.fit, fits, labels, error=error)
+
+
+def _measure_error(row: SetEvidence, noise: Noise, context: Context) -> float:
+    """What a set misses beyond the noise of a response: of the held-out events, or of those it was
+    fitted to.
+    """
+    if row.prediction is not None:
+        return row.prediction.error
+    if row.gap is not None:
+        return row.gap.after.error.certain
+    return curves(context, row.told.unit, noise, row.told.names).error.certain
 
 
 def explain(

@@ -16,7 +16,9 @@ from tractexp.errors import TASK, UserError, among, check_range
 from tractexp.inference.information import Information
 from tractexp.inference.interval import interval_factor
 from tractexp.inference.likelihood import Likelihood, before_the_event
+from tractexp.inference.model_error import weigh_error
 from tractexp.inference.problem import Problem
+from tractexp.model.drive import Drive
 from tractexp.noise import Autoregression, Noise
 from tractexp.record import Event
 
@@ -50,6 +52,7 @@ class DipShape:
     domain: Domain = PHASORS
     jump: float = 0.0
     unbalance: float = 0.0
+    error: float = 0.0  # what the model misses of the response, beside the noise
 
     @classmethod
     def of(cls, event: Event, noise: Noise | None = None) -> "DipShape":
@@ -96,6 +99,11 @@ class DipShape:
                 " zero; give it as"
                 f" {where}.noise, a fraction of P before the dip"
             )
+
+    @property
+    def still(self) -> "DipShape":
+        """The same record without the dip."""
+        return replace(self, depth=0.0, jump=0.0, unbalance=0.0)
 
     def event(self) -> Event:
         """The event as if it had been recorded."""
@@ -154,8 +162,24 @@ def forecast(
         )
     planned = like(problem, [shape.event()])
     informations = each(planned, values, noise or shape.noise)
+    if shape.error:
+        more = _weigh_model_error(planned, values, shape)
+        informations = [replace(i, J=i.J / math.sqrt(1 + more)) for i in informations]
     total = add_information([*([earlier] if earlier else []), *informations])
     return Forecast(shape, total.names, total.values, interval_factor() * total.standard_errors)
+
+
+def _weigh_model_error(planned: Problem, values: np.ndarray, shape: DipShape) -> float:
+    """By how many times the noise's variance the model's error adds to it in a planned dip."""
+    model, full = planned.model, planned.full(values)
+    still = Drive.of([planned.domain.excitation(shape.still.event(), model)])
+    dip, rest = (
+        model.simulate(drive, full, planned.step.substeps).outputs[:, 0]
+        for drive in (planned.drive, still)
+    )
+    response = float(np.nanmean((dip - rest) ** 2))
+    variance = (shape.noise_P**2 + shape.noise_Q**2) / 2
+    return weigh_error(shape.error, response, variance, 1 / shape.rate)
 
 
 def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> list[Information]:

@@ -54,6 +54,11 @@ class ModelError:
         low, high = content["interval"]
         return cls(content["value"], (low, high), content["of_S"], content["value"] ** 2)
 
+    @property
+    def certain(self) -> float:
+        """The error where it is more than noise leaves, with its interval; else 0."""
+        return self.value if self.interval[0] > 0 else 0.0
+
     @classmethod
     def of_stall(cls, events: Sequence[str]) -> "ModelError":
         """Of a model whose motor stalls on these events: beyond that of any that does not."""
@@ -61,6 +66,17 @@ class ModelError:
 
     def __str__(self) -> str:
         return f"{in_percent(self.value)} of its response ({in_percent(self.of_S)} of S)"
+
+
+def weigh_error(error: float, response: float, variance: float, step: float) -> float:
+    """By how many times noise's variance [pu²] what a model misses adds to it in what an event
+    tells.
+
+    `error` is the model's, of the response, whose mean square in a channel is `response` [pu²]. It
+    hangs together within a block, as long as `LENGTH`: what a block's samples add up to of it
+    counts so many times, and it does not grow less where the same event is recorded again.
+    """
+    return error**2 * response / max(variance, 1e-30) * max(LENGTH / step, 1.0)
 
 
 def describe_stall(events: Sequence[str]) -> str:

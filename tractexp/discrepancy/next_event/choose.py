@@ -22,6 +22,7 @@ from tractexp.discrepancy.next_event.separation import (
 )
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.model_error import in_percent
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.records import Records
 from tractexp.model.drive import Drive
@@ -63,6 +64,7 @@ class NextEvent:
     criteria: Criteria
     same: tuple[tuple[int, int, Same], ...] = field(default=())
     hopeless: tuple[tuple[int, int, float], ...] = field(default=())
+    error: float = 0.0  # what the rivals miss of the response, counted in all chances
 
     @property
     def probability(self) -> float:
@@ -91,6 +93,7 @@ class NextEvent:
         return {
             "sentence": self.sentence(),
             "rivals": list(self.rivals),
+            "model_error": self.error,
             "recommended": self._row(self.best),
             "indistinguishable": [
                 {
@@ -127,12 +130,13 @@ class NextEvent:
             f"{first} from {others[0]}" if len(others) == 1 else f"these {len(self.rivals)} apart"
         )
         what, p = self.best.event.words, self.probability
+        missed = f", where they miss {in_percent(self.error)} of a response" if self.error else ""
         if p >= DECIDED:
-            return f"record {what}: it tells {them} with a probability of {p:.0%}"
+            return f"record {what}: it tells {them} with a probability of {p:.0%}{missed}"
         sure = f"no event that was tried is sure to tell {them}"
         return (
             f"{sure}; the surest, {what}, does so with a probability of"
-            f" {p:.0%}{_describe_joint_events(self.best)}"
+            f" {p:.0%}{missed}{_describe_joint_events(self.best)}"
         )
 
 
@@ -148,10 +152,12 @@ def next_event(
     rivals: Sequence[Refit],
     labels: Sequence[str],
     seed: int = 0,
+    error: float = 0.0,
 ) -> NextEvent:
     """Choose what to record to tell two rivals or more apart.
 
-    `bare` is the base model's fit, `noise` that under which all were fitted.
+    `bare` is the base model's fit, `noise` that under which all were fitted, `error` what the best
+    of the rivals misses of a response beyond the noise: it will miss as much of the next.
     """
     context.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
     sides = [linearize_side(context, noise, fit) for fit in (bare, *rivals)]
@@ -167,7 +173,9 @@ def next_event(
     # sampled alike
     for group in (list(alike) for _, alike in itertools.groupby(by_rate, key=lambda e: e.rate)):
         for event, views in zip(
-            group, zip(*(seen(context, noise, s, group) for s in sides), strict=True), strict=True
+            group,
+            zip(*(seen(context, noise, s, group, error) for s in sides), strict=True),
+            strict=True,
         ):
             events.append(event)
             denied.append(np.stack([separation.denied(views, truth) for truth in truths]))
@@ -182,11 +190,11 @@ def next_event(
         for a, b, _ in open_pairs:
             ignored[a, b] = ignored[b, a] = True
     tried = [EventTrial(e, Chances.of(d, ignored)) for e, d in zip(events, denied, strict=True)]
-    best = _choose_mildest_event(context, noise, sides, tried, ignored, seed)
+    best = _choose_mildest_event(context, noise, sides, tried, ignored, seed, error)
     pairs = [(a, b, same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
     hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, pairs, strict=True) if s is None)
-    return NextEvent(tuple(labels), best, tuple(tried), context.criteria, proved, hopeless)
+    return NextEvent(tuple(labels), best, tuple(tried), context.criteria, proved, hopeless, error)
 
 
 def mildest(tried: Sequence[EventTrial], decided: float) -> EventTrial:
@@ -206,6 +214,7 @@ def _choose_mildest_event(
     tried: Sequence[EventTrial],
     ignored: np.ndarray,
     seed: int,
+    error: float,
 ) -> EventTrial:
     """The mildest event that is sure enough after refits, too."""
     left, checked = list(tried), []
@@ -216,7 +225,7 @@ def _choose_mildest_event(
             break
         left.remove(best)
         checked.append(
-            _compute_refitted_chances(context, noise, sides, best, ignored, seed)
+            _compute_refitted_chances(context, noise, sides, best, ignored, seed, error)
             if chance >= WORTH
             else best
         )
@@ -232,6 +241,7 @@ def _compute_refitted_chances(
     best: EventTrial,
     ignored: np.ndarray,
     seed: int,
+    error: float,
 ) -> EventTrial:
     """The chances of one event with rivals linearised where they fit it best, each in turn the
     truth.
@@ -248,7 +258,7 @@ def _compute_refitted_chances(
             side if k == a or not moved else linearize_side(context, noise, moved[k])
             for k, side in enumerate(sides)
         ]
-        views = [seen(context, noise, side, [event])[0] for side in there]
+        views = [seen(context, noise, side, [event], error)[0] for side in there]
         places.append((Separation(there, context.criteria, seed=seed), views))
 
     def again(times: int) -> EventTrial:

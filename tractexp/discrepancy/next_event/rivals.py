@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.gap import curves
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.domain import domain_of
 from tractexp.errors import TASK, UserError
@@ -68,9 +69,9 @@ def event_for(
         bare, *fits = sorted(
             refit(context, noise, [((), base.fit.unit), *begin]), key=lambda fit: bool(fit.names)
         )
-        return next_event(
-            context, noise, bare, fits, [join_words(list(fit.names)) for fit in fits], seed
-        )
+        labels = [join_words(list(fit.names)) for fit in fits]
+        error = min(curves(context, f.unit, noise, f.names).error.certain for f in fits)
+        return next_event(context, noise, bare, fits, labels, seed, error)
 
 
 def _check(missing: Catalogue, named: Sequence[str]) -> None:

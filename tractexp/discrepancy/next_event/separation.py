@@ -19,6 +19,7 @@ from tractexp.inference.context import Context
 from tractexp.inference.differences import slopes, two_sided
 from tractexp.inference.fitting import Refit
 from tractexp.inference.linearization import find_active_bounds
+from tractexp.inference.model_error import weigh_error
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 
@@ -61,6 +62,8 @@ class EventView:
 
     f: np.ndarray
     K: np.ndarray
+    # by how many times the noise's variance the model's error adds to it
+    missed: float = 0.0
 
     @property
     def survives(self) -> bool:
@@ -105,10 +108,10 @@ def linearize_side(context: Context, noise: Noise, fit: Refit) -> Side:
 
 
 def seen(
-    context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDip]
+    context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDip], error: float = 0.0
 ) -> list[EventView]:
     """What an explanation predicts of events that are sampled alike, with the faults of the
-    measurement at their null.
+    measurement at their null. It misses `error` of the response.
 
     What the recorder did to earlier events says nothing of the load, but it may go on.
     """
@@ -130,6 +133,13 @@ def seen(
         for sign in (1, -1)
     ]
     one, k = Drive.of(drives[:1]), len(inside)
+    missed = [0.0] * len(events)
+    if error:
+        still = replace(events[0], depth=0.0, jump=0.0, unbalance=0.0)
+        (rest,) = _simulate_drives(context, names, middle[None], [driven(context, still)])[0]
+        variance, step = float(np.mean(np.square(noise.levels))), drives[0].step
+        responses = [float(np.mean((rows[0] - rest) ** 2)) for rows in moved]
+        missed = [weigh_error(error, response, variance, step) for response in responses]
     white = noise_of(noise, one, events[0].rate, context.events[0].record.step)
     chances = []
     for e in range(len(events)):
@@ -138,7 +148,7 @@ def seen(
         K = np.zeros((len(side.columns) + 2, rows.shape[1]))
         K[:k] = slopes(rows[1 : 1 + 2 * k], width) * side.free[:k, None]
         K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * POWER_DIFFERENCE)
-        chances.append(EventView(rows[0], K))
+        chances.append(EventView(rows[0], K, missed[e]))
     return chances
 
 
@@ -173,11 +183,13 @@ class Separation:
         """Which rivals (a, b) each of b draws denies by one new event, or `times` its like, with
         `truth` the truth.
 
-        None is denied where a side does not survive, the truth itself always where all do.
+        None is denied where a side does not survive, the truth itself always where all do. What the
+        models miss is missed again in each of its like: more of them tell more of the noise alone.
         """
         if not all(x.survives for x in seen):
             return np.zeros((len(self.sides) - 1, self.draws), bool)
-        rows = _reduce_blocks([np.sqrt(times) * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
+        weight = np.sqrt(times / (1 + times * max(x.missed for x in seen)))
+        rows = _reduce_blocks([weight * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
         f, K = [x[0] for x in rows], [x[1:] for x in rows]
         rng = np.random.default_rng([self.seed, truth])
         side = self.sides[truth]
