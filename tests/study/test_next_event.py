@@ -316,4 +316,3 @@ def test_what_rivals_miss_is_missed_in_each_of_its_like(alike):
     assert chance(0.0, 20) > DECIDED
     assert chance(1.0, 20) < LEAST_CHANCE
     assert chance(1.0, 2000) == chance(1.0, 20)
-    assert chance(0.0, 1) > chance(1.0, 1)
