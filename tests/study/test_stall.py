@@ -13,6 +13,7 @@ from tractexp.domain import domain_of
 from tractexp.inference.model_error import ModelError, model_error
 from tractexp.model.drive import Drive
 from tractexp.model.model import LARGEST_OUTPUT
+from tractexp.report.discrepancy import gap
 
 HEAVY = {
     "T_prime": 0.1,
@@ -68,13 +69,28 @@ def test_a_motor_that_stalls_has_words_and_no_number(stalled):
 
 
 def test_console_page_and_json_tell_it(stalled, tmp_path):
-    console, page = str(stalled.summary()), stalled.report()
-    stalled.save(tmp_path / "found")
-    written = (tmp_path / "found" / "discrepancy.json").read_text(encoding="utf-8")
-    for text in (console, str(page), json.dumps(stalled.content), written):
+    console, page = str(stalled.summary()), stalled.report().html
+    stalled.write_results(tmp_path)
+    written = (tmp_path / "discrepancy.json").read_text(encoding="utf-8")
+    for text in (console, page, json.dumps(stalled.content), written):
         assert "the motor stalls" in text
     held_out = next(row for row in stalled.table().rows if row[0] == "held out")
     assert held_out[2] == "the motor stalls"
+
+
+def test_a_table_of_waveforms_keeps_its_columns_where_currents_have_no_number():
+    error = {"value": 0.1, "interval": [0.05, 0.15]}
+    known = {"epsilon_p": 0.1, "epsilon_q": 0.1, "epsilon_i": 0.1, "chi2_per_sample": 1.0}
+    none = dict.fromkeys(known)
+    fitted = {"model_error": error, **known}
+    held_out = {"model_error": {"value": None, "interval": [None] * 2, "stalls": ["b"]}, **none}
+    gaps = {
+        role: {"before": misfit, "after": misfit, "closed": None}
+        for role, misfit in (("train", fitted), ("validate", held_out))
+    }
+    table = gap({"effects": [], "gap": gaps})
+    assert [len(row) for row in table.rows] == [len(table.columns)] * 2
+    assert table.rows[1][2] == "the motor stalls"
 
 
 def test_sets_that_stall_are_behind_all_that_survive(stalled):

@@ -81,6 +81,7 @@ def summary(findings: "Outcome") -> Report:
 def gap(content: Mapping[str, Any]) -> Table:
     """How far off the base model is, and the extended one where an effect was named."""
     gaps, named, rows = content["gap"], bool(content["effects"]), []
+    waves = "epsilon_i" in gaps["train"]["before"]
     for role, label in ROLES.items():
         for model, stage in (("base model", "before"), ("extended model", "after"))[: 1 + named]:
             if (one := gaps[role]) is not None:
@@ -91,11 +92,10 @@ def gap(content: Mapping[str, Any]) -> Table:
                         label,
                         model,
                         error,
-                        *_off(one[stage]),
+                        *_off(one[stage], waves=waves),
                         "" if closed is None else f"{closed:.0%}",
                     ]
                 )
-    waves = "epsilon_i" in gaps["train"]["before"]
     columns = [
         "events",
         "model",
@@ -210,7 +210,12 @@ def _with_nearest(near: Nearest) -> list[list[str]]:
     pairs = (("fitted", near.curves), ("held out", near.carried))
     stages = ("base model", "nearest candidates")
     return [
-        [label, stage, _error(c.error.to_dict()), *_off(vars(c))]
+        [
+            label,
+            stage,
+            _error(c.error.to_dict()),
+            *_off(vars(c), waves=near.curves[0].epsilon_i is not None),
+        ]
         for label, both in pairs
         if both
         for stage, c in zip(stages, both, strict=True)
@@ -225,13 +230,12 @@ def _error(entry: Mapping[str, Any]) -> str:
     )
 
 
-def _off(misfit: Mapping[str, Any]) -> list[str]:
-    """How far off curves are, as a table has it."""
-    shown = ["epsilon_p", "epsilon_q"]
-    if misfit.get("epsilon_i") is not None:
-        shown.append("epsilon_i")
+def _off(misfit: Mapping[str, Any], *, waves: bool) -> list[str]:
+    """How far off curves are, as a table has it; of `waves` the currents, too."""
+    shown = ["epsilon_p", "epsilon_q", *(["epsilon_i"] if waves else [])]
     chi2 = misfit["chi2_per_sample"]
-    return [*(epsilon(misfit[name]) for name in shown), "" if chi2 is None else f"{chi2:.3f}"]
+    told = "" if chi2 is None or not np.isfinite(chi2) else f"{chi2:.3f}"
+    return [*(epsilon(misfit[name]) for name in shown), told]
 
 
 def _add_remainder_section(page: Report, findings: Findings) -> None:
