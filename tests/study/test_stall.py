@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.decide import beats, find_nearest, rank_sets
+from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.domain import domain_of
+from tractexp.inference.fitting import Refit
 from tractexp.inference.model_error import ModelError, model_error
 from tractexp.model.drive import Drive
 from tractexp.model.model import LARGEST_OUTPUT
@@ -149,3 +153,23 @@ def test_a_load_that_has_stopped_itself_does_not_stall_in_a_model_that_does_as_i
     told = tractexp.read(t=record.t, U=record.U, P=stopped, Q=0.1 * stopped, name="stopped")[0]
     assert not domain.comparison(told, np.stack([stopped, 0.1 * stopped])).stalls
     assert not domain.comparison(event, np.stack([record.P, record.Q])).stalls
+
+
+def test_however_much_a_set_that_survives_leaves_it_is_ahead_of_one_that_stalls():
+    """A set that stalls leaves all: no fit brings it before one that does not."""
+    blocks = np.ones(10)
+
+    def row(names, squares, deviance, stalls=()):
+        prediction = PredictedError(squares, 0.01 * blocks, blocks, np.zeros(1), stalls)
+        fit = Refit(names, np.zeros(1), deviance, len(names))
+        return SetEvidence(fit, names, names, prediction=prediction)
+
+    stalling = row(("a",), np.inf * blocks, 1.0, ("dip3",))
+    surviving = row(("b",), 1e6 * blocks, 1e6)
+    base = row((), np.inf * blocks, 1e9, ("dip3",))
+    table, criteria = Evidence(base, (stalling, surviving)), Criteria()
+    assert rank_sets(table, criteria) == [surviving, stalling]
+    assert find_nearest(table, criteria) is surviving
+    assert beats(surviving, stalling, criteria)
+    assert beats(surviving, base, criteria)
+    assert not beats(stalling, base, criteria)
