@@ -13,7 +13,7 @@ from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import tell_error
 from tractexp.report.extended import interval
 from tractexp.wording import as_sentence, in_words, join_words, percent, with_error
 
@@ -93,7 +93,7 @@ def _numbers(page: Report, proposal: Proposal) -> None:
 
 def _add_explanation(page: Report, proposal: Proposal) -> None:
     rows = [
-        [role, *map(in_percent, (g.before.error.value, g.after.error.value)), percent(g.explained)]
+        [role, *(tell_error(vars(c.error)) for c in (g.before, g.after)), percent(g.explained)]
         for role, g in (("fitted", proposal.train), ("held out", proposal.validate))
     ]
     page.table(
