@@ -114,7 +114,7 @@ def test_an_investigation_without_priors_or_motor_has_no_such_rows():
     assert context.prior == 0.0
 
 
-def test_the_base_model_of_an_investigation_is_that_of_an_identification_with_priors():
+def test_the_base_model_of_an_investigation_is_that_of_an_identification_with_priors(no_proposal):
     dips, model = contactors(fixed={"C": 0.9}, bounds={"T_m": (0.1, 0.8)})
     alone = tractexp.identify(dips[:2], model, **QUICK)
     found = tractexp.investigate(
