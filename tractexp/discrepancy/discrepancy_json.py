@@ -312,9 +312,11 @@ def sets(investigation: Findings) -> list[dict[str, Any]]:
             "parameters": values,
         }
         predicted = set_evidence.prediction
-        error = {} if predicted is None else {"model_error": predicted.error}
-        if predicted is not None and predicted.stalls:
-            error["stalls"] = predicted.stalls
+        error: dict[str, Any] = {}
+        if predicted is not None:
+            error["model_error"] = predicted.error
+            if predicted.stalls:
+                error["stalls"] = predicted.stalls
         rows.append(row | files.plain(error | {"evidence": _evidence(set_evidence)}))
     return rows
 
