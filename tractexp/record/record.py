@@ -199,14 +199,14 @@ class Record:
         P and Q are not invented: of these samples they are in no sum.
         """
         drives = {name: x for name, x in self.channels.items() if name in ("U", "f", "U2")}
-        at = find_single_gaps(np.isnan([*drives.values()]).any(axis=0))
+        at = find_single_gaps(np.any(np.isnan(np.stack([*drives.values()])), axis=0))
         if not len(at):
             return self
         lacking = {name: x for name, x in drives.items() if np.isnan(x[at]).any()}
         channels = {name: bridge_values(x, at) for name, x in lacking.items()}
         gaps = np.isin(np.arange(self.samples), at)
         channels |= {name: np.where(gaps, np.nan, self.channels[name]) for name in "PQ"}
-        note = f"{describe_bridged(self.t[at])}: bridged, and in no sum of P and Q"
+        note = f"{describe_bridged(self.t[at].tolist())}: bridged, and in no sum of P and Q"
         return replace(self, **channels, notes=(*self.notes, note))
 
     def _even_out(self, place: Callable[[int], str]) -> "Record":

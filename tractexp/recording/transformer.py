@@ -88,7 +88,7 @@ def _find_same_currents(
         for a, b in zip(*np.nonzero(rest < LARGEST_REST[True]), strict=True):
             high, low = int(bus[a]), int(bus[b])
             small, large = (_size(phasors, feeders[k]) for k in (high, low))
-            steps = round(turned[a, b] / 30)
+            steps = round(float(turned[a, b]) / 30)
             named = _find_sides(recording, feeders[high], feeders[low]) is not None
             alike = rest[a, b] < LARGEST_REST[named]
             alike &= abs(turned[a, b] - 30 * steps) < LARGEST_TURN[named]
