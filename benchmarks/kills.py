@@ -140,7 +140,7 @@ def perform(every: int) -> dict[str, Counter[str]]:
 
 
 if __name__ == "__main__":
-    asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    asked = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     asked.add_argument("--every", type=int, default=1)
     counts = perform(asked.parse_args().every)
     files.write_json(Path(__file__).with_suffix(".json"), counts)

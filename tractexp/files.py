@@ -249,12 +249,11 @@ def _yaml_loader() -> Any:
     """YAML's safe loader, for which 1e-3 is a number, as for people."""
     import yaml
 
-    class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
-        pass
-
+    base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    loader: Any = type("Loader", (base,), {})
     number = re.compile(r"[-+]?\d[\d_]*[eE][-+]?\d+$")
-    Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+0123456789"))
-    return Loader
+    loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+0123456789"))
+    return loader
 
 
 def _count_nodes(text: str, path: Path | str) -> None:
