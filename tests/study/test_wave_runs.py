@@ -6,6 +6,7 @@ import base64
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ import tractexp
 from tractexp.domain import WAVES, domain_of
 from tractexp.domain.playback import as_phasors, measure_unsteadiness
 from tractexp.errors import UserError
-from tractexp.identification.advice import better_domain
+from tractexp.identification.adequacy import Grade
+from tractexp.identification.advice import advise, better_domain
 from tractexp.identification.plan import DipShape, forecast
 from tractexp.inference.problem import Problem
 from tractexp.plugin import get
@@ -303,3 +305,17 @@ def test_a_short_or_unbalanced_dip_with_samples_is_better_fitted_in_waveforms(di
     assert "is unbalanced, U2 20% of U" in said(replace(dip, record=unbalanced))[0]
     slow = replace(dip.record, waves=replace(dip.record.waves, rate=600.0))
     assert said(replace(short, record=slow)) == []
+
+
+@pytest.mark.parametrize(
+    ("share", "first"), [(1.0, "find what is missing: "), (0.06, "fit the sampled waveforms")]
+)
+def test_what_is_missing_is_looked_for_where_waveforms_tell_more(dip, share, first):
+    """One way on, not two: a model of smeared phasors is not extended before the waveforms are
+    fitted.
+    """
+    event = replace(dip, end=dip.start + round(share * dip.rate)) if share < 1 else dip
+    problem = Problem(tractexp.compose().model, [event])
+    known = SimpleNamespace(likelihood=SimpleNamespace(problem=problem))
+    (said,) = advise(known, SimpleNamespace(grade=Grade.WRONG_MODEL))
+    assert said.startswith(first)
