@@ -38,7 +38,7 @@ def test_a_table_that_lacks_a_row_before_the_dip_and_one_in_it_gives_the_true_pa
 
 @pytest.mark.parametrize("domain", ["phasors", "waves"])
 def test_waveforms_that_lack_samples_give_the_parameters_of_the_whole(tmp_path, domain):
-    whole = made_recordings.recording(made_recordings.motor_dip(0.3, noise=2e-4))
+    whole = made_recordings.recording(made_recordings.motor_dip(0.3, noise=2e-4, length=1.2))
     lacking = [dataclasses.replace(c, raw=c.raw.copy(), missing=-32768) for c in whole.channels]
     for channel, sample in ((0, 500), (3, 1850), (4, 1850)):
         lacking[channel].raw[sample] = -32768

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tractexp.wording import count_noun
+
 # of all samples: where more are missing, they were not lost but recorded in another way
 MOST_BRIDGED_SHARE = 0.05
 # usual steps: a step within them leaves one row out
@@ -74,4 +76,4 @@ def describe_bridged(times: Sequence[float]) -> str:
     """How many samples were bridged, and when, as the beginning of a sentence."""
     when = ", ".join(f"{t:.6g}" for t in times[:NAMED_TIMES])
     more = f" and {len(times) - NAMED_TIMES} more" if len(times) > NAMED_TIMES else ""
-    return f"{len(times)} single sample{'s' * (len(times) > 1)} missing at t = {when} s{more}"
+    return f"{count_noun(len(times), 'single sample')} missing at t = {when} s{more}"

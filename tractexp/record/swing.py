@@ -18,7 +18,7 @@ FEWEST_PERIODS = 6.0
 FASTEST_SHARE = 0.45
 CHANCE = 1e-6  # that a line of noise stands out as much
 FINER = 8  # lines of the spectrum for each that the samples tell apart
-BESIDE = 2.5  # such lines on either side that a swing itself reaches
+WIDTH_OF_LINE = 2.5  # such lines on either side that a swing itself reaches
 NEAR = 2.0  # times the frequency, and over it: the noise there is what the line is compared with
 LEAST_PASSED = 0.3  # of an oscillation that a recorder's window leaves: of less no size is told
 
@@ -66,12 +66,12 @@ def _find_line(x: np.ndarray, rate: float, fastest: float) -> tuple[float, float
     slowest = FEWEST_PERIODS * rate / n
     f = np.fft.rfftfreq(FINER * n, 1 / rate)
     inside = (f >= slowest) & (f <= fastest)
-    if np.count_nonzero(inside) < 2 * BESIDE * FINER:
+    if np.count_nonzero(inside) < 2 * WIDTH_OF_LINE * FINER:
         return None
     window = np.hanning(n)
     power = np.abs(np.fft.rfft(_level(x) * window, FINER * n)) ** 2
     best = int(np.argmax(np.where(inside, power, 0.0)))
-    low, high = f[best] - BESIDE * rate / n, f[best] + BESIDE * rate / n
+    low, high = f[best] - WIDTH_OF_LINE * rate / n, f[best] + WIDTH_OF_LINE * rate / n
     sides = ((f > f[best] / NEAR) & (f < low)), ((f > high) & (f < NEAR * f[best]))
     around = power[best - 1 : best + 2]
     if not all(side.any() for side in sides) or around.max() > power[best]:

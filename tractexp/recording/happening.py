@@ -445,7 +445,8 @@ def name_fallen_phases(phases: Sequence[float]) -> str:
     if len(fallen) == 3:
         return ""
     names = " and ".join("abc"[k] for k in fallen)
-    return f"phase{'s' * (len(fallen) > 1)} {names} to {100 * (1 - falls.max()):.3g} %"
+    word = "phases" if len(fallen) > 1 else "phase"
+    return f"{word} {names} to {100 * (1 - falls.max()):.3g} %"
 
 
 def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:

@@ -144,8 +144,8 @@ def _label(event: Entry) -> str:
 
 def _event(event: Entry) -> str:
     fallen = name_fallen_phases(event.get("phases") or ())
-    size = [f"{event['depth']:.1%}", f"{1000 * event['duration']:.0f} ms", *[fallen] * bool(fallen)]
-    return f"{_label(event)} at {starts(event, ' s')} ({', '.join(size)})"
+    size = [f"{event['depth']:.1%}", f"{1000 * event['duration']:.0f} ms", fallen]
+    return f"{_label(event)} at {starts(event, ' s')} ({', '.join(filter(None, size))})"
 
 
 def _reservation(why: str) -> str:
