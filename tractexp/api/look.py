@@ -396,7 +396,8 @@ def _content(view: View) -> dict[str, Any]:
             "channels": [_channel(view, number) for number in range(len(recording.channels))],
         }
         direct = bool(lacks and direct_voltage(recording))
-        content |= {"lacks": lacks, "can_be_named": can_be_named(recording), "direct": direct}
+        named = not lacks or can_be_named(recording)
+        content |= {"lacks": lacks, "can_be_named": named, "direct": direct}
     content["measured_frequency"] = view.frequency
     return content | {"feeders": [_feeder(view, shown) for shown in view.sights]}
 
