@@ -115,7 +115,7 @@ def _list_offered() -> dict[str, set[str]]:
             yield group, {name for name, cls in classes.items() if cls.chosen}
 
     kept = json.loads(TEXTS.get(key(environment(), "plugins that Hydra offers"), ask))
-    here = dict(offered(plugin.registered()))
+    here = dict(offered(plugin.list_registered()))
     return {group: {*kept.get(group, ()), *here.get(group, ())} for group in {*kept, *here}}
 
 

@@ -175,7 +175,7 @@ def discover() -> Mapping[str, Mapping[str, type[Plugin]]]:
     return _registry
 
 
-def registered() -> Mapping[str, Mapping[str, type[Plugin]]]:
+def list_registered() -> Mapping[str, Mapping[str, type[Plugin]]]:
     """{group: {name: class}} of what was imported so far."""
     return _registry
 

@@ -120,7 +120,8 @@ def list_settings_of_all() -> list[str]:
     if not validate:
         return []
     dips = [quoting.hydra(dip) if isinstance(dip, str) else str(dip) for dip in (*train, *validate)]
-    return [*[f"data.train=[{','.join(dips)}]"] * bool(train), "data.validate=[]"]
+    fitted = [f"data.train=[{','.join(dips)}]"] if train else []
+    return [*fitted, "data.validate=[]"]
 
 
 def build_again_command(*settings: str, of: Collection[str] = OF_LOAD) -> str:

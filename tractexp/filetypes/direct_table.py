@@ -25,9 +25,9 @@ NAMED = re.compile(
 )
 RIPPLES = (300.0, 600.0, 360.0, 720.0)  # Hz: of six and twelve pulses at 50 and 60 Hz
 LEAST_RIPPLE, RIPPLE_SHARE = 1e-3, 0.5  # of the mean; of all that is faster than 100 Hz
-FASTER = 100.0  # Hz
+LEAST_RIPPLE_FREQUENCY = 100.0  # Hz
 NO_Q = 1e-6  # of P: so much Q is none
-VOLTS = 100.0  # a voltage without a unit that is above it is in V
+LARGEST_DIRECT_KILOVOLTS = 100.0  # a voltage without a unit that is above it is in V
 
 
 def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
@@ -54,7 +54,7 @@ def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
         t, x = times_of(table, mapping, cells).t, cells[number].values * factor(unit)
     except UserError:
         return ""
-    if not unit and np.nanmedian(x) > VOLTS:
+    if not unit and np.nanmedian(x) > LARGEST_DIRECT_KILOVOLTS:
         x = x / 1000
     rate = (len(t) - 1) / float(t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else 0.0
     direct = DirectVoltage.of(x, rate) if rate else None
@@ -92,8 +92,11 @@ def check_alternating(
         return []
     without = np.nanmax(np.abs(Q), initial=0.0) <= NO_Q * np.nanmax(np.abs(P), initial=0.0)
     pulses = _find_pulses(U, rate)
-    reasons = [f"a ripple of {pulses:g} Hz"] * bool(pulses) + ["Q is zero"] * bool(without)
-    reasons += ["its name"] * bool(NAMED.search(name))
+    reasons = [f"a ripple of {pulses:g} Hz"] if pulses else []
+    if without:
+        reasons.append("Q is zero")
+    if NAMED.search(name):
+        reasons.append("its name")
     if reasons:
         raise UserError(
             f"{source}: {direct.describe(name, float(t[0]))}; told by {' and '.join(reasons)};"
@@ -112,7 +115,7 @@ def _find_pulses(U: np.ndarray, rate: float) -> float:
         return 0.0
     lines = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2
     f = np.fft.rfftfreq(len(x), 1 / rate)
-    fast = f > FASTER
+    fast = f > LEAST_RIPPLE_FREQUENCY
     # mean square of a Hann window is 3/8
     size = np.sqrt(2 * lines[fast].sum() / (3 / 8)) / len(x)
     near: Sequence[float] = [lines[np.abs(f - one) < 0.02 * one].sum() for one in RIPPLES]

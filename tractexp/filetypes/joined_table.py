@@ -29,7 +29,7 @@ class JoinedTable(TableFile):
         self.parts, self.source = parts, parts[0].source
         read = [_times(part) for part in parts]
         self.aligned = align(
-            [_sampled(part, times) for part, (times, _) in zip(parts, read, strict=True)]
+            [_describe_samples(part, times) for part, (times, _) in zip(parts, read, strict=True)]
         )
         first, count = self.aligned.first[0], self.aligned.count
         times = read[0][0]
@@ -94,7 +94,7 @@ def _times(part: TableFile) -> tuple[TableTimes, set[int]]:
     return times_of(part, mapping, part.read(kinds)), numbers | set(mapping.beside)
 
 
-def _sampled(part: TableFile, times: TableTimes) -> SampledFile:
+def _describe_samples(part: TableFile, times: TableTimes) -> SampledFile:
     if len(times.t) < 3:
         raise UserError(f"{part.source}: only {len(times.t)} rows; a part of an event needs more")
     steps = np.diff(times.t)

@@ -29,7 +29,7 @@ from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
 
 # the positive sequence of line voltages over that of phase voltages
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)
-VOLTS = 1000.0  # a voltage without a unit that is above it is in V
+LARGEST_KILOVOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
 LEAST_LIVE_VOLTAGE = 0.5  # of the median voltage: at less the frequency is noise
 SLOWEST = 10.0  # Hz: no network's frequency is lower
@@ -375,7 +375,7 @@ def _in_units(
     }
     stated = {_absolute(mapping, key) for key in sizes}
     level = float(np.nanmedian(np.abs(values[next(key for key in sizes if key[0] == "U")])))
-    if stated == {None} and level > VOLTS:
+    if stated == {None} and level > LARGEST_KILOVOLTS:
         return {**values, **{key: values[key] * 1e-3 for key in sizes}}, True
     if stated == {None} and NEAR_ONE[0] < level < NEAR_ONE[1]:
         return {**values}, False

@@ -21,7 +21,7 @@ from tractexp.recording.record_files import find_packed
 from tractexp.wording import join_words
 
 MOST_FILES = 24  # of one event
-LARGEST_RATE_DIFFERENCE = 1e-3  # of rates that are the same by another clock
+LARGEST_CLOCK_DIFFERENCE = 1e-3  # of rates that are the same by another clock
 FEWEST_COMMON = 10  # samples that all files have
 SAME_INSTANT = 0.01  # of a step, within which two samples are of one instant
 PART = re.compile(r"[^\W_]+")
@@ -136,7 +136,7 @@ def align(sampled: Sequence[SampledFile]) -> Alignment:
     one, *others = sampled
     for other in others:
         drift = abs(other.rate / one.rate - 1)
-        if drift > LARGEST_RATE_DIFFERENCE or drift * min(one.count, other.count) > 1:
+        if drift > LARGEST_CLOCK_DIFFERENCE or drift * min(one.count, other.count) > 1:
             raise UserError(
                 f"{one.source} has {one.rate:g} samples a second and {other.source}"
                 f" {other.rate:g}: files of one event are joined at one rate; resample one of"

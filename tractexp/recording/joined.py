@@ -29,7 +29,7 @@ def join_recordings(recordings: Sequence[Recording]) -> Recording:
     if not others:
         return first
     aligned = _align(recordings)
-    cut = [_cut(each, aligned, k) for k, each in enumerate(recordings)]
+    cut = [_cut_common(each, aligned, k) for k, each in enumerate(recordings)]
     channels, said = _name_channels(cut)
     notes = [
         note if note in first.notes else f"{Path(each.source).name}: {note}"
@@ -50,7 +50,7 @@ def _align(recordings: Sequence[Recording]) -> Alignment:
     """Where recordings have the same instants: those of several segments where all are alike."""
     first = recordings[0]
     if all(len(each.segments) == 1 for each in recordings):
-        return align([_sampled(each) for each in recordings])
+        return align([_describe_samples(each) for each in recordings])
     for each in recordings:
         if [*map(_shape, each.segments)] != [*map(_shape, first.segments)]:
             raise UserError(
@@ -74,14 +74,14 @@ def _shape(segment: Segment) -> tuple[float, ...]:
     return segment.first, segment.stop, round(segment.rate, 3), round(segment.start, 6)
 
 
-def _sampled(recording: Recording) -> SampledFile:
+def _describe_samples(recording: Recording) -> SampledFile:
     (segment,) = recording.segments
     begun = recording.start and recording.start + timedelta(seconds=segment.start)
     count = segment.stop - segment.first
     return SampledFile(recording.source, segment.rate, count, segment.start, begun)
 
 
-def _cut(recording: Recording, aligned: Alignment, k: int) -> Recording:
+def _cut_common(recording: Recording, aligned: Alignment, k: int) -> Recording:
     """File k at the instants that all files have."""
     if len(recording.segments) > 1:
         return recording

@@ -23,7 +23,7 @@ from tractexp.sweep.surroundings import surround_job
 from tractexp.tracking.sweepfile import folder_of, parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
-MOST_RECORDS = 4  # choices of data that a worker keeps: the jobs of a sweep share one
+MOST_KEPT_RECORDS = 4  # choices of data that a worker keeps: the jobs of a sweep share one
 
 
 @dataclass(frozen=True)
@@ -246,7 +246,7 @@ def read_shared_events(data: Mapping[str, Any], inputs: str) -> Any:
     return _read_once(json.dumps(data, sort_keys=True, default=str), inputs)
 
 
-@functools.lru_cache(MOST_RECORDS)
+@functools.lru_cache(MOST_KEPT_RECORDS)
 def _read_once(data: str, inputs: str) -> Any:
     return read_events(json.loads(data))
 

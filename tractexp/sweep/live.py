@@ -171,8 +171,8 @@ def _add_standings(page: Report, standings: Sequence[Standing]) -> None:
     ]
     columns = ["variant", "jobs", "best objective [pu²]", "median [pu²]"]
     page.table(columns, rows, "At the end of the search, before the estimate is polished.")
-    more = len(standings) - len(rows)
-    page.text(*[f"and {more} more variants"] * (more > 0))
+    if (more := len(standings) - len(rows)) > 0:
+        page.text(f"and {more} more variants")
 
 
 def _draw_curves(curves: Sequence[tuple[str, Curve]]) -> Chart:
@@ -186,8 +186,9 @@ def _draw_curves(curves: Sequence[tuple[str, Curve]]) -> Chart:
 
 
 def _shorten(texts: Sequence[str], most: int) -> list[str]:
-    more = len(texts) - most
-    return [*texts[:most], *[f"and {more} more"] * (more > 0)]
+    if (more := len(texts) - most) > 0:
+        return [*texts[:most], f"and {more} more"]
+    return list(texts)
 
 
 def _read_end(folder: Path) -> Status | None:

@@ -21,7 +21,7 @@ SWITCHED, LASTING = (0.04, 0.06, 0.1), 1.0  # of the voltage; s until the bank o
 JUMPS = (-20.0, 20.0)  # degrees, of dips; a bank that is switched turns the voltage by a few
 TURNED_BY_BANK = 3.0  # degrees
 UNBALANCED_SHARE = 0.5  # of the depth: negative sequence in an unbalanced dip
-FASTER = 4  # times the record's rate
+RATE_FACTOR = 4  # times the record's rate
 HIGHEST_PHASOR_RATE = 5000.0  # Hz, of phasors
 
 
@@ -112,8 +112,8 @@ def imagine_dips(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDi
             ImaginedDip(*pair, unbalance=UNBALANCED_SHARE)
             for pair in itertools.product(DEPTHS[::2], durations[::2])
         ]
-    if FASTER / context.events[0].record.step <= HIGHEST_PHASOR_RATE:
-        dips += [ImaginedDip(depth, durations[1], rate=FASTER) for depth in DEPTHS[2::2]]
+    if RATE_FACTOR / context.events[0].record.step <= HIGHEST_PHASOR_RATE:
+        dips += [ImaginedDip(depth, durations[1], rate=RATE_FACTOR) for depth in DEPTHS[2::2]]
     return dips
 
 

@@ -19,7 +19,7 @@ from tractexp.progress import Progress, count_parts, tell
 if TYPE_CHECKING:
     from tractexp.studies.comparison.runs import SearchRun
 
-SEEDS = 30
+SEARCH_SEEDS = 30
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,7 +69,7 @@ def search(
     *,
     optimizers: Any = None,
     switches: Sequence[str] = (),
-    seeds: int = SEEDS,
+    seeds: int = SEARCH_SEEDS,
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     per_event: Sequence[str] | None = None,
