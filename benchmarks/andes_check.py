@@ -89,7 +89,7 @@ def ours(model, parameters: dict, theirs: dict, step: float) -> tuple[np.ndarray
     """
     U, P, Q = theirs["U"], theirs["P"], theirs["Q"]
     speed = np.gradient(theirs["angle"], step, edge_order=2)
-    drive = Drive.of([Excitation(step, U, P, Q, U[0], P[0], Q[0], speed, 0.0, OMEGA)])
+    drive = Drive.from_events([Excitation(step, U, P, Q, U[0], P[0], Q[0], speed, 0.0, OMEGA)])
     response = model.simulate(drive, np.array([parameters[name] for name in model.names]), 8)
     return response.P[0], response.Q[0]
 

@@ -58,8 +58,8 @@ class Limit:
 
 def limit(text: str, substeps: int, rounds: int) -> Limit:
     """Of a kernel by its IR."""
-    width = Room.of(text).width
-    sample, step = counts(objects.assembly(text), Room.of(text).outputs)
+    width = Room.from_text(text).width
+    sample, step = counts(objects.assembly(text), Room.from_text(text).outputs)
     mix = (
         step.multiplications * substeps + sample.multiplications,
         step.others * substeps + sample.others,
@@ -127,14 +127,14 @@ def rate(mix: Count, width: int) -> Callable[[], float]:
     n = Numbers(f, width)
     x = n.load("%work")
     with f.loop(0, TIMES):
-        values = [n.load(f.at("%work", c * width)) for c in range(CHAINS)]
+        values = [n.load(f.offset_address("%work", c * width)) for c in range(CHAINS)]
         for _ in range(DEPTH):
             values = [
-                n.fused(a, x, x, "contract") if c < fused else n.add(a, x, "")
+                n.multiply_add(a, x, x, "contract") if c < fused else n.add(a, x, "")
                 for c, a in enumerate(values)
             ]
         for c, a in enumerate(values):
-            n.store(a, f.at("%work", c * width))
+            n.store(a, f.offset_address("%work", c * width))
     loaded = objects.load(
         "\n".join([*f.intrinsics.values(), f.text("define void @run(ptr %work)")])
     )

@@ -35,7 +35,7 @@ def drive_of(depths: tuple[float, ...]) -> Drive:
     """Dips of a quarter of a second."""
     t, flat = np.arange(SAMPLES) * STEP, np.ones(SAMPLES)
     shape = np.clip((t - 0.4) / 0.02, 0, 1) - np.clip((t - 0.65) / 0.02, 0, 1)
-    return Drive.of(
+    return Drive.from_events(
         [Excitation(STEP, 1 - d * shape, flat, 0.6 * flat, 1.0, 1.0, 0.6) for d in depths]
     )
 
@@ -67,7 +67,8 @@ def main() -> None:
     for name in (*family.catalogue.of_load, PUSHES):
         _, beside = family.key((), name)
         kernels.setdefault(
-            "effects that are cheap" if len(beside) > 1 else name, family.of(family.key((), name))
+            "effects that are cheap" if len(beside) > 1 else name,
+            family.build_model(family.key((), name)),
         )
     whole = cost(family.whole, drive)
     for name, model in kernels.items():

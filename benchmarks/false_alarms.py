@@ -51,7 +51,12 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     missing = catalogue(model, events)
     first = disagreement(
-        base_fit(Context.of(model, missing, Records.of(events), {}, {}, Criteria(), Effort())), 0
+        base_fit(
+            Context.from_records(
+                model, missing, Records.from_events(events), {}, {}, Criteria(), Effort()
+            )
+        ),
+        0,
     )
     drawn, best = first.chance.least_p, first.scores[0]
     rank = (np.count_nonzero(drawn < best.p) + 1) / (len(drawn) + 1)

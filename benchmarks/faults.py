@@ -350,7 +350,7 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
             kept = save(folder / "job", run, uri)
             tracking.open_store(uri)
             count = counting_statements(n)
-            kept.logged(tracking.log(kept.run, uri))
+            kept.mark_logged(tracking.log(kept.run, uri))
             print("statements", count[0])
 
         return act

@@ -191,11 +191,11 @@ def _counted(found) -> dict:
         "proposal": _proposed(found.proposed),
         "no_proposal": found.proposed.why,
         "chi2": found.train.after.chi2_per_sample,
-        "closed": found.train.closed,
+        "closed": found.train.closed_share,
         "refitted": found.fitted_to_both,
-        "closed_held": None if found.validate is None else found.validate.closed,
-        "explained": found.train.explained,
-        "explained_held": None if found.validate is None else found.validate.explained,
+        "closed_held": None if found.validate is None else found.validate.closed_share,
+        "explained": found.train.explained_share,
+        "explained_held": None if found.validate is None else found.validate.explained_share,
         "gain_held": None
         if found.validate is None
         else [found.validate.gain, found.validate.expected],
@@ -203,7 +203,7 @@ def _counted(found) -> dict:
         "grade": found.final_grade.adequacy.grade,
         "reason": found.reason,
         "left": [s.p_left for s in found.explanations.steps],
-        "left_by": found.last.left,
+        "left_by": found.last.p_by_test,
         "samples": found.context.samples,
         "refits": _refits(found),
         "predicted": _predicted(found),
@@ -218,7 +218,7 @@ def _predicted(found) -> list[tuple[list[str], float]]:
     """
     if found.evidence.there is None:
         return []
-    every = sorted(found.evidence.every, key=lambda row: row.prediction.left)
+    every = sorted(found.evidence.every, key=lambda row: row.prediction.excess)
     return [([*row.names], row.prediction.error) for row in (*every[:5], found.evidence.base)]
 
 
@@ -279,7 +279,7 @@ def _compared(found, trial: cases.Trial) -> dict:
         sets = [(), found.names]  # members of families have kernels of their own
         got = (
             other.residuals_of(np.array(found.validate.units), sets)
-            + other.drive.measured
+            + other.drive.measurements
             - clean[:, -N:]
         )
         before, after = np.sum(got**2, axis=(1, 2))
@@ -291,7 +291,9 @@ def _compared(found, trial: cases.Trial) -> dict:
         N = found.context.drive.samples
         change = (clean - without)[:, :N]
         first = found.first
-        projection = first.projection.of(found.context.whiten(first.noise, -change[None]))
+        projection = first.projection.replace_residuals(
+            found.context.whiten(first.noise, -change[None])
+        )
         row |= {
             "lambda": float(projection.r[0] @ projection.r[0]),
             "lambda_left": _left(found, clean[:, :N]),
@@ -319,8 +321,12 @@ def _left(found, clean: np.ndarray) -> float:
     left = []
     for fit in sorted(singles, key=lambda f: f.cost)[:BEST]:
         t = tangent(bench, fit, first.noise)
-        off = (t.residual + bench.drive.measured - clean) * bench.valid
-        rows = t.whitened(first.noise).of(bench.whiten(first.noise, off[None])).r[0]
+        off = (t.residual + bench.drive.measurements - clean) * bench.valid
+        rows = (
+            t.build_score_test(first.noise)
+            .replace_residuals(bench.whiten(first.noise, off[None]))
+            .r[0]
+        )
         left.append(float(rows @ rows))
     return min(left)
 

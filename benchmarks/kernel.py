@@ -85,8 +85,8 @@ def serve(narrow: bool) -> None:
 
     def driven(domain: str) -> Drive:
         if domain == "waves":
-            return Drive.of([kernel_reference.waves(0.3, 0.05, 1.0, SAMPLES / 1200)])
-        return Drive.of([kernel_reference.phasors(0.4, 1e-3, SAMPLES, 1.0, 0.0)])
+            return Drive.from_events([kernel_reference.waves(0.3, 0.05, 1.0, SAMPLES / 1200)])
+        return Drive.from_events([kernel_reference.phasors(0.4, 1e-3, SAMPLES, 1.0, 0.0)])
 
     def compiled(parts: list[str]) -> list[float]:
         model, drive = load(parts), driven(parts[0])
@@ -107,7 +107,7 @@ def serve(narrow: bool) -> None:
         )
         drive, substeps = driven(model.domain), 2 if model.waves else 1
         calls[key] = lambda: model.errors(drive, values, substeps)
-        return bool(calls[key]().refused.any())
+        return bool(calls[key]().is_refused.any())
 
     def called(key: str) -> float:
         started = time.thread_time()  # of this thread alone: others may use the machine

@@ -108,8 +108,10 @@ def _effect(name: str) -> Any:
 def drive(domain: str) -> Drive:
     """Two events: a deep dip and a shallow one that begins elsewhere."""
     if domain == WAVES:
-        return Drive.of([waves(0.4, 0.05, 1.0, 0.10), waves(0.2, 0.0, 0.97, 0.06)])
-    return Drive.of([phasors(0.45, 5e-3, 60, 1.0, 0.0), phasors(0.2, 10e-3, 45, 0.98, -0.5)])
+        return Drive.from_events([waves(0.4, 0.05, 1.0, 0.10), waves(0.2, 0.0, 0.97, 0.06)])
+    return Drive.from_events(
+        [phasors(0.45, 5e-3, 60, 1.0, 0.0), phasors(0.2, 10e-3, 45, 0.98, -0.5)]
+    )
 
 
 def phasors(depth: float, step: float, samples: int, U0: float, speed: float) -> Excitation:

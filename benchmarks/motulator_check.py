@@ -95,7 +95,9 @@ def check(rate: float = 10_000.0, substeps: int = 4) -> dict[str, float]:
     )
     of = compose(get("model/motor", "stator_flux")(), get("model/static", "none")(), domain="waves")
     known = parameters()
-    response = of.simulate(Drive.of([made]), np.array([known[name] for name in of.names]), substeps)
+    response = of.simulate(
+        Drive.from_events([made]), np.array([known[name] for name in of.names]), substeps
+    )
     own = response.outputs[0, 0] + 1j * response.outputs[1, 0]
     return {"difference": float(np.abs(own - i).max()), "largest": float(np.abs(i).max())}
 

@@ -317,14 +317,16 @@ def perform(arguments, folder):
             from tractexp.identification.search import Limits, search
 
             asked = {key: job.config[key] for key in ("budget", "time_limit", "target")}
-            setup = Setup.of(
+            setup = Setup.from_arguments(
                 job.events.train,
                 job.config["model"],
                 job.events.validate,
                 job.config["objective"],
                 **asked,
             )
-            optimizer = Choice.of("optimizer", job.config["optimizer"]).build("optimizer")
+            optimizer = Choice.from_argument("optimizer", job.config["optimizer"]).build(
+                "optimizer"
+            )
             search(setup.problem, optimizer, job.seed, Limits(60, 5.0, job.config["target"]))
 
 

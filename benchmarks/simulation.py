@@ -200,7 +200,7 @@ def measure(rounds: int) -> dict:
     """All figures of one run."""
     P, Q = rivals.Record(excitation()).solution(TRUTH)
     record = replace(excitation(), P=P, Q=Q)
-    drive, model = Drive.of([record]), base()
+    drive, model = Drive.from_events([record]), base()
     own = Way("tractexp, public batch call", ours(model, drive), CANDIDATES)
     halved = Way("tractexp, two steps a sample", ours(model, drive, 2), CANDIDATES)
     error = own.error()

@@ -162,7 +162,7 @@ def bound(load, events, truth: np.ndarray, deviation: float, correlation: float)
     shock = deviation * np.sqrt(1 - correlation**2)
     true = Autoregression(np.array([[0.0], [correlation]]), np.array([deviation, shock]))
     problem = Problem(load, events)
-    likelihood = Likelihood.of(problem, Noise(((true, true),)))
+    likelihood = Likelihood.from_problem(problem, Noise(((true, true),)))
     unit = likelihood.to_unit(truth)[0]
     _, J = likelihood.jacobian(unit)
     return Information(tuple(NAMES), truth, problem.upper - problem.lower, J.without_own)

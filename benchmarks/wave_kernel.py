@@ -64,8 +64,8 @@ def kernels(rounds: int) -> list[dict]:
         values = np.array([p.default for p in load.parameters]) * rng.uniform(
             0.97, 1.03, (CANDIDATES, len(load.names))
         )
-        drive, n = Drive.of([driving]), np.array([1 if load is phasors else 4])
-        refused = load.errors(drive, values, n).refused.sum()
+        drive, n = Drive.from_events([driving]), np.array([1 if load is phasors else 4])
+        refused = load.errors(drive, values, n).is_refused.sum()
         if refused:
             raise SystemExit(f"{refused} candidates have no steady state; their time means nothing")
         steps = CANDIDATES * (drive.samples - 1) * int(n[0])

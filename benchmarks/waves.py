@@ -154,8 +154,8 @@ def told_at_truth(event, truth: dict[str, float]) -> dict[str, float]:
     load = compose(
         get("model/motor", "stator_flux")(), get("model/static", "branch")(), domain="waves"
     )
-    observed = Observed.of(Problem(load, [event]))
-    likelihood = Likelihood.of(observed.problem)
+    observed = Observed.from_problem(Problem(load, [event]))
+    likelihood = Likelihood.from_problem(observed.problem)
     values = np.array([truth[n] for n in observed.problem.space.names])
     unit = likelihood.to_unit(values)[0]
     noise = noise_at(observed, likelihood, unit, observed.input_errors(values))

@@ -9,7 +9,7 @@ def dense(J: Sensitivities) -> np.ndarray:
     """(R, k + m E)."""
     m = len(J.columns) - J.k
     whole = np.zeros((J.columns.shape[1], J.k + m * len(J.rows)))
-    whole[:, : J.k] = J.shared
+    whole[:, : J.k] = J.shared_columns
     for e, rows in enumerate(J.rows):
         whole[rows, J.k + e * m : J.k + (e + 1) * m] = J.own(e)
     return whole

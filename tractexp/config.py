@@ -108,14 +108,16 @@ def _list_offered() -> dict[str, set[str]]:
     """
 
     def ask() -> bytes:
-        return json.dumps({group: [*names] for group, names in offered(plugin.discover())}).encode()
+        return json.dumps(
+            {group: [*names] for group, names in list_groups(plugin.discover())}
+        ).encode()
 
-    def offered(classes_of: Mapping[str, Any]) -> Iterator[tuple[str, set[str]]]:
+    def list_groups(classes_of: Mapping[str, Any]) -> Iterator[tuple[str, set[str]]]:
         for group, classes in classes_of.items():
             yield group, {name for name, cls in classes.items() if cls.chosen}
 
     kept = json.loads(TEXTS.get(key(environment(), "plugins that Hydra offers"), ask))
-    here = dict(offered(plugin.list_registered()))
+    here = dict(list_groups(plugin.list_registered()))
     return {group: {*kept.get(group, ()), *here.get(group, ())} for group in {*kept, *here}}
 
 

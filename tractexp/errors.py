@@ -32,7 +32,7 @@ def settings_as(call: str, arguments: Callable[[], Collection[str]]) -> Iterator
     """
     outer = _spelling.get()
 
-    def spelled(key: str) -> str:
+    def spell_key(key: str) -> str:
         if key == f"task={call}":
             return f"{call}()"
         section, _, rest = key.partition(".")
@@ -40,7 +40,7 @@ def settings_as(call: str, arguments: Callable[[], Collection[str]]) -> Iterator
         rest = "records" if key == "data.train" and "records" in names else rest
         return rest if rest.partition(".")[0] in names else outer(key)
 
-    token = _spelling.set(spelled)
+    token = _spelling.set(spell_key)
     try:
         yield
     finally:
@@ -86,7 +86,7 @@ class Stopped(KeyboardInterrupt):
         self.code, self.state, self.result = code, state, result
 
     @classmethod
-    def of(cls, stop: KeyboardInterrupt, **more: Any) -> "Stopped":
+    def from_interrupt(cls, stop: KeyboardInterrupt, **more: Any) -> "Stopped":
         """The same end with more of its fields."""
         fields = {name: getattr(stop, name, None) for name in ("state", "result")}
         return cls(str(stop), getattr(stop, "code", 130), **{**fields, **more})

@@ -98,7 +98,7 @@ class Outcome(Plain, Tabulated):
             Outcome.kinds[cls.kind] = cls
 
     @classmethod
-    def revived(cls, content: Mapping[str, Any]) -> Self:
+    def from_saved(cls, content: Mapping[str, Any]) -> Self:
         """As `from_dict`; raises `UserError` where something is missing or of the wrong kind."""
         try:
             return cls.from_dict(content)
@@ -125,7 +125,7 @@ class Outcome(Plain, Tabulated):
                 f"{path} holds a result of kind '{content['kind']}', not '{cls.kind}'; read it by"
                 " load()"
             )
-        return cls.revived(content)
+        return cls.from_saved(content)
 
 
 class Written(Outcome):

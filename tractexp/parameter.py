@@ -85,10 +85,12 @@ class Box:
     names: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, parameters: tuple[Parameter, ...]) -> "Box":
+    def from_parameters(cls, parameters: tuple[Parameter, ...]) -> "Box":
         """The box of some parameters, named as they are."""
         bounds = np.array([p.bounds for p in parameters], dtype=float).reshape(-1, 2)
         return cls(bounds[:, 0].copy(), bounds[:, 1].copy(), tuple(p.name for p in parameters))
+
+    of = from_parameters  # its name in version 0.2
 
     @classmethod
     def unit(cls, dimension: int) -> "Box":

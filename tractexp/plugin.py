@@ -60,6 +60,16 @@ class Plugin:
         """
 
 
+# {group: {name of a method in version 0.2: its name now}}: a plugin that defines the old one is
+# taken as if it defined the new one
+RENAMED_METHODS: Mapping[str, Mapping[str, str]] = {
+    "effect": {"shown": "describe_sign"},
+    "model/static": {"damping": "compute_damping"},
+    "format": {"simulated": "play_back_dip"},
+    "data": {"of": "build_settings"},
+    "task": {"logged": "collect_log"},
+}
+
 Class = TypeVar("Class", bound=type[Plugin])
 _registry: dict[str, dict[str, type[Plugin]]] = {}
 _schemas: dict[type[Plugin], type] = {}
@@ -90,6 +100,9 @@ def plugin(cls: Class) -> Class:
                 " without -OO"
             )
         raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
+    for old, new in RENAMED_METHODS.get(group, {}).items():
+        if old in vars(cls):
+            setattr(cls, new, vars(cls)[old])
     others = _registry.setdefault(group, {})
     if name in others and others[name].__module__ != cls.__module__:
         raise UserError(
@@ -201,7 +214,7 @@ def register_all() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, 
     """
     refused: dict[str, str] = {}
 
-    def tried(name: str, function: Callable[[Any], Any], argument: Any) -> list[Any]:
+    def try_reading(name: str, function: Callable[[Any], Any], argument: Any) -> list[Any]:
         try:
             return [function(argument)]
         except UserError as error:
@@ -209,11 +222,13 @@ def register_all() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, 
             return []
 
     packages = [
-        package for point in entry_points() for package in tried(point.module, _package, point)
+        package
+        for point in entry_points()
+        for package in try_reading(point.module, _package, point)
     ]
     names = [name for package in packages for name in modules(package.__name__, package.__path__)]
-    for module in [module for name in names for module in tried(name, _module, name)]:
-        tried(module.__name__, _check_decorated, module)
+    for module in [module for name in names for module in try_reading(name, _module, name)]:
+        try_reading(module.__name__, _check_decorated, module)
     return _registry, refused
 
 

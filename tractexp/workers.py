@@ -53,7 +53,7 @@ class Workers:
     address: str | None = None
     apart: bool = False
 
-    def completed(
+    def run_items(
         self, function: Callable[[Item], Any], items: Iterable[Item], count: int
     ) -> Iterator[tuple[int, Any]]:
         """(position, result) of the `count` items, as they are done.
@@ -110,7 +110,7 @@ class Workers:
             barren += 1
             keys, working = list(remaining), set[int]()
             with contextlib.suppress(BrokenExecutor):
-                for k, result in self.completed(
+                for k, result in self.run_items(
                     function, _note_items(remaining, keys, working), len(keys)
                 ):
                     working.discard(k)

@@ -85,7 +85,7 @@ class FeederImpedance(Effect):
             eq[s] for s in (sites.P_motor, sites.P_static, sites.Q_motor, sites.Q_static) if s in eq
         ]
         at_bus = [
-            eq.before(power.xreplace(dict.fromkeys(loads, sympy.Integer(0))))
+            eq.evaluate_before(power.xreplace(dict.fromkeys(loads, sympy.Integer(0))))
             for power in (eq.P, eq.Q)
         ]
         I_0 = (eq.P0 - at_bus[0] - I * (eq.Q0 - at_bus[1])) / eq.U0
@@ -190,7 +190,7 @@ def _solve_voltage(eq, R, J, rest, source):
     (a, b), (c, e) = ((J[0][0] * R + 1, J[0][1] * R), (J[1][0] * R, J[1][1] * R + 1))
     whole = eq.compute("feeder_whole", a * e - b * c)
     eq.require(
-        eq.real(eq.before(a * e - b * c)),
+        eq.real(eq.evaluate_before(a * e - b * c)),
         "no current settles between an impedance and a load of which one has a negative resistance"
         " ({value:.3g}); raise"
         " X_f, or lower T_m so that the static load draws power",
@@ -205,7 +205,7 @@ def _solve(eq, Z, b, B, V_0):
 
     v_0 = eq.compute("load_voltage_0", *[sympy.sqrt(_square(eq, V_0))] * 2)
     square = _square(eq, B)
-    x = eq.compute("feeder_x0", sympy.log(square / eq.before(square)) / 2, 0)
+    x = eq.compute("feeder_x0", sympy.log(square / eq.evaluate_before(square)) / 2, 0)
     for k in range(ITERATIONS):
         v_squared = eq.compute(f"{x}_v_squared", (v_0 * sympy.exp(x)) ** 2)
         Y, slope = _static_admittance(eq, x, v_squared)
@@ -271,7 +271,7 @@ def _compute_complex_step(eq, name, value, before):
     """A complex quantity computed once, from its two parts."""
     from sympy import I
 
-    pairs = zip("dq", eq.parts(value), eq.parts(eq.before(before)), strict=True)
+    pairs = zip("dq", eq.parts(value), eq.parts(eq.evaluate_before(before)), strict=True)
     d, q = (eq.compute(f"{name}_{axis}", now, then) for axis, now, then in pairs)
     return d + I * q
 

@@ -36,7 +36,7 @@ class HarmonicsSource(Measurement):
     relevant = {"harmonics": 0.2}
     confused_with = ("transformer_saturation",)
 
-    def shown(self, event):
+    def describe_sign(self, event):
         periodic = np.sqrt(max(event.levels[0] ** 2 - event.random[0] ** 2, 0.0) * 2)
         share = periodic * event.U0 / np.hypot(event.P0, event.Q0)
         return (
@@ -58,7 +58,7 @@ class HarmonicsSource(Measurement):
             inverse = np.linalg.pinv(basis[first:last])  # (2 H + 1, W)
             basis[:last] = 0.0
             compared = drive.weights[:, part].any(axis=1)
-            residual = drive.measured[compared, None, part.start + first : part.start + last]
+            residual = drive.measurements[compared, None, part.start + first : part.start + last]
             residual = residual - power[compared, :, part.start + first : part.start + last]
             out[compared, :, part] += values["harmonics"][e][:, None] * (
                 residual @ inverse.T @ basis.T

@@ -38,7 +38,7 @@ class MagneticSaturation(Effect):
         if eq.waves and sites.stator_current in eq:
             E = eq.define("air_gap", E + I * eq["X_prime"] / 2 * eq[sites.stator_current], "E_m")
         square = lambda x: re(x * conjugate(x))  # noqa: E731
-        rise = eq.define("flux_rise", square(E) - square(eq.before(E)), r"\Delta E^2")
+        rise = eq.define("flux_rise", square(E) - square(eq.evaluate_before(E)), r"\Delta E^2")
         unsaturated = 1 + (1 - eq["C"]) * saturation * rise
         for site in (sites.coupling, sites.time_constant):
             eq.edit(site, lambda x: x / unsaturated)

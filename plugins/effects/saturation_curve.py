@@ -75,7 +75,7 @@ class SaturationCurve(Effect):
 
         unsaturated = (1 - flux_depth) * eq.v + flux_depth * eq["E"]
         squared = eq.define("flux_squared", re(unsaturated * conjugate(unsaturated)), r"|\psi_u|^2")
-        fall = eq.define("flux_fall", eq.before(squared) - squared, r"\Delta\psi_u^2")
+        fall = eq.define("flux_fall", eq.evaluate_before(squared) - squared, r"\Delta\psi_u^2")
         h = bent(fall, (saturation_corner,), (saturation_bend,), saturation_rounding)
         share = (1 - eq["C"]) / (1 - flux_depth * (1 - eq["C"]))  # X'/X_m
         less = eq.define("saturation_fall", curve_saturation * h * share, r"(1 - \sigma) X'/X_m")

@@ -37,7 +37,7 @@ class SecondMotorGroup(Effect):
     def edit(self, eq, group_share, inertia_ratio):
         omega, moving = eq.omega, _list_needed_states(eq)
         twins = {s: eq.twin(s, "_2") for s in moving}
-        twins |= {eq.before(s): eq.before(twin) for s, twin in twins.items()}
+        twins |= {eq.evaluate_before(s): eq.evaluate_before(twin) for s, twin in twins.items()}
         touched = [s for s in eq.definitions if eq.expand(s).free_symbols & twins.keys()]
         for symbol in touched:
             twin = eq.definitions[symbol].xreplace(twins)

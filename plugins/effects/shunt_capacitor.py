@@ -37,7 +37,7 @@ class ShuntCapacitor(Effect):
     relevant = {"capacitor": 0.05}
     confused_with = ("static_var_compensator", "negative_sequence_braking")
 
-    def shown(self, event):
+    def describe_sign(self, event):
         supplied = -event.Q0 / np.hypot(event.P0, event.Q0)
         return (
             f"the load supplies Q, {supplied:.0%} of S, before the dip"

@@ -27,5 +27,5 @@ class SpeedDependentTorque(Effect):
     confused_with = ("feeder_impedance", "second_motor_group", "magnetic_saturation")
 
     def edit(self, eq, quadratic_share):
-        speed = (eq.omega + eq.omega_n) / (eq.before(eq.omega) + eq.omega_n)
+        speed = (eq.omega + eq.omega_n) / (eq.evaluate_before(eq.omega) + eq.omega_n)
         eq.edit(sites.load_torque, lambda T: T * (1 - quadratic_share + quadratic_share * speed**2))

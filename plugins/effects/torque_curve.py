@@ -48,7 +48,7 @@ class TorqueCurve(Effect):
     confused_with = ("speed_dependent_torque", "feeder_impedance", "magnetic_saturation")
 
     def edit(self, eq, curve_share, torque_bend_1, torque_bend_2):
-        speed = (eq.omega + eq.omega_n) / (eq.before(eq.omega) + eq.omega_n)
+        speed = (eq.omega + eq.omega_n) / (eq.evaluate_before(eq.omega) + eq.omega_n)
         slower = eq.define("speed_fall", 1 - speed**2, r"\Delta\omega^2")
         law = 1 - curve_share * bent(slower, KNOTS, (torque_bend_1, torque_bend_2), TORQUE_CORNER)
         eq.edit(sites.load_torque, lambda T: T * law)

@@ -54,7 +54,7 @@ class TransformerSaturation(Effect):
         eq.moves(
             psi,
             eq.omega_n * eq.v - psi / flux_decay - I * speed * psi,
-            self._before(eq, flux_decay),
+            self._compute_initial_flux(eq, flux_decay),
         )
         eq.states[psi].derived = True
         knee = flux_knee * eq.omega_n * eq.U0 / sympy.sqrt(1 / flux_decay**2 + speed**2)
@@ -65,7 +65,7 @@ class TransformerSaturation(Effect):
         eq.draw(vector_of(eq, drawn)[0])
 
     @staticmethod
-    def _before(eq, flux_decay):
+    def _compute_initial_flux(eq, flux_decay):
         from sympy import I
 
         return eq.omega_n * eq.v / (1 / flux_decay + I * (eq.omega_n + eq.omega_s))

@@ -44,8 +44,8 @@ class ZeroSequencePath(Effect):
     grid = {"zero_resistance": (0.02, 0.1, 0.5)}
     relevant = {"zero_susceptance": 0.1}
 
-    def shown(self, event):
-        if not event.compared[2]:
+    def describe_sign(self, event):
+        if not event.compared_channels[2]:
             return ""
         dip = slice(event.start, event.end)
         drawn, before = (

@@ -81,7 +81,7 @@ def start_running(system, motor):
     size = motor.Sn.v / system.config.mva  # currents are per unit of the system
     guesses |= {"Id": 0.5 * size, "Iq": -0.3 * size}
 
-    def running():
+    def evaluate_system():
         initialize()
         for name, value in guesses.items():
             if hasattr(motor, name):
@@ -92,7 +92,7 @@ def start_running(system, motor):
         system.vars_to_models()
         return system.dae.xy
 
-    system.PFlow.init = running
+    system.PFlow.init = evaluate_system
 
 
 def play(tables, dip):

@@ -14,7 +14,7 @@ def restore_load(load, motor, law, static):
     """
     parts = {"motor": {"name": "none"}, "static": {"name": "none"}, "effects": []}
     values = dict(law)
-    if "P_static" in load.before:
+    if "P_static" in load.steady_state:
         name = load.result.model["static"]["name"]
         parts["static"] = {"name": SAME.get(name, name)}
     if motor is not None:

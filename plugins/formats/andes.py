@@ -52,16 +52,21 @@ class Andes(Format):
     effects = ("stator_resistance",)
 
     def text(self, load):
-        bus = {"idx": load.bus, "name": load.name, "Vn": load.voltage, "v0": load.before["U0"]}
+        bus = {
+            "idx": load.bus,
+            "name": load.name,
+            "Vn": load.voltage,
+            "v0": load.steady_state["U0"],
+        }
         tables = {"Bus": [bus]}
-        if "P_motor" in load.before:
+        if "P_motor" in load.steady_state:
             tables |= self._motor(load)
-        if "P_static" in load.before:
+        if "P_static" in load.steady_state:
             tables |= self._static(load)
         return json.dumps(tables, indent=2) + "\n"
 
     def notes(self, load):
-        slip = -load.before.get("omega_before", 0.0) / load.omega_n
+        slip = -load.steady_state.get("omega_before", 0.0) / load.omega_n
         start = (
             "ANDES starts its power flow at standstill; where it does not converge, start the motor"
         )
@@ -85,7 +90,7 @@ class Andes(Format):
             law = {name: percent / 100 for name, percent in law.items()}
         return restore_load(load, motor, law, static)
 
-    def simulated(self, text, load):
+    def play_back_dip(self, text, load):
         """The response in ANDES, in a process of its own: of this Python, or of the one in
         TRACTEXP_ANDES_PYTHON.
         """
@@ -133,7 +138,7 @@ class Andes(Format):
     def _static(self, load):
         scale, before, static = (
             load.power / SYSTEM_MVA,
-            load.before,
+            load.steady_state,
             load.result.model["static"]["name"],
         )
         power = {"p0": before["P_static"] * scale, "q0": before["Q_static"] * scale}

@@ -26,7 +26,7 @@ class Modelica(Format):
     suffix = ".mo"
 
     def text(self, load):
-        eq, before = load.model.equations, load.before
+        eq, before = load.model.equations, load.steady_state
         if eq.memories or load.model.measurements:
             which = next(m.name for m in (*eq.memories, *load.model.measurements))
             raise UserError(
@@ -75,7 +75,7 @@ class Modelica(Format):
             if key in load.result.model
         }
         parameters = {p.name: numbers[p.name] for p in load.model.parameters}
-        static = load.before.get("P_static", 0.0), load.before.get("Q_static", 0.0)
+        static = load.steady_state.get("P_static", 0.0), load.steady_state.get("Q_static", 0.0)
         return Restored(model, parameters, static)
 
 

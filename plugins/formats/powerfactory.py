@@ -49,17 +49,17 @@ class PowerFactory(Format):
             "ElmTerm": {3: bus},
             "StaCubic": {},
         }
-        if "P_motor" in load.before:
+        if "P_motor" in load.steady_state:
             tables["StaCubic"][4] = {"loc_name": "Cub_1", "fold_id": 3, "obj_bus": 0, "obj_id": 5}
             tables |= {"ElmAsm": {5: self._machine(load)}, "TypAsmo": {6: self._machine_type(load)}}
-        if "P_static" in load.before:
+        if "P_static" in load.steady_state:
             tables["StaCubic"][7] = {"loc_name": "Cub_2", "fold_id": 3, "obj_bus": 0, "obj_id": 8}
             tables |= {"ElmLod": {8: self._load(load)}, "TypLod": {9: self._load_type(load)}}
         return HEAD + "".join(_table(name, rows) for name, rows in tables.items())
 
     def notes(self, load):
         lines = ["not tried in PowerFactory itself; readers of DGS named the classes and columns"]
-        if "P_motor" in load.before:
+        if "P_motor" in load.steady_state:
             c, t = load.circuit, self._machine_type(load)
             lines += [
                 "check the machine's type after the import, for no open reader names rrtrA, xrtrA"
@@ -70,7 +70,7 @@ class PowerFactory(Format):
                 " its load torque is"
                 " constant (exponent 0)",
             ]
-        if "P_static" in load.before:
+        if "P_static" in load.steady_state:
             lines.append("take the load's type as static in RMS simulations: 0 % dynamic")
         return [*lines, *self.omissions(load)]
 
@@ -85,7 +85,7 @@ class PowerFactory(Format):
                 load.omega_n, *(of_type[key] for key in ("rstr", "xstr", "xm", "rrtrA", "xrtrA"))
             )
             P, Q = element["pgini"] / power, element["qgini"] / power
-            torque = P - circuit.R_s * (P**2 + Q**2) / load.before["U0"] ** 2  # on the shaft
+            torque = P - circuit.R_s * (P**2 + Q**2) / load.steady_state["U0"] ** 2  # on the shaft
             inertia = of_type["J"] * (load.omega_n / of_type["nppol"]) ** 2 / (2e6 * power)
             motor = circuit, inertia, torque
         for element in tables.get("ElmLod", ()):
@@ -98,7 +98,7 @@ class PowerFactory(Format):
         return restore_load(load, motor, own, static)
 
     def _machine(self, load):
-        P, Q = (load.power * load.before[f"{power}_motor"] for power in "PQ")
+        P, Q = (load.power * load.steady_state[f"{power}_motor"] for power in "PQ")
         return {
             "loc_name": "Motor",
             "fold_id": 2,
@@ -113,7 +113,7 @@ class PowerFactory(Format):
 
     def _machine_type(self, load):
         c, frequency = load.circuit, load.omega_n / (2 * pi)
-        slip = -load.before.get("omega_before", 0.0) / load.omega_n
+        slip = -load.steady_state.get("omega_before", 0.0) / load.omega_n
         return {
             "loc_name": "Motor type",
             "fold_id": "",
@@ -136,7 +136,7 @@ class PowerFactory(Format):
         }
 
     def _load(self, load):
-        P, Q = (load.power * load.before[f"{power}_static"] for power in "PQ")
+        P, Q = (load.power * load.steady_state[f"{power}_static"] for power in "PQ")
         return {
             "loc_name": "Static load",
             "fold_id": 2,
@@ -144,7 +144,7 @@ class PowerFactory(Format):
             "outserv": 0,
             "plini": P,
             "qlini": Q,
-            "u0": load.before["U0"],
+            "u0": load.steady_state["U0"],
         }
 
     def _load_type(self, load):

@@ -33,7 +33,7 @@ class PsseDyr(Format):
 
     def text(self, load):
         records = []
-        if "P_motor" in load.before:
+        if "P_motor" in load.steady_state:
             c = load.circuit
             cages = (c.R_1, c.X_1, c.R_2 or 0.0, c.X_2 or 0.0)
             saturation, trip = (0.0, 0.0, 0.0, 0.0), (0.0, 9999.0, 0.0)
@@ -55,10 +55,10 @@ class PsseDyr(Format):
                     0.0,
                 )
             )
-        if "P_static" in load.before:
+        if "P_static" in load.steady_state:
             pairs = [pair for side in terms(load) for pair in side]
             coefficients, exponents = (
-                [a / load.before["U0"] ** n for a, n in pairs],
+                [a / load.steady_state["U0"] ** n for a, n in pairs],
                 [n for _, n in pairs],
             )
             records.append(_record(load.bus, "IEELBL", "S", *coefficients, 0.0, 0.0, *exponents))
@@ -67,8 +67,8 @@ class PsseDyr(Format):
     def notes(self, load):
         lines = self.omissions(load)
         for identifier, part in (("M", "motor"), ("S", "static")):
-            if f"P_{part}" in load.before:
-                P, Q = (load.power * load.before[f"{power}_{part}"] for power in "PQ")
+            if f"P_{part}" in load.steady_state:
+                P, Q = (load.power * load.steady_state[f"{power}_{part}"] for power in "PQ")
                 lines.append(
                     f"load '{identifier}' of bus {load.bus} in the power flow: {P:.6g} MW, {Q:.6g}"
                     " Mvar"
@@ -85,8 +85,8 @@ class PsseDyr(Format):
                 motor = TCircuit(load.omega_n, *c[1:4], *cages), c[14], load.values["T_m"]
             else:
                 # in the power flow: see the notes
-                static = load.before["P_static"], load.before["Q_static"]
-                pairs = [(c[k] * load.before["U0"] ** c[8 + k], c[8 + k]) for k in range(6)]
+                static = load.steady_state["P_static"], load.steady_state["Q_static"]
+                pairs = [(c[k] * load.steady_state["U0"] ** c[8 + k], c[8 + k]) for k in range(6)]
                 own = law(load, (pairs[:3], pairs[3:]))
         return restore_load(load, motor, own, static)
 

@@ -132,8 +132,8 @@ class LineSideConverter(Motor):
         y, swing = eq.lag_vector("resonance", "y"), eq.lag_vector("resonance_swing", "y'")
         Z = X_c * (self.resistance + turning / eq.omega_n)
         i_0 = P_c / eq.U0
-        u_0 = eq.U0 - eq.before(Z) * i_0
-        y_0 = eq.U0 - u_0 * (1 + eq.before(turning) * control_delay)
+        u_0 = eq.U0 - eq.evaluate_before(Z) * i_0
+        y_0 = eq.U0 - u_0 * (1 + eq.evaluate_before(turning) * control_delay)
         eq.moves(i, eq.omega_n / X_c * (V - u_c - Z * i), i_0)
         eq.moves(u_c, (V - K * off - y - u_c) / control_delay - turning * u_c, u_0)
         eq.moves(y, K * current_bandwidth / 10 * off + I * turning * swing - turning * y, y_0)

@@ -77,14 +77,14 @@ class MotorGroups(Motor):
         for k, one in enumerate(self.members, 1):
             assert isinstance(one, Motor)
             own = self._own_of(k, one, parameters)
-            current = one.declare(eq if k == 1 else eq.apart(_suffix(k)), **own)
+            current = one.declare(eq if k == 1 else eq.view_with_suffix(_suffix(k)), **own)
             if k == 1 and sites.stator_current not in eq:
                 current = eq.place(sites.stator_current, current)
             total += current
-        self._ordered(eq, parameters)
+        self._require_order(eq, parameters)
         return total
 
-    def _ordered(self, eq, parameters):
+    def _require_order(self, eq, parameters):
         """Require that groups of the same kind stand in order of inertia."""
         last = {}
         for k, member in enumerate(self.of, 1):

@@ -142,12 +142,12 @@ class Sparrow(Iterative):
         return lambda t, flock: None
 
     @property
-    def perturbed(self) -> float:
+    def perturbation_cost(self) -> float:
         """The simulations that the perturbation of an iteration costs, on average."""
         return 0.0
 
     @property
-    def _foraging(self) -> float:
+    def _foraging_cost(self) -> float:
         """The simulations of Eqs. (11)-(13) in an iteration, on average: producers who perceive
         move twice.
         """
@@ -155,7 +155,7 @@ class Sparrow(Iterative):
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
         flock = Flock(self.initial(box, rng), evaluate, self.acceptance == "better")
-        each = self._foraging + self.perturbed
+        each = self._foraging_cost + self.perturbation_cost
         iterations, steps = self.laid_out(evaluate.budget, self.population, each)
         perturb = self.perturbation(box, iterations, rng)
         yield

@@ -90,14 +90,14 @@ class CovariantSparrow(Iterative):
         _, steps = self.laid_out(evaluate.budget, self.population, self.population)
         yield
         for _ in steps:
-            if self._collapsed(flock, box):
+            if self._has_collapsed(flock, box):
                 flock = Flock(box.uniform(rng, self.population), evaluate, better_only=True)
             else:
                 flock.sort()
-                flock.move(np.arange(self.population), self._proposed(flock.x, rng))
+                flock.move(np.arange(self.population), self._propose_points(flock.x, rng))
             yield
 
-    def _proposed(self, x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    def _propose_points(self, x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Where the sparrows x (n, d), best first, would go."""
         n, p, half = len(x), max(1, round(self.producers * len(x))), len(x) // 2
         way, leader = differences(x, rng), x[rng.integers(0, p, n)]
@@ -108,6 +108,6 @@ class CovariantSparrow(Iterative):
         new[watch] = draw_varied_points(x[0], x[:half], len(watch), rng)
         return mix_coordinates(x, new, self.mixing, rng)
 
-    def _collapsed(self, flock: Flock, box: Box) -> bool:
+    def _has_collapsed(self, flock: Flock, box: Box) -> bool:
         narrow = (np.ptp(flock.x, axis=0) <= self.collapse * box.width).all()
         return bool(narrow or np.ptp(flock.f) <= FLAT_OBJECTIVE * np.abs(flock.f).max())

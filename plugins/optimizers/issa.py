@@ -115,7 +115,7 @@ class ISSA(Sparrow):
         return perturb
 
     @property
-    def perturbed(self) -> float:
+    def perturbation_cost(self) -> float:
         shares = self.gaussian * BETTER, self.tent_perturbation * (1.0 - BETTER)
         # all in one half of the iterations, the best alone in the other
         if self.schedule == "stage":

@@ -41,7 +41,7 @@ class Waveforms(Tabular, WaveformReader):
         check_range("data.frequency", self.frequency, *SIZES["frequency"])
         self.check_table()
 
-    def joined(self) -> Recording:
+    def join_files(self) -> Recording:
         return self.recording()  # the columns of all files are those of one table
 
     def recording(self) -> Recording:

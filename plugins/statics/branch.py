@@ -36,5 +36,5 @@ class Branch(Static):
     def law(self, u, branch_resistance):
         return u**2, u**2
 
-    def damping(self, branch_resistance):
+    def compute_damping(self, branch_resistance):
         return branch_resistance

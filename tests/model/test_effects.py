@@ -81,13 +81,13 @@ def values(name, size=None, **chosen):
 
 def run(name, excitation, chosen, substeps=4):
     """P and Q (N,) with one effect."""
-    response = model(name).simulate(Drive.of([excitation]), chosen, substeps)
+    response = model(name).simulate(Drive.from_events([excitation]), chosen, substeps)
     assert (response.miss == 0).all()
     return response.P[0], response.Q[0]
 
 
 def base(excitation, substeps=4, truth=TRUTH):
-    response = model().simulate(Drive.of([excitation]), truth, substeps)
+    response = model().simulate(Drive.from_events([excitation]), truth, substeps)
     return response.P[0], response.Q[0]
 
 
@@ -115,7 +115,7 @@ def test_many_stack_and_at_their_nulls_are_the_base_model(half):
     null = np.r_[
         TRUTH, [p.default if p.null is None else p.null for p in union.parameters[len(TRUTH) :]]
     ]
-    drive = Drive.of([dip(0.5)])
+    drive = Drive.from_events([dip(0.5)])
     together, alone = union.simulate(drive, null), model().simulate(drive, TRUTH)
     assert np.abs(together.P - alone.P).max() < 1e-12
     assert np.abs(together.Q - alone.Q).max() < 1e-12
@@ -139,7 +139,7 @@ def test_they_stack_in_any_order(seed):
         TRUTH,
         [p.default if p.null is None else 0.3 * halfway(p) for p in one.parameters[len(TRUTH) :]],
     ]
-    drive = Drive.of([dip(0.5)])
+    drive = Drive.from_events([dip(0.5)])
     first, second = one.simulate(drive, chosen), other.simulate(drive, chosen)
     assert one.names == other.names
     assert np.array_equal(first.P, second.P)
@@ -198,7 +198,7 @@ def test_a_candidate_has_the_same_bits_alone_and_among_others(name):
     rng = np.random.default_rng(len(name))
     own = [rng.uniform(*p.bounds, size=7) for p in effect(name).parameters]
     candidates = np.column_stack([np.tile(TRUTH, (7, 1)), *own])
-    drive = Drive.of([dip(0.5)])
+    drive = Drive.from_events([dip(0.5)])
     together = model(name).simulate(drive, candidates)
     for k, one in enumerate(candidates):
         alone = model(name).simulate(drive, one)
@@ -260,7 +260,7 @@ def test_a_feeder_is_refused_before_a_motor_whose_current_bends_with_the_voltage
 def test_a_feeder_fits_before_other_motors(motor):
     whole, bare = model("feeder_impedance", motor=motor), model(motor=motor)
     truth = [dict(zip(model().names, TRUTH, strict=True))[n] for n in bare.names]
-    drive = Drive.of([dip(0.4)])
+    drive = Drive.from_events([dip(0.4)])
     on, off = (whole.simulate(drive, [*truth, *Z]) for Z in ((0.02, 0.06), (0, 0)))
     without = bare.simulate(drive, truth)
     assert np.abs(off.P - without.P).max() < 1e-12
@@ -449,7 +449,7 @@ def test_an_exponent_and_a_share_of_constant_power_stand_for_a_zip_load(shares):
     elsewhere by more.
     """
     u = np.r_[np.ones(50), np.linspace(1.0, 0.3, 200)]
-    drive = Drive.of([event(u)])
+    drive = Drive.from_events([event(u)])
     wanted = np.polyval(shares, u) * np.array([[P0], [Q0]])
     of = model("polynomial_static_load", motor="none")
     scale = np.array([P0, Q0])[:, None]
@@ -471,7 +471,7 @@ def test_an_exponent_and_a_share_of_constant_power_stand_for_a_zip_load(shares):
 def test_what_trips_of_the_static_load_takes_its_share_of_constant_power_with_it():
     held = {"constant_share_P": 0.4, "constant_share_Q": 0.4}
     tripped = {"static_tripped": 0.3, "static_level": 0.7, "static_delay": 0.05}
-    drive = Drive.of([dip(0.5, length=1.0)])
+    drive = Drive.from_events([dip(0.5, length=1.0)])
 
     def power(*names):
         of = model(*names, motor="none")
@@ -823,13 +823,13 @@ def test_measurement_effects_see_each_event_by_itself():
     """The first event's end does not leak into the second's beginning."""
     for name in ("time_skew", "measurement_window", "load_change"):
         on = values(name, halfway)
-        together = model(name).simulate(Drive.of([dip(0.3), dip(0.6)]), on)
-        alone = model(name).simulate(Drive.of([dip(0.6)]), on)
+        together = model(name).simulate(Drive.from_events([dip(0.3), dip(0.6)]), on)
+        alone = model(name).simulate(Drive.from_events([dip(0.6)]), on)
         assert np.array_equal(together.P[:, -alone.P.shape[1] :], alone.P)
 
 
 def test_a_measurement_may_be_off_its_null_in_one_event_only():
-    drive = Drive.of([dip(0.3), dip(0.6)])
+    drive = Drive.from_events([dip(0.3), dip(0.6)])
     plain = model().simulate(drive, TRUTH).outputs[:, 0]
     for name in ("time_skew", "measurement_window", "load_change"):
         by_event = np.array([[values(name)], [values(name, halfway)]])
@@ -845,7 +845,7 @@ def test_a_measurement_is_asked_only_for_candidates_off_their_null():
     for name in ("time_skew", "measurement_window", "load_change"):
         rows, drive = (
             np.array([values(name, halfway), values(name), values(name, halfway)]),
-            Drive.of([dip()]),
+            Drive.from_events([dip()]),
         )
         together, base = (
             model(*names).simulate(drive, some) for names, some in (((name,), rows), ((), TRUTH))

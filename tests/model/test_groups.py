@@ -54,7 +54,9 @@ def drawn(motors, domain, known, *effects):
         t = np.arange(600) * 1e-3
         U = 1 - 0.4 * np.exp(-(((t - 0.2) / 0.05) ** 2))
         made = Excitation(1e-3, U, np.ones(len(t)), np.full(len(t), 0.6), 1.0, 1.0, 0.6)
-    response = of.simulate(Drive.of([made]), np.array([known[name] for name in of.names]), 8)
+    response = of.simulate(
+        Drive.from_events([made]), np.array([known[name] for name in of.names]), 8
+    )
     assert response.miss[0, 0] == 0
     return response.outputs[:, 0]
 
@@ -104,7 +106,7 @@ def test_each_group_has_its_parameters():
 
 def test_groups_of_the_same_motor_stand_in_order_of_inertia():
     of = model(("electromechanical",) * 2, "phasors")
-    drive = Drive.of([Excitation(1e-3, np.ones(5), np.ones(5), np.ones(5), 1.0, 1.0, 0.6)])
+    drive = Drive.from_events([Excitation(1e-3, np.ones(5), np.ones(5), np.ones(5), 1.0, 1.0, 0.6)])
     swapped = np.array([(TWO | {f"{n}_2": v for n, v in ONE.items()})[name] for name in of.names])
     assert of.refusal(swapped, drive) == (
         "groups of the same motor stand in order of inertia: M may not exceed M_2, and it is larger"
@@ -118,7 +120,7 @@ def test_groups_of_the_same_motor_stand_in_order_of_inertia():
 
 def test_a_steady_state_that_a_group_lacks_names_the_group():
     of = model(("electromechanical",) * 2, "phasors")
-    drive = Drive.of([Excitation(1e-3, np.ones(5), np.ones(5), np.ones(5), 1.0, 1.0, 0.6)])
+    drive = Drive.from_events([Excitation(1e-3, np.ones(5), np.ones(5), np.ones(5), 1.0, 1.0, 0.6)])
     refusal = of.refusal(np.array([(BOTH | {"T_m_2": 0.95})[name] for name in of.names]), drive)
     assert refusal.startswith("of motor group 2: no steady state exists before the event")
 

@@ -35,8 +35,11 @@ def computed(expression, x, y=None, width=None):
     n = Numbers(f, width or VECTOR_LANES)
     with f.loop(0, "%n", n.width) as i:
         left = f.integer("sub", "%n", i)
-        known = {X: n.part(f.at("%x", i), left), Y: n.part(f.at("%y", i), left)}
-        n.store_part(Expressions(n, known)(expression), f.at("%out", i), left)
+        known = {
+            X: n.part(f.offset_address("%x", i), left),
+            Y: n.part(f.offset_address("%y", i), left),
+        }
+        n.store_part(Expressions(n, known)(expression), f.offset_address("%out", i), left)
     text = "\n".join(
         [*f.intrinsics.values(), f.text("define void @run(ptr %x, ptr %y, ptr %out, i64 %n)")]
     )
@@ -211,7 +214,7 @@ def drive():
     one = Excitation(
         1e-2, 1 - 0.3 * (abs(t - 0.1) < 0.05), np.ones(30), np.full(30, 0.6), 1.0, 1.0, 0.6
     )
-    return Drive.of([one, one])
+    return Drive.from_events([one, one])
 
 
 def arguments(model, drive, n=9):
@@ -221,7 +224,7 @@ def arguments(model, drive, n=9):
         "event": drive.event,
         "first": drive.first,
         "inputs": drive.inputs,
-        "measured": drive.measured,
+        "measured": drive.measurements,
         "weights": drive.weights,
         "substeps": np.ones(2, dtype=np.int64),
         "sums": np.empty((2, 2, n)),
@@ -359,7 +362,7 @@ def test_an_expression_is_printed_whole_up_to_so_many_nodes(more):
 
 
 def test_a_kernel_is_printed_for_people(model):
-    told = model.listing()
+    told = model.format_listing()
     assert "in each stage of a step:" in told
     assert "d omega/dt = " in told
     assert "define void @run(" in told
@@ -373,7 +376,9 @@ def test_the_steady_state_is_told_and_is_one(drive):
     values = np.array([p.default for p in model.parameters])
     starts = model.kernel.starts(model._candidates(drive, values), drive.event)
     assert np.array_equal(starts[0], starts[1])
-    flat = Drive.of([Excitation(1e-2, np.ones(50), np.ones(50), np.full(50, 0.6), 1.0, 1.0, 0.6)])
+    flat = Drive.from_events(
+        [Excitation(1e-2, np.ones(50), np.ones(50), np.full(50, 0.6), 1.0, 1.0, 0.6)]
+    )
     assert np.ptp(model.simulate(flat, values).P) < 1e-12
 
 

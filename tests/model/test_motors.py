@@ -159,7 +159,7 @@ def play(of, excitation, parameters, names=("P_motor", "Q_motor"), rtol=1e-11):
 @pytest.mark.parametrize("motor", MOTORS)
 def test_the_kernel_agrees_with_dop853(motor):
     of, excitation = model(motor, "none"), dip(length=0.4, swing=2.0)
-    response = of.simulate(Drive.of([excitation]), values(of), 16)
+    response = of.simulate(Drive.from_events([excitation]), values(of), 16)
     _, (P, Q) = play(of, excitation, values(of))
     assert np.abs(response.P[0] - P).max() < 1e-8
     assert np.abs(response.Q[0] - Q).max() < 1e-8
@@ -255,7 +255,7 @@ def test_the_steady_state_is_the_equivalent_circuit(motor):
 
 def gap(a, b, excitation, changed_a, changed_b, substeps=64):
     """Largest difference of P and Q between two motors on one event."""
-    drive = Drive.of([excitation])
+    drive = Drive.from_events([excitation])
     left = model(a).simulate(drive, values(model(a), **changed_a), substeps)
     right = model(b).simulate(drive, values(model(b), **changed_b), substeps)
     assert left.miss[0, 0] == right.miss[0, 0] == 0
@@ -331,7 +331,7 @@ def test_an_oscillation_at_supply_frequency_follows_a_sudden_dip_in_the_fifth_or
     spectra = {}
     for motor in ("electromechanical", "stator_flux"):
         of = model(motor, "none")
-        Q = of.simulate(Drive.of([excitation]), values(of), 8).Q[0, 230:330]
+        Q = of.simulate(Drive.from_events([excitation]), values(of), 8).Q[0, 230:330]
         spectra[motor] = np.abs(np.fft.rfft((Q - Q.mean()) * np.hanning(100)))[3:10]  # 30 .. 90 Hz
     assert np.argmax(spectra["stator_flux"]) + 3 == 5  # 50 Hz
     assert spectra["stator_flux"].max() > 20 * spectra["electromechanical"].max()
@@ -359,8 +359,8 @@ def test_the_lists_above_are_all_there_is():
 )
 def test_values_without_a_steady_state_get_a_sentence(motor, changed, sentence):
     of = model(motor)
-    assert sentence in of.refusal(values(of, **changed), Drive.of([dip()]))
-    assert of.errors(Drive.of([dip()]), values(of, **changed)).refused[0]
+    assert sentence in of.refusal(values(of, **changed), Drive.from_events([dip()]))
+    assert of.errors(Drive.from_events([dip()]), values(of, **changed)).is_refused[0]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -384,7 +384,7 @@ def test_the_double_cage_finds_the_stable_slip_where_there_is_one(seed):
     # of the first cage; past it a motor crawls, and is not meant
     strongest = S.real[np.arange(len(rows)), peak]
     near = carried & (strongest > 1.02 * p["T_m"][:, 0])
-    response = of.simulate(Drive.of([dip(length=0.01)]), rows, 64)
+    response = of.simulate(Drive.from_events([dip(length=0.01)]), rows, 64)
     found = response.miss[0] == 0
     assert near.sum() > 100
     # a shoulder of the torque curve may stop Newton's method: refused, not wrong

@@ -80,7 +80,7 @@ def test_rows_of_the_records_are_the_same_beside_a_prior(problem):
         beside[:, rows.shape[1] :], 3 * departures(problem, squares.values(unit))
     )
     np.testing.assert_array_equal(held.of_records.rows(unit), rows)
-    assert held.scaled(2.0).prior == 1.5
+    assert held.scale_noise(2.0).prior == 1.5
 
 
 def test_a_parameter_that_the_prior_alone_holds_scatters_as_it_says(problem):

@@ -42,8 +42,8 @@ def test_eq_8_is_the_sum_of_squares_and_holds_the_power_before():
     assert rows @ rows * 0.01**2 / case.drive.samples == pytest.approx(
         case.objective(study.TYPICAL[None])[0], rel=1e-9
     )
-    assert squares.apart.count == 0
-    assert squares.with_initial_power.placed(unit).shape == (1, 9)
+    assert squares.separable_columns.count == 0
+    assert squares.with_initial_power.place_parameters(unit).shape == (1, 9)
 
 
 def test_blocks_hold_every_sample_once_and_begin_with_the_dip():
@@ -75,7 +75,7 @@ def test_leaving_out_a_block_is_what_a_refit_without_it_gives():
         before = np.arange(event.steady.start, event.steady.stop)
         rest = before[(before < block.start) | (before >= block.stop)]
         other = Problem(case.model, [event], substeps=int(case.step.substeps[0]))
-        other.drive.before[0] = other.drive.measured[:, rest].mean(axis=1)
+        other.drive.before[0] = other.drive.measurements[:, rest].mean(axis=1)
         part = Likelihood(problem=other, noise=squares.noise, valid=known, initial_power=False)
         moved.append(descend(part.rows, unit[None], tolerance=1e-9).unit[0] - unit)
     errors = np.sqrt((len(blocks) - 1) / len(blocks) * np.sum(np.square(moved), axis=0)) * (
@@ -96,7 +96,7 @@ def test_of_white_noise_it_is_near_the_usual_error_and_of_correlated_residuals_a
             error = study.noise(rng, 1000, NOISE, phi)
             squares, unit = least_squares(problem(error, seed=seed))
             left = float(np.sqrt(np.mean(squares.rows(unit[None])[0] ** 2)))
-            each.append(scatter(squares.scaled(left), unit).ratio)
+            each.append(scatter(squares.scale_noise(left), unit).ratio)
         ratios.append(np.median(each, axis=0))
     assert (ratios[0] < 1.6).all()
     assert (ratios[1][[0, 3, 4, 5]] > 1.5 * ratios[0][[0, 3, 4, 5]]).all()
@@ -195,7 +195,7 @@ class Silent(Likelihood):
 
 def test_the_power_before_is_free_around_what_was_measured_and_stands_there_at_first():
     case = problem()
-    free = Likelihood.of(case).free_set
+    free = Likelihood.from_problem(case).free_set
     (P, Q), reach = case.drive.before[0], 0.2 * np.linalg.norm(case.drive.before[0])
     assert free.names[-2:] == ("P0[1]", "Q0[1]")
     assert free.box.lower[free.before] == pytest.approx([P - reach, Q - reach])

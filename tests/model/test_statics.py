@@ -46,7 +46,7 @@ SHARES = VOLTAGES / 0.98
     ],
 )
 def test_a_static_load_alone_is_its_formula(static, values, P, Q):
-    response = alone(static).simulate(Drive.of([event(VOLTAGES)]), np.array([values]))
+    response = alone(static).simulate(Drive.from_events([event(VOLTAGES)]), np.array([values]))
     assert response.P[0] == pytest.approx(0.8 * P, rel=1e-11)
     assert response.Q[0] == pytest.approx(0.5 * Q, rel=1e-11)
 
@@ -69,7 +69,7 @@ class Dimmed(Static):
 
 def test_a_law_in_pieces_is_its_formula():
     load = compose(get("model/motor", "none")(), Dimmed())
-    response = load.simulate(Drive.of([event(VOLTAGES)]), np.array([[0.7]]))
+    response = load.simulate(Drive.from_events([event(VOLTAGES)]), np.array([[0.7]]))
     P = np.where(SHARES < 0.3, 0.0, np.where(SHARES < 0.7, (SHARES - 0.3) / 0.4, 1.0))
     assert response.P[0] == pytest.approx(0.8 * P, rel=1e-11)
     assert response.Q[0] == pytest.approx(0.5 * SHARES**2, rel=1e-11)
@@ -79,20 +79,22 @@ def test_a_law_in_pieces_is_its_formula():
 def test_a_law_in_pieces_stands_beside_a_motor(motor):
     load = compose(get("model/motor", motor)(), Dimmed())
     values = np.array([[p.default for p in load.parameters]])
-    assert np.isfinite(load.simulate(Drive.of([event(np.full(5, 0.98), P0=1.0)]), values).P).all()
+    assert np.isfinite(
+        load.simulate(Drive.from_events([event(np.full(5, 0.98), P0=1.0)]), values).P
+    ).all()
 
 
 def test_the_frequency_exponent_counts_from_the_frequency_before_the_event():
     speed = np.array([-2.0, 0.0, 3.0, -8.0, 5.0])
     ratio = (2 * np.pi * 50 + speed) / (2 * np.pi * 50 - 2.0)
-    drive = Drive.of([event(VOLTAGES, omega_s=speed, omega_s0=-2.0)])
+    drive = Drive.from_events([event(VOLTAGES, omega_s=speed, omega_s0=-2.0)])
     response = alone("exponential_frequency").simulate(drive, [[1.3, 2.6, 1.7, -2.2]])
     assert response.P[0] == pytest.approx(0.8 * SHARES**1.3 * ratio**1.7, rel=1e-11)
     assert response.Q[0] == pytest.approx(0.5 * SHARES**2.6 * ratio**-2.2, rel=1e-11)
 
 
 def test_without_a_recorded_frequency_its_exponents_change_nothing():
-    drive = Drive.of([event(VOLTAGES)])
+    drive = Drive.from_events([event(VOLTAGES)])
     response = alone("exponential_frequency").simulate(
         drive, [[1.3, 2.6, 1.7, -2.2], [1.3, 2.6, 0.0, 3.0]]
     )
@@ -117,7 +119,7 @@ def test_zip_and_exponential_agree_at_the_voltage_before_the_event_in_value_and_
     """p_v = 2 a_Z + a_I: the difference vanishes with the square of the distance from U_0."""
     differences = []
     for distance in (1e-2, 1e-3):
-        drive = Drive.of([event([0.98, 0.98 * (1 - distance), 0.98 * (1 + distance)])])
+        drive = Drive.from_events([event([0.98, 0.98 * (1 - distance), 0.98 * (1 + distance)])])
         zip_load = alone("zip").simulate(drive, [[0.3, 0.5, 0.2, 0.3]])
         exponential = alone("exponential").simulate(drive, [[2 * 0.3 + 0.5, 2 * 0.2 + 0.3]])
         gap = np.abs(np.stack([zip_load.P - exponential.P, zip_load.Q - exponential.Q]))
@@ -137,7 +139,7 @@ def test_zip_and_exponential_agree_at_the_voltage_before_the_event_in_value_and_
     ],
 )
 def test_the_presets_are_special_cases(special, general, values):
-    drive = Drive.of([event(VOLTAGES, omega_s=np.linspace(-3, 3, 5))])
+    drive = Drive.from_events([event(VOLTAGES, omega_s=np.linspace(-3, 3, 5))])
     own = values[:2] if special == "exponential" else []
     left, right = alone(special).simulate(drive, [own]), alone(general).simulate(drive, [values])
     assert pytest.approx(right.P, rel=1e-11) == left.P
@@ -153,9 +155,9 @@ def test_the_presets_are_special_cases(special, general, values):
     ],
 )
 def test_shares_that_do_not_add_up_get_a_sentence_and_are_refused(values, sentence):
-    of, drive = alone("zip"), Drive.of([event(VOLTAGES)])
+    of, drive = alone("zip"), Drive.from_events([event(VOLTAGES)])
     assert sentence in of.refusal(np.array(values), drive)
-    assert of.errors(drive, [values]).refused[0]
+    assert of.errors(drive, [values]).is_refused[0]
 
 
 @pytest.mark.parametrize(
@@ -168,15 +170,17 @@ def test_shares_that_do_not_add_up_get_a_sentence_and_are_refused(values, senten
 def test_a_motor_alone_cannot_meet_power_that_is_fed_back(P0, Q0, named):
     of = compose(get("model/motor", "electromechanical")(), get("model/static", "none")())
     values = np.array([p.default for p in of.parameters])
-    drive = Drive.of([event(VOLTAGES, P0=P0, Q0=Q0)])
+    drive = Drive.from_events([event(VOLTAGES, P0=P0, Q0=Q0)])
     assert named in of.refusal(values, drive)
     assert "choose a static load" in of.refusal(values, drive)
-    assert of.errors(drive, values).refused[0]
+    assert of.errors(drive, values).is_refused[0]
 
 
 def test_a_motor_alone_draws_its_own_power_before_the_event():
     of = compose(get("model/motor", "electromechanical")(), get("model/static", "none")())
-    response = of.simulate(Drive.of([event(np.full(20, 0.98))]), [[0.1, 0.3, 0.9, 0.005, 0.37]])
+    response = of.simulate(
+        Drive.from_events([event(np.full(20, 0.98))]), [[0.1, 0.3, 0.9, 0.005, 0.37]]
+    )
     assert response.P[0] == pytest.approx(np.full(20, 0.37), abs=1e-12)
 
 

@@ -136,9 +136,9 @@ def test_information_of_a_straight_line_is_the_textbooks():
     """y = a + b x: the variances of regression, once with the level as a nuisance."""
     x = np.linspace(0, 1, 50)
     J = np.column_stack((np.ones(50), x))
-    whole = Information.of(("a", "b"), np.ones(2), np.ones(2), J, np.zeros((50, 1)))
+    whole = Information.from_jacobian(("a", "b"), np.ones(2), np.ones(2), J, np.zeros((50, 1)))
     np.testing.assert_allclose(whole.covariance, np.linalg.inv(J.T @ J), rtol=1e-9)
-    slope = Information.of(("b",), np.ones(1), np.ones(1), J[:, 1:], J[:, :1])
+    slope = Information.from_jacobian(("b",), np.ones(1), np.ones(1), J[:, 1:], J[:, :1])
     assert slope.standard_errors[0] == pytest.approx(whole.standard_errors[1], rel=1e-9)
 
 
@@ -170,7 +170,7 @@ def test_jacobian_agrees_with_the_printed_equations(model):
     events = [replace(records((0.5,), 0.005)[0], U0=1.0)]
     problem = Problem(model, events, substeps=16)
     white = Noise.white(1.0, 1.0)
-    likelihood = Likelihood.of(problem, white)
+    likelihood = Likelihood.from_problem(problem, white)
     t, U = events[0].record.t, events[0].record.U
     _, J = likelihood.jacobian(likelihood.to_unit(study.TYPICAL)[0])
     for j, name in enumerate(study.NAMES):
@@ -183,7 +183,7 @@ def test_jacobian_agrees_with_the_printed_equations(model):
             sides.append(np.concatenate((P, Q + (events[0].Q0 - Q[0]) * U ** moved[6])))
         expected = (sides[0] - sides[1]) / (2 * h) * (problem.upper - problem.lower)[j]
         np.testing.assert_allclose(
-            J.shared[:, j], expected, atol=1e-4 * np.abs(expected).max(), err_msg=name
+            J.shared_columns[:, j], expected, atol=1e-4 * np.abs(expected).max(), err_msg=name
         )
 
 
@@ -360,7 +360,7 @@ def test_a_jacobian_takes_as_many_simulations_for_many_events_and_no_more_fits(m
     assert taken == [2 * (uncertainty.likelihood.free + 2) + 1]
     assert J.columns.shape == (
         uncertainty.likelihood.free + 2,
-        uncertainty.likelihood.problem.drive.measured.size,
+        uncertainty.likelihood.problem.drive.measurements.size,
     )
     only, fits = agreement.only, []
     monkeypatch.setattr(
@@ -396,7 +396,7 @@ def test_the_gain_of_an_event_is_that_of_all_rows_against_those_without_its_own(
 
     def errors(rows):
         own, nuisances = J[rows][:, : likelihood.free], J[rows][:, likelihood.free :]
-        information = Information.of(
+        information = Information.from_jacobian(
             known.names, known.values, known.upper - known.lower, own, nuisances
         )
         return information.standard_errors
@@ -404,18 +404,19 @@ def test_the_gain_of_an_event_is_that_of_all_rows_against_those_without_its_own(
     whole = errors(np.arange(len(J)))
     for e, gain in enumerate(gains.values()):
         assert list(gain.values()) == pytest.approx(
-            errors(np.setdiff1d(np.arange(len(J)), likelihood.apart.rows[e])) / whole, rel=1e-9
+            errors(np.setdiff1d(np.arange(len(J)), likelihood.separable_columns.rows[e])) / whole,
+            rel=1e-9,
         )
 
 
 def test_the_normal_equations_of_the_likelihood_are_those_of_every_column_by_itself(model):
     """P0 and Q0 of each event stand in columns of their own, which are never written out."""
-    likelihood = Likelihood.of(Problem(model, records((0.3, 0.5), 0.003)))
+    likelihood = Likelihood.from_problem(Problem(model, records((0.3, 0.5), 0.003)))
     unit, lanes = likelihood.to_unit(study.TYPICAL), np.zeros(1, dtype=int)
     base = likelihood.rows(unit)
     alone, together = (
         normal(likelihood.rows, unit, base, lanes, apart)
-        for apart in (NOT_SEPARABLE, likelihood.apart)
+        for apart in (NOT_SEPARABLE, likelihood.separable_columns)
     )
     for one, other in (alone[0], together[0]), (dense_normal(alone[1]), dense_normal(together[1])):
         assert other == pytest.approx(one, rel=1e-6, abs=1e-6 * np.abs(one).max())
@@ -437,7 +438,7 @@ def test_what_a_requirement_of_the_model_holds_is_not_called_without_effect():
     load = tractexp.compose({"motor": "electromechanical", "static": "zip"}).model
     problem = Problem(load, records((0.5,), 0.002))
     values = np.array([{"a_Z": 1.0, "a_I": 0.0}.get(p.name, p.default) for p in load.parameters])
-    likelihood = Likelihood.of(problem, Noise.white(0.003, 0.003))
+    likelihood = Likelihood.from_problem(problem, Noise.white(0.003, 0.003))
     known = conclude(likelihood, likelihood.to_unit(values)[0])
     assert known.information.held == ("a_I",)
     assert str(known.verdicts["a_I"]).endswith(

@@ -50,7 +50,7 @@ STACK = (
     "harmonics_source",
 )
 DIP = drives.wave_dip(0.5)
-DIPS = Drive.of([DIP])
+DIPS = Drive.from_events([DIP])
 
 
 def effect(name):
@@ -182,7 +182,7 @@ def test_a_feeder_and_a_capacitor_ring_at_their_resonance():
     step = np.where(np.arange(n) < 600, 1.0, 0.9)
     for array, values in ((still.v, step), (still.U, step)):
         array[:] = values
-    drive = Drive.of([still])
+    drive = Drive.from_events([still])
     seen, _ = run("feeder_impedance", "shunt_capacitor", X_f=0.12, capacitor=1.0, drive=drive)
     ringing = (seen * still.turn)[620:1100] - (
         run("shunt_capacitor", capacitor=1.0, drive=drive)[0] * still.turn
@@ -232,7 +232,7 @@ def test_a_resonant_branch_is_its_resistance_inductance_and_capacitor():
 
 
 def test_a_resonant_branch_rings_at_its_frequency_until_its_time_is_over():
-    drive = Drive.of([drives.wave_dip(0.3, rate=12800.0, length=0.4)])
+    drive = Drive.from_events([drives.wave_dip(0.3, rate=12800.0, length=0.4)])
     chosen = {"resonant_susceptance": 0.3, "resonance_frequency": 190.0, "ringing_time": 0.02}
     ringing = run("resonant_branch", drive=drive, **chosen)[0] - run(drive=drive)[0]
     turned = (ringing - ringing[-1]) * drives.wave_dip(0.3, rate=12800.0, length=0.4).turn
@@ -267,7 +267,7 @@ def test_a_second_group_is_two_motors_side_by_side():
 
 def test_a_trip_takes_its_share_of_the_currents():
     chosen = {"tripped_share": 0.4, "trip_level": 0.8, "trip_delay": 0.01}
-    drive = Drive.of([drives.wave_dip(0.6)])
+    drive = Drive.from_events([drives.wave_dip(0.6)])
     names = ("undervoltage_trip", "zero_sequence_path")
     i, zero = run(*names, drive=drive, zero_susceptance=10.0, **chosen)
     whole, whole_zero = run("zero_sequence_path", drive=drive, zero_susceptance=10.0)
@@ -345,7 +345,7 @@ def test_a_saturated_current_transformer_loses_what_its_core_takes():
 
 def test_a_power_that_is_held_is_the_conjugate_path_to_first_order():
     """i = conj(S/v) less its value before is -conj(S) conj(dv) for a small dv that moves slowly."""
-    drive = Drive.of([drives.wave_dip(0.01, edge=0.04)])
+    drive = Drive.from_events([drives.wave_dip(0.01, edge=0.04)])
     chosen = {"conjugate_conductance": -0.5, "conjugate_susceptance": 0.2, "conjugate_lag": 3e-4}
     extra = (
         run("negative_sequence_path", drive=drive, substeps=16, **chosen)[0] - run(drive=drive)[0]
@@ -392,7 +392,7 @@ def test_harmonics_of_the_record_go_on_through_the_dip():
     measured = bare * DIP.turn + fifth
     recorded = np.stack([measured.real, measured.imag, np.zeros(896)])
     recorded[:, :64] = np.nan
-    drive = Drive.of([dataclasses.replace(DIP, currents=recorded)])
+    drive = Drive.from_events([dataclasses.replace(DIP, currents=recorded)])
     seen = run("harmonics_source", drive=drive, harmonics=1.0)[0]
     added = (seen - bare) * DIP.turn
     learnt = slice(64, 193)  # the two cycles they are found in stand as they are

@@ -109,7 +109,10 @@ def test_channels_on_other_clocks_are_moved_by_their_skew():
     late = [replace(c, skew=2e-5) if "I" in c.name else c for c in made.channels]
     made = replace(made, channels=late)
     feeder = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
-    assert FeederWaves.of(made, feeder, made.segments[0]).late.tolist() == [0.0] * 3 + [2e-5] * 3
+    assert (
+        FeederWaves.from_recording(made, feeder, made.segments[0]).late.tolist()
+        == [0.0] * 3 + [2e-5] * 3
+    )
 
 
 def test_every_dip_of_a_file_is_an_event_of_its_own(tmp_path):
@@ -128,7 +131,7 @@ def test_a_single_phase_feeder_is_read_and_fitted(tmp_path):
     (dip,) = tractexp.read(path, connection="single_phase")
     event = in_waves(dip)
     assert event.phases == 1
-    assert event.compared == (True, False, False)
+    assert event.compared_channels == (True, False, False)
     np.testing.assert_allclose(np.abs(event.v[event.steady]), event.U0, rtol=2e-3)
     fit = tractexp.identify(
         dip,

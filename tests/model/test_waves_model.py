@@ -64,7 +64,9 @@ def values(of, **changed):
 
 def played(of, made, chosen=None, substeps=16):
     """The currents (3, N) of one candidate."""
-    response = of.simulate(Drive.of([made]), values(of) if chosen is None else chosen, substeps)
+    response = of.simulate(
+        Drive.from_events([made]), values(of) if chosen is None else chosen, substeps
+    )
     assert response.miss[0, 0] == 0
     return response.outputs[:, 0]
 
@@ -160,7 +162,9 @@ def test_a_voltage_turned_by_an_angle_gives_currents_turned_by_it(angle):
     of, whole = model("stator_flux", "branch", "shunt"), np.exp(1j * angle)
     made = event(dip(0.4, jump=0.5, negative=0.2), length=0.2)
     turned = event(dip(0.4, jump=0.5, negative=0.2), length=0.2, angle=angle)
-    one, other = (vector(of.simulate(Drive.of([e]), values(of), 4)) for e in (made, turned))
+    one, other = (
+        vector(of.simulate(Drive.from_events([e]), values(of), 4)) for e in (made, turned)
+    )
     assert other == pytest.approx(one * whole, abs=1e-12)
 
 
@@ -188,7 +192,7 @@ def test_an_offset_decays_where_the_stator_has_a_resistance():
     left = []
     for effects in ((), ("stator_resistance",)):
         of = model("double_cage", "none", *effects)
-        current = vector(of.simulate(Drive.of([made]), values(of), 4))
+        current = vector(of.simulate(Drive.from_events([made]), values(of), 4))
         left.append(abs(current[-100:].mean()))
     assert left[0] > 0.3
     assert left[1] < 0.01 * left[0]
@@ -214,7 +218,7 @@ def test_before_the_event_nothing_moves(names):
     made = event(
         lambda t: U0 * np.exp(2j * np.pi * 49.6 * t), f0=49.6, U0=U0, length=0.3, rate=2000.0
     )
-    current = vector(of.simulate(Drive.of([made]), values(of), 8)) / made.turn
+    current = vector(of.simulate(Drive.from_events([made]), values(of), 8)) / made.turn
     assert np.abs(current - current[0]).max() < 1e-9
     if names[1] != "none":  # what is recorded before is drawn before
         assert U0 * np.conj(current[0]) == pytest.approx(made.P0 + 1j * made.Q0, abs=1e-9)
@@ -274,7 +278,9 @@ def test_laws_of_a_constant_impedance_are_one_circuit():
 def test_a_constant_power_is_drawn_once_half_a_cycle_has_passed():
     of = model("none", "constant_power")
     made = event(dip(0.4, end=10.0, edge=0.002), length=0.6, Q0=0.0)
-    power = made.v * np.conj(vector(of.simulate(Drive.of([made]), values(of), 4)) / made.turn)
+    power = made.v * np.conj(
+        vector(of.simulate(Drive.from_events([made]), values(of), 4)) / made.turn
+    )
     t = times(made)
     assert np.abs(power[t > 0.0121] - 1).max() < 1e-9
     # its admittance is as before
@@ -300,7 +306,7 @@ def test_input_power_is_losses_and_shaft_power_and_what_is_stored(names):
     before = dict(
         U0=1.0, U=0.8, omega_s0=0.0, omega_s=0.0, omega_n=OMEGA, P0=1.0, Q0=0.6, step=1e-3
     )
-    at_rest = of.at_rest(values(of), Drive.of([event(dip())]))
+    at_rest = of.at_rest(values(of), Drive.from_events([event(dip())]))
     x = dict(zip(states, rng.normal(0, 0.5, len(states)), strict=True))
     v = complex(*rng.normal(0, 1, 2))
     known = (
@@ -374,13 +380,13 @@ def test_a_slow_symmetric_dip_draws_the_power_that_phasors_say():
     gaps = []
     for edge in (0.05, 0.2, 0.8):
         made = event(dip(0.3, end=1.0, edge=edge), length=2.0, rate=2000.0)
-        current = vector(waves.simulate(Drive.of([made]), values(waves), 4)) / made.turn
+        current = vector(waves.simulate(Drive.from_events([made]), values(waves), 4)) / made.turn
         S = made.v * np.conj(current)
         n = len(made.v)
         still = Excitation(
             made.step, made.v.real.copy(), np.ones(n), np.full(n, 0.6), 1.0, 1.0, 0.6
         )
-        plain = phasors.simulate(Drive.of([still]), values(phasors), 4)
+        plain = phasors.simulate(Drive.from_events([still]), values(phasors), 4)
         gaps.append(np.abs(S - plain.P[0] - 1j * plain.Q[0]).max())
     assert gaps[0] > 5e-3
     assert gaps[1] < 0.4 * gaps[0]

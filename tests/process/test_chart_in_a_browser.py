@@ -19,7 +19,7 @@ BLUE = "#0072B2"
 def test_a_folded_chart_is_drawn_when_it_is_opened(tmp_path, opened):
     page, chart = Report("charts"), Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE)
     page.chart(chart, "shown")
-    with page.folded("more"):
+    with page.fold_blocks("more"):
         page.chart(chart, "folded")
     if opened:
         page.add(

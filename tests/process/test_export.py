@@ -92,11 +92,11 @@ def test_the_circuit_of_two_cages_gives_back_what_was_identified(seed):
 def test_the_circuit_draws_what_the_model_draws_before_the_event():
     """The T-circuit at the exported slip, by impedances alone."""
     load = identified()
-    c, slip = load.circuit, -load.before["omega_before"] / OMEGA
+    c, slip = load.circuit, -load.steady_state["omega_before"] / OMEGA
     rotor = c.R_1 / slip + 1j * c.X_1
     S = 0.98**2 / np.conj(1j * c.X_s + 1j * c.X_m * rotor / (1j * c.X_m + rotor))
     assert S.real == pytest.approx(VALUES["T_m"], rel=1e-9)
-    assert S.imag == pytest.approx(load.before["Q_motor"], rel=1e-9)
+    assert S.imag == pytest.approx(load.steady_state["Q_motor"], rel=1e-9)
 
 
 @pytest.mark.parametrize("motor", ["electromechanical", "double_cage", "none"])
@@ -156,7 +156,9 @@ def test_the_dyr_static_load_is_its_law(static):
     U = np.array([0.98, 0.8, 0.5, 1.05])
     event = Excitation(1e-3, U, U, U, 0.98, 1.0, 0.6)
     of = identified("none", static)
-    response = of.model.simulate(Drive.of([event]), [[of.values[name] for name in of.model.names]])
+    response = of.model.simulate(
+        Drive.from_events([event]), [[of.values[name] for name in of.model.names]]
+    )
     for power, start, exponents, before in ((response.P, 0, 8, 1.0), (response.Q, 3, 11, 0.6)):
 
         def law(V, start=start, exponents=exponents):
@@ -223,7 +225,7 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
     P, Q = np.array(rows).T
     event = Excitation(2e-3, U, P, Q, 0.98, 1.0, 0.6, speed, 0.0, OMEGA)
     response = load.model.simulate(
-        Drive.of([event]), [[load.values[name] for name in load.model.names]], 16
+        Drive.from_events([event]), [[load.values[name] for name in load.model.names]], 16
     )
     assert pytest.approx(P, abs=1e-6) == response.P[0]
     assert pytest.approx(Q, abs=1e-6) == response.Q[0]
@@ -410,7 +412,7 @@ def test_an_export_played_back_by_its_own_numbers_follows_the_fit(
         build("format", {"name": name}),
         identified(motor, static, effects, power=47.0, ratio=0.7),
     )
-    monkeypatch.setattr(type(form), "simulated", lambda *_: None)
+    monkeypatch.setattr(type(form), "play_back_dip", lambda *_: None)
     agreement, notes = play_back_export(form, form.text(load), load)
     assert notes == []
     assert agreement.moved[0] > 0.15
@@ -430,7 +432,7 @@ def test_a_file_that_holds_another_load_is_seen_when_it_is_played_back(
     name, right, wrong, monkeypatch
 ):
     form, load = build("format", {"name": name}), identified()
-    monkeypatch.setattr(type(form), "simulated", lambda *_: None)
+    monkeypatch.setattr(type(form), "play_back_dip", lambda *_: None)
     text = form.text(load)
     assert right in text
     assert play_back_export(form, text.replace(right, wrong, 1), load)[0].share > 0.01
@@ -439,7 +441,7 @@ def test_a_file_that_holds_another_load_is_seen_when_it_is_played_back(
 def test_what_a_format_leaves_out_is_in_the_agreement(monkeypatch):
     """The stator's transients, which the machines of ANDES lack."""
     form, load = build("format", {"name": "andes"}), identified("stator_flux")
-    monkeypatch.setattr(type(form), "simulated", lambda *_: None)
+    monkeypatch.setattr(type(form), "play_back_dip", lambda *_: None)
     assert play_back_export(form, form.text(load), load)[0].share > 1e-4
 
 
@@ -492,7 +494,7 @@ def test_where_the_simulator_fails_ours_plays_the_file_back_and_it_is_said(monke
     def fails(*_):
         raise UserError("not played back in ANDES: it said nothing")
 
-    monkeypatch.setattr(type(form), "simulated", fails)
+    monkeypatch.setattr(type(form), "play_back_dip", fails)
     agreement, notes = play_back_export(form, form.text(load), load)
     assert notes == ["not played back in ANDES: it said nothing"]
     assert agreement.by.startswith("our own simulator")

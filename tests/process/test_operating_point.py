@@ -34,7 +34,7 @@ def test_the_impedance_of_the_circuit_is_that_of_its_operational_reactance(slip)
 
 def test_the_motor_draws_what_its_circuit_draws_at_its_slip():
     result = fitted()
-    point, circuit = OperatingPoint.of(result), identified().circuit
+    point, circuit = OperatingPoint.from_result(result), identified().circuit
     drawn = result.before["U0"] ** 2 / np.conj(circuit.impedance(point.slip) - circuit.R_s)
     assert (point.P_motor, point.Q_motor) == pytest.approx((drawn.real, drawn.imag), rel=1e-6)
     S = abs(drawn)
@@ -45,12 +45,12 @@ def test_the_motor_draws_what_its_circuit_draws_at_its_slip():
 
 
 def test_it_is_said_in_megawatts_where_the_base_is_in_them():
-    point = OperatingPoint.of(
+    point = OperatingPoint.from_result(
         fitted({"power": 29.7, "file_power": 100.0, "in_mva": True, "origin": "file"})
     )
     assert point.units == ("MW", "Mvar")
     assert pytest.approx(29.7) == point.P
-    assert pytest.approx(29.7 * OperatingPoint.of(fitted()).P_motor) == point.P_motor
+    assert pytest.approx(29.7 * OperatingPoint.from_result(fitted()).P_motor) == point.P_motor
     assert f"motor {point.P_motor:.4g} MW and {point.Q_motor:.4g} Mvar" in str(point)
 
 
@@ -75,7 +75,7 @@ def test_a_motor_that_no_load_has_is_doubted_and_its_export_asked_for(parameters
         result, adequacy={"grade": "effect_missing", "sentence": "it fits"}
     )
     fit = Identification(result)
-    assert doubt in OperatingPoint.of(result).doubt
+    assert doubt in OperatingPoint.from_result(result).doubt
     assert bool(doubt) == (fit.headline != "it fits")
     refused = pytest.raises(
         UserError, match=r"is no physical load: the motor draws .*doubtful=true exports it all"
@@ -110,7 +110,7 @@ def test_a_parameter_that_a_bound_holds_is_exported_when_asked_for_only():
 
 
 def test_a_load_without_a_motor_has_no_such_point():
-    assert OperatingPoint.of(identified(motor="none").result) is None
+    assert OperatingPoint.from_result(identified(motor="none").result) is None
 
 
 def test_a_load_without_active_power_has_no_share_of_it():

@@ -42,7 +42,7 @@ def test_whatever_is_written_is_escaped(tmp_path, drawing):
         Chart(HOSTILE, [HOSTILE]).line(HOSTILE, np.arange(3), np.arange(3), "#000000"), HOSTILE
     )
     page.table([HOSTILE, "b"], [[HOSTILE, "1"]], HOSTILE).figure(drawing, HOSTILE).equation(HOSTILE)
-    with page.folded(HOSTILE):
+    with page.fold_blocks(HOSTILE):
         page.text("inside")
     reader = read(page.save(tmp_path / "page.html"))
     assert reader.words.count(HOSTILE) >= 10

@@ -85,7 +85,7 @@ def test_a_call_that_joblib_takes_ahead_with_the_one_that_kills_is_not_blamed():
 class Killed(Workers):
     """Workers that are killed as soon as they start, as where there is no memory for them."""
 
-    def completed(self, function, items, count):
+    def run_items(self, function, items, count):
         next(iter(items))
         raise BrokenExecutor
         yield
@@ -108,4 +108,4 @@ def test_what_a_call_had_left_is_its_result():
 def test_libraries_use_one_thread_in_each_worker(monkeypatch):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-    assert sorted(Workers(2).completed(os.getenv, names, 3)) == [(0, "1"), (1, "1"), (2, "1")]
+    assert sorted(Workers(2).run_items(os.getenv, names, 3)) == [(0, "1"), (1, "1"), (2, "1")]

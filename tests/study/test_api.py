@@ -100,11 +100,11 @@ def test_an_investigation_names_what_is_missing_and_gives_a_model_again(found, f
     assert found.gap.validate.closed > 0.9
     assert found.gap.train.after.chi2_per_sample < 1.3 < found.gap.train.before.chi2_per_sample
     assert found.predict(dips[2]).epsilon[1] < 0.5 * fit.predict(dips[2]).epsilon[1]
-    extended = tractexp.identify(dips[:2], model=found.extended, optimizer=QUICK)
+    extended = tractexp.identify(dips[:2], model=found.extended_model, optimizer=QUICK)
     assert extended.parameters["R_s"].value == pytest.approx(0.02, rel=0.1)
     assert "stator_resistance" in [row[0] for row in found.candidates.rows]
-    assert found.extended.model.latex()[0] in found.extended._repr_latex_()
-    assert "R_s" in found.extended._repr_html_()
+    assert found.extended_model.model.latex()[0] in found.extended_model._repr_latex_()
+    assert "R_s" in found.extended_model._repr_html_()
 
 
 def test_where_nothing_is_named_there_is_no_extended_model(dips, tmp_path):
@@ -119,7 +119,7 @@ def test_where_nothing_is_named_there_is_no_extended_model(dips, tmp_path):
     with pytest.raises(
         UserError, match=rf"no extended model: the verdict is '{found.verdict}'.* base model"
     ):
-        _ = found.extended
+        _ = found.extended_model
     assert found.question.model.effects == ()
     assert found.fit.parameters.keys() == set(MOTOR)
     assert [row[1] for row in found.table().rows] == ["base model"]
@@ -272,8 +272,8 @@ def test_a_model_is_found_by_name_by_file_and_by_parts(tmp_path, found):
     )
     assert mine.parameters["M"].bounds == (0.001, 0.02)
     assert "fixed" in repr(mine)
-    again = tractexp.compose(found.extended.model)
-    assert again.node == found.extended.node
+    again = tractexp.compose(found.extended_model.model)
+    assert again.node == found.extended_model.node
 
 
 def test_progress_tells_each_line_or_nothing(dips, capsys):

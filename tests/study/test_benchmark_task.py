@@ -57,7 +57,7 @@ def test_a_problem_has_iohs_values_box_and_optimum(ioh, function):
     assert (ours.lower == -5).all()
     assert (ours.upper == 5).all()
     assert ours.objective(np.array([theirs.optimum.x]))[0] == pytest.approx(ours.optimum, abs=1e-12)
-    assert ours.solved
+    assert ours.is_solved
 
 
 def test_the_groups_hold_every_function_once():
@@ -88,7 +88,7 @@ def test_a_target_is_met_at_the_evaluation_that_met_it_not_at_the_end_of_its_bat
     assert problem.hits.tolist() == [4, 4, 6, np.inf]
     problem.objective(np.array([near, best]))
     assert problem.hits.tolist() == [4, 4, 6, 9]
-    assert problem.solved
+    assert problem.is_solved
 
 
 def test_cmaes_reaches_the_known_optimum_of_the_sphere(ioh, cma):
@@ -150,7 +150,7 @@ def test_running_times_and_shares_are_those_worked_out_by_hand(by_hand):
     assert by_hand.ert("b", 2, 16, 0) == (float("inf"), 0)
     assert by_hand.share("a", 2, (1, 16)) == 7 / 8
     assert by_hand.share("b", 2, (1, 16)) == 1 / 8
-    assert (by_hand.solved("a", 2), by_hand.solved("b", 2)) == (1, 0)
+    assert (by_hand.count_solved("a", 2), by_hand.count_solved("b", 2)) == (1, 0)
     assert by_hand.hits("a", 2, [16]).tolist() == [40.0, 80.0, 90.0, float("inf")]
     assert by_hand.groups() == {"separable": [1], "many valleys": [16]}
 

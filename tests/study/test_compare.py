@@ -304,13 +304,13 @@ def test_a_full_factorial_gives_every_effect_and_interaction():
     assert effects["levy"].factor == pytest.approx(10 ** (-0.3 + 0.1), rel=0.01)
     assert effects["gaussian"].factor == pytest.approx(10 ** (0.1 + 0.1), rel=0.01)
     assert effects["levy"].low < effects["levy"].factor < effects["levy"].high < 1
-    assert effects["levy"].shown
-    assert effects["gaussian"].shown
+    assert effects["levy"].is_significant
+    assert effects["gaussian"].is_significant
     interactions = {frozenset(e.switches): e for e in found.interactions}
     assert len(interactions) == 6
     assert interactions[frozenset(("levy", "gaussian"))].factor == pytest.approx(10**0.2, rel=0.01)
     # one is planted; 1 in 20 of the others by chance
-    assert sum(e.shown for e in interactions.values()) <= 2
+    assert sum(e.is_significant for e in interactions.values()) <= 2
 
 
 def test_one_by_one_from_both_ends_gives_effects_and_says_what_it_cannot_give():
@@ -565,7 +565,7 @@ def problem():
     from tractexp.record import detect
 
     (record,) = build("data", {"name": "csv", "train": SHIPPED["data.train"]}).read().train
-    return Setup.of([detect(record)], NODE).problem
+    return Setup.from_arguments([detect(record)], NODE).problem
 
 
 def ended_at(problem, optimizer, seed, values, **more):
@@ -653,7 +653,7 @@ def test_every_run_that_finished_is_drawn():
     result = compared([*samples({"a": 1.0, "b": 2.0}), a_failure("b", 77)])
     points = drawn(spread(result.variants, result.floor), "every run")
     assert sorted(x for x, _ in points) == sorted(
-        run.objective for v in result.variants for run in v.finished
+        run.objective for v in result.variants for run in v.finished_runs
     )
     assert len(points) == 60
     assert {round(y) for _, y in points} == {0, 1}

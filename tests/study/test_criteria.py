@@ -84,7 +84,7 @@ def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
         curves = (
             SimpleNamespace(error=SimpleNamespace(square=square)) for square in (before, after)
         )
-        return GapTest(*curves, 1.0, 1.0, 1.0, 10.8, None).closed
+        return GapTest(*curves, 1.0, 1.0, 1.0, 10.8, None).closed_share
 
     assert closed(4e-4, 1e-4) == pytest.approx(0.75)
     assert closed(4e-4, -4e-5) == pytest.approx(1.1)
@@ -118,7 +118,9 @@ def closes_share(c, closed, kept=1):
         "final_grade": "after",
         "context": SimpleNamespace(criteria=c),
     }
-    judged = {"judged": lambda which: SimpleNamespace(error=SimpleNamespace(square=errors[which]))}
+    judged = {
+        "select_misfit": lambda which: SimpleNamespace(error=SimpleNamespace(square=errors[which]))
+    }
     verdict = SimpleNamespace(kept=("one",) * kept)
     return Findings.closes_share.fget(SimpleNamespace(verdict=verdict, **graded, **judged))
 
@@ -199,7 +201,7 @@ def proposed(c, explained=0.9, p=1e-6, whole=1000.0):
 
 
 def test_what_only_gets_worse_explains_nothing():
-    assert [measured_gap(Criteria(), gain=gain).explained for gain in (-5.0, 0.0, 5.0)] == [
+    assert [measured_gap(Criteria(), gain=gain).explained_share for gain in (-5.0, 0.0, 5.0)] == [
         0.0,
         0.0,
         1.0,
@@ -302,7 +304,7 @@ def test_a_member_of_a_family_pays_as_a_second_name_does():
 )
 def test_a_looser_criterion_decides_otherwise(name, looser, decide, by_default):
     assert decide(Criteria()) == by_default
-    assert decide(Criteria.of({name: looser})) != by_default
+    assert decide(Criteria.from_choices({name: looser})) != by_default
 
 
 def test_a_criterion_that_is_unknown_or_out_of_range_is_refused():
@@ -310,7 +312,7 @@ def test_a_criterion_that_is_unknown_or_out_of_range_is_refused():
         UserError,
         match=r"criteria\.adequatep: there is no such criterion; did you mean 'adequate_p'",
     ):
-        Criteria.of({"adequatep": 0.1})
+        Criteria.from_choices({"adequatep": 0.1})
     with pytest.raises(
         UserError, match=r"task\.false_alarms=0\.7 is out of range: .* at most 0\.5"
     ):

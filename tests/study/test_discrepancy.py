@@ -80,7 +80,9 @@ def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET, recorder=SLOW, *
 
 def bench(model, made, only=FEW, bounds=None):
     missing = catalogue(model, made, only)
-    return Context.of(model, missing, Records.of(made), bounds or {}, {}, Criteria(), Effort())
+    return Context.from_records(
+        model, missing, Records.from_events(made), bounds or {}, {}, Criteria(), Effort()
+    )
 
 
 def steady(samples):
@@ -170,7 +172,7 @@ def test_the_gap_shrinks_on_fitted_and_on_held_out_events(planted):
     for gap in (planted.train, planted.validate):
         assert gap.after.epsilon_p < gap.before.epsilon_p
         assert gap.after.chi2_per_sample < gap.before.chi2_per_sample
-        assert gap.closed > 0.9
+        assert gap.closed_share > 0.9
         assert gap.gain > 0
     assert planted.train.after.chi2_per_sample == pytest.approx(1.0, abs=0.1)
 
@@ -254,7 +256,7 @@ def test_a_recurrence_is_undone_by_its_own_whitening():
         np.array([[0.0, 0.0], [0.6, 0.0], [0.9, -0.3]]), np.array([1.5, 1.2, 1.0])
     )
     shocks = np.random.default_rng(0).standard_normal((3, 50))
-    made = color.recurring(shocks)
+    made = color.color_shocks(shocks)
     assert made[:, 0] == pytest.approx(shocks[:, 0])
     assert color.whiten(made, np.ones(50, dtype=bool))[:, 2:] == pytest.approx(shocks[:, 2:])
 
@@ -398,7 +400,7 @@ def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_act
     walk = np.cumsum(rng.normal(size=(count, 1, n)) * 0.01, axis=2)
     walk -= walk.mean(axis=2, keepdims=True)  # a load that is larger throughout is P0 and Q0
     recorded = clean * walk + 0.05 * rng.normal(size=(count, 2, n))
-    load = Load.of(clean, np.array([[1.0, 0.4]]), np.array([0, n]))
+    load = Load.from_powers(clean, np.array([[1.0, 0.4]]), np.array([0, n]))
     # in which what goes together in P and Q before the dip is P's alone
     mix = np.array([[20.0, 0.0], [-8.0, 20.0]])
     noise = PowerNoise(
@@ -494,7 +496,7 @@ def test_the_voltages_noise_is_part_of_the_noise_of_the_power():
     """
     model, made = base(), events(noise=Noise(0.002, voltage=0.005))
     made = bench(model, made)
-    noise = QuietNoise.at(made, made.coordinates.null).of_fit(made.coordinates.null)
+    noise = QuietNoise.from_context(made, made.coordinates.null).of_fit(made.coordinates.null)
     drive = made.drive
     drawn = noise.draw(np.random.default_rng(4), 200, np.diff(drive.first).tolist())
     rows = made.whiten(noise, drawn)
@@ -545,7 +547,9 @@ def test_what_no_effect_explains_is_found_by_the_test_that_looks_for_it(silent, 
     planted = first.tangent.residual.copy()
     for e, event in enumerate(at.events):
         planted[0, at.drive.part(e)] += 0.002 * shape(event.record.t, event)
-    found = first.chance.surprises(first.projection.of(at.whiten(first.noise, planted[None])), at)
+    found = first.chance.surprises(
+        first.projection.replace_residuals(at.whiten(first.noise, planted[None])), at
+    )
     assert min(found, key=found.get) == looked_for
     assert found[looked_for] < 1e-5
 
@@ -591,13 +595,13 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
     ]:
         moved = replace(bare)
         moved.__dict__["goodness_of_fit"] = GoodnessOfFit({"one of six": p})
-        assert moved.undecided == open_
+        assert moved.is_undecided == open_
     exact = replace(
         bare,
         chance=replace(bare.chance, scales=scales(first.tangent, first.projection, first.noise, 3)),
     )
     exact.__dict__["goodness_of_fit"] = GoodnessOfFit({"one of six": level})
-    assert not exact.undecided
+    assert not exact.is_undecided
     drawn = bare.chance.left
     for name, scale in exact.chance.scales.items():
         assert np.median(np.abs(scale.mean / drawn[name].mean(axis=0) - 1)) < 0.1
@@ -664,7 +668,7 @@ def test_what_changes_nothing_is_exactly_zero():
     unit, names = at.null.copy(), ("stator_resistance", "feeder_impedance", PUSHES)
     unit[at.sizes(["stator_resistance"])] = at.to_unit("R_s", 0.02)
     assert not made.changes(unit, np.array([unit] * 3), ("stator_resistance",), names).any()
-    moved = at.placed(unit, {"X_f": 0.02})
+    moved = at.place_values(unit, {"X_f": 0.02})
     assert made.changes(unit, moved[None], ("stator_resistance",), ("feeder_impedance",)).any()
 
 
@@ -725,7 +729,7 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     """An event with the effect adds to the evidence of the fitted ones, one without it takes from
     it.
     """
-    trained, alone, criteria = planted.context, planted.extended, Criteria()
+    trained, alone, criteria = planted.context, planted.extended_fit, Criteria()
     known = planted.evidence
     both = lambda made: AllEvents(trained, made, known.noise, known.faults, known.base.fit)  # noqa: E731
     fit = lambda made: both(made).fit_jointly([alone], seed=0)  # noqa: E731
@@ -872,7 +876,7 @@ def test_candidates_at_their_null_leave_the_base_model(silent):
     response = alone.model.simulate(alone.drive, alone.full(values), made.problem.step.substeps)
     for beside in ("stator_resistance", "feeder_impedance", PUSHES):
         rows = made.residuals(null[None], (), beside)[0]
-        assert rows[0] == pytest.approx(response.P[0] - alone.drive.measured[0], abs=1e-10)
+        assert rows[0] == pytest.approx(response.P[0] - alone.drive.measurements[0], abs=1e-10)
 
 
 def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):
@@ -883,15 +887,15 @@ def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):
     made = bench(base(), events(), bounds={"T_prime": [1.05 * T, 2 * T]})
     first = disagreement(base_fit(made), seed=0)
     assert first.fit.unit[made.coordinates.column["T_prime"]] == 0.0
-    assert "T_prime" in first.resting
-    assert silent.first.resting == []
+    assert "T_prime" in first.parameters_at_bound
+    assert silent.first.parameters_at_bound == []
     assert first.fit.deviance > silent.first.fit.deviance + 50
     assert silent.first.adequate
     assert first.p_left < 1e-6
 
 
 def test_nuisance_columns_are_orthogonal_to_the_projected_residual(silent):
-    projection = tangent(silent.context, silent.first.fit, silent.first.noise).whitened(
+    projection = tangent(silent.context, silent.first.fit, silent.first.noise).build_score_test(
         silent.first.noise
     )
     assert np.abs(projection.r @ projection.Q).max() < 1e-8

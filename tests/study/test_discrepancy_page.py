@@ -50,7 +50,7 @@ def unexplained():
 def page(found, folder):
     """The words of the page, and what its charts draw."""
     path = discrepancy.report(
-        found, content(found), [Identity.at(e.record) for e in found.context.events]
+        found, content(found), [Identity.from_record(e.record) for e in found.context.events]
     ).save(folder / "discrepancy.html")
     return words_of(path), charts(path.read_text(encoding="utf-8"))
 
@@ -121,7 +121,7 @@ def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
 
 def test_the_noise_band_holds_what_the_extended_model_leaves(named):
     shown = named.overlays[0]
-    off = (shown.measured - shown.after) / shown.deviation
+    off = (shown.measurements - shown.after) / shown.deviation
     assert 0.93 < np.mean(np.abs(off) < BAND_DEVIATIONS) < 0.98
     assert [o.held_out for o in named.overlays] == [False, False, True]
 
@@ -149,7 +149,7 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
     (size,) = rows[0].sizes
     assert size.parameter.name == "R_s"
     assert size.error == pytest.approx(
-        next(e for e in named.after if e.parameter.name == "R_s").error
+        next(e for e in named.final_estimates if e.parameter.name == "R_s").error
     )
     drops = [row.drop for row in rows[1:] if np.isfinite(row.drop)]
     assert drops == sorted(drops, reverse=True)
@@ -209,7 +209,9 @@ def test_what_is_drawn_and_told_is_of_the_graded_model(named):
     """
     known = named.final_grade.uncertainty
     values = dict(zip(known.names, known.values, strict=True))
-    assert {e.parameter.name: e.value for e in named.graded_parameters} == values | named.held
+    assert {
+        e.parameter.name: e.value for e in named.graded_parameters
+    } == values | named.undetermined_values
     for ranked, graded in zip(named.overlays, named.graded_overlays, strict=True):
         (fit,) = (
             one
@@ -279,13 +281,15 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
     ],
 )
 def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(names, faults, told):
-    catalogue = SimpleNamespace(spoken=lambda name: name, candidates=range(19))
+    catalogue = SimpleNamespace(label_effect=lambda name: name, candidates=range(19))
     context = SimpleNamespace(catalogue=catalogue)
     tests = SimpleNamespace(loudest="pushes into the balances")
     best = SetEvidence(SimpleNamespace(names=names), names, names, p_left=0.001, tests=tests)
     evidence = Evidence(None, (best,), faults=faults)
-    assert told in explain_rest(evidence, SimpleNamespace(closed=(0.66, 0.5)), context)
-    assert "nan" not in explain_rest(evidence, SimpleNamespace(closed=(np.nan, np.nan)), context)
+    assert told in explain_rest(evidence, SimpleNamespace(closed_shares=(0.66, 0.5)), context)
+    assert "nan" not in explain_rest(
+        evidence, SimpleNamespace(closed_shares=(np.nan, np.nan)), context
+    )
 
 
 def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):

@@ -122,7 +122,7 @@ def test_the_end_of_a_search_and_the_estimate_stand_in_one_table_with_a_word_whe
     table = tabulate_search_end(fit)
     by_name = {row[0]: row for row in table.rows}
     assert by_name["objective"][1:3] == [fit.result.search["objective"], fit.result.objective]
-    assert {n for n in fit.result.verdicts if by_name[n][4]} == {*fit.astray}
+    assert {n for n in fit.result.verdicts if by_name[n][4]} == {*fit.outside_interval}
     far = replace(
         fit.result,
         search=fit.result.search
@@ -202,18 +202,20 @@ def test_what_is_judged_is_the_estimate_against_all_draws(fit, monkeypatch):
     monkeypatch.setattr(
         adequacy, "tail", lambda draws, value: judged.append((len(draws), len(value))) or 1.0
     )
-    adequacy.surprise(Observed.of(known.likelihood.problem), known.likelihood, known.unit)
+    adequacy.surprise(Observed.from_problem(known.likelihood.problem), known.likelihood, known.unit)
     assert {*judged} == {(adequacy.FIT_DRAWS, 1)}
 
 
 def test_p_of_noise_alone_is_no_smaller_than_it_says():
     """60 judgements of noise drawn anew: one in ten below 0.1, give or take."""
-    observed = Observed.of(Problem(study.model(), [recorded()]))
+    observed = Observed.from_problem(Problem(study.model(), [recorded()]))
     known = estimate_without_search(observed.problem).uncertainty
-    clean = known.likelihood.residuals(known.unit[None])[0] + observed.drive.measured
+    clean = known.likelihood.residuals(known.unit[None])[0] + observed.drive.measurements
     rng, p = np.random.default_rng(2), []
     for _ in range(60):
-        drive = replace(observed.drive, measured=clean + 0.004 * rng.standard_normal(clean.shape))
+        drive = replace(
+            observed.drive, measurements=clean + 0.004 * rng.standard_normal(clean.shape)
+        )
         problem = observed.problem.driven_by(observed.problem.events)
         problem.drive = drive
         again = replace(known.likelihood, problem=problem)
@@ -263,7 +265,7 @@ def test_correlated_noise_of_p_and_q_is_seen_and_used():
     power += 0.0005 * rng.standard_normal(power.shape)
     known = estimate_without_search(Problem(study.model(), [study.event(t, U, power)])).uncertainty
     assert known.noise[0]["between_P_and_Q"] > 0.95
-    apart = Likelihood.of(known.likelihood.problem, Noise.white(0.004, 0.0032))
+    apart = Likelihood.from_problem(known.likelihood.problem, Noise.white(0.004, 0.0032))
     J = dense(apart.jacobian(known.unit)[1])
     loose = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))[: apart.free] * (known.upper - known.lower)
     assert (known.information.standard_errors < loose).all()
@@ -320,7 +322,7 @@ def test_a_model_that_takes_its_error_for_slow_noise_is_found_out_by_least_squar
     squares = Likelihood.of_squares(likelihood.problem, 0.004)
     rows = squares.with_initial_power.rows(known.unit[None])[0]
     least = float(rows @ rows)
-    observed = Observed.of(likelihood.problem)
+    observed = Observed.from_problem(likelihood.problem)
     agree = adequacy.surprise(observed, likelihood, known.unit, squares, least)
     apart = adequacy.surprise(observed, likelihood, known.unit, squares, least / 2)
     assert agree.p > adequacy.ADEQUATE_P

@@ -98,9 +98,9 @@ def narrow():
 def test_what_a_member_does_not_take_beside_it_is_not_tested_there():
     here = narrow()
     for names, tested in (((), "abc"), (("a", "b"), "abc"), (("m",), "acm")):
-        assert here.of(here.key(names, beside="c")).names == {*tested}
-    assert here.of(here.key(("m",), beside=PUSHES)).names == {"m", PUSHES}
-    assert here.of(here.key(("m", "a"))).names == {"m", "a"}
+        assert here.build_model(here.key(names, beside="c")).names == {*tested}
+    assert here.build_model(here.key(("m",), beside=PUSHES)).names == {"m", PUSHES}
+    assert here.build_model(here.key(("m", "a"))).names == {"m", "a"}
 
 
 def test_an_effect_that_iterates_and_the_pushes_are_simulated_by_themselves():
@@ -134,10 +134,10 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     (form,) = forms(made)
     assert (form.effect.name, form.effect.differs) == ("static_trip", "of the static load only")
     at = made.context.coordinates
-    assert at.value("static_tripped", made.extended.unit) == pytest.approx(0.2, abs=0.01)
-    assert made.validate.explained > 0.9
+    assert at.value("static_tripped", made.extended_fit.unit) == pytest.approx(0.2, abs=0.01)
+    assert made.validate.explained_share > 0.9
     # its instants are no parameters of each event:
-    there = tangent(made.context, made.extended, made.evidence.noise)
+    there = tangent(made.context, made.extended_fit, made.evidence.noise)
     # of the relay the share alone
     assert len(there.split) == 2 * (len(at.base) - len(there.held) + 1)
 
@@ -157,7 +157,7 @@ def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, see
     assert made.verdict.word == "named"
     (form,) = forms(made)
     assert (form.name, form.effect.name) == (textbook, member)
-    assert made.validate.explained > 0.9
+    assert made.validate.explained_share > 0.9
 
 
 def test_a_bounded_flux_is_a_saturation_with_a_round_corner():
@@ -168,8 +168,8 @@ def test_a_bounded_flux_is_a_saturation_with_a_round_corner():
     told = investigate(base(), made[:3], made[3:], {}, {}, only=("magnetic_saturation",))
     (form,) = forms(told)
     assert form.effect.name == "saturation_curve"
-    assert told.context.coordinates.value("saturation_rounding", told.extended.unit) > 0.1
-    assert told.validate.explained > 0.85
+    assert told.context.coordinates.value("saturation_rounding", told.extended_fit.unit) > 0.1
+    assert told.validate.explained_share > 0.85
 
 
 @pytest.mark.parametrize(("better", "named"), [(60.0, True), (99.0, False)])
@@ -561,7 +561,9 @@ def test_a_member_that_nests_the_textbook_starts_from_its_fit():
 def two_stages(share):
     """A bench with the trip in two stages, and the textbook's fit of such a share."""
     at = bench(base(), events(), TRIPS[:1])
-    unit = at.coordinates.placed(at.coordinates.null, {"tripped_share": share, "trip_level": 0.8})
+    unit = at.coordinates.place_values(
+        at.coordinates.null, {"tripped_share": share, "trip_level": 0.8}
+    )
     return at, {
         (): Refit((), at.coordinates.null, 0.0, 0),
         TRIPS[:1]: Refit(TRIPS[:1], unit, 0.0, 6),

@@ -37,7 +37,7 @@ def test_a_model_is_looked_at_through_the_window_where_it_follows_what_happens_w
 
 def test_the_voltage_reckoned_back_has_the_recorded_average():
     [event] = tractexp.read("tibet_50pct_comtrade", estimator="p_class")
-    weights = event.record.window.on(event.record.step)
+    weights = event.record.window.compute_weights(event.record.step)
     back = sharpen_voltage(event, weights, event.record.window.length).record.U
     inside = slice(len(weights), -len(weights))
     assert np.abs(average(back, weights) - event.record.U)[inside].max() < 5e-3

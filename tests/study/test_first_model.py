@@ -25,7 +25,7 @@ QUICK = {
 
 
 def shown(events):
-    return set(model_of(None, "waves").fitting(events).effects)
+    return set(model_of(None, "waves").add_shown_effects(events).effects)
 
 
 def beside(seed, *devices, delta=False):
@@ -69,13 +69,13 @@ def test_a_model_that_is_asked_for_stays_as_it_is():
         model_of(None, "waves").with_(shown_effects=False),
         model_of(None),
     ):
-        assert model.fitting(events) is model
+        assert model.add_shown_effects(events) is model
 
 
 def test_a_model_that_has_what_its_records_show_stays_as_it_is():
     events = beside([2, 7], Earthed(0.2, 1.0))
-    model = model_of(None, "waves").fitting(events)
-    again = model.fitting(events)
+    model = model_of(None, "waves").add_shown_effects(events)
+    again = model.add_shown_effects(events)
     assert (again.effects, again.shown) == (model.effects, model.shown)
 
 

@@ -63,7 +63,7 @@ def test_what_naming_may_spend_is_calibrated_on_development_seeds():
             p.seed for p in itertools.islice(study.cases.nulls(noise, events=4), len(own))
         ]
     assert len(rows) >= 300
-    found, level = false_alarms.shares(rows), Criteria().naming
+    found, level = false_alarms.shares(rows), Criteria().naming_false_alarms
     assert found[round(level, 6)] < Criteria().false_alarms < found[round(2 * level, 6)]
     assert found[0.5] == pytest.approx(0.5, abs=0.06)  # it is the tail that is heavy
 

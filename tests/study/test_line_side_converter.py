@@ -130,7 +130,7 @@ def test_before_the_event_nothing_moves():
         lambda t: U0 * np.exp(2j * np.pi * 49.6 * t), f0=49.6, U0=U0, length=0.3, rate=2000.0
     )
     values = np.array([TRUTH[name] for name in of.names])
-    current = vector(of.simulate(Drive.of([made]), values, 8)) / made.turn
+    current = vector(of.simulate(Drive.from_events([made]), values, 8)) / made.turn
     assert np.abs(current - TRUTH["P_c"] / U0).max() < 1e-9
 
 
@@ -139,7 +139,7 @@ def test_it_draws_its_power_again_up_to_its_limit():
     values = np.array([TRUTH[name] for name in of.names])
     for depth, power, current in ((0.15, 0.8, 0.8 / 0.85), (0.4, None, 1.3 * 0.8)):
         made = event(dip(depth, jump=0.4, end=10.0, edge=0.002), length=0.6)
-        i = vector(of.simulate(Drive.of([made]), values, 8)) / made.turn
+        i = vector(of.simulate(Drive.from_events([made]), values, 8)) / made.turn
         P = (made.v * np.conj(i)).real[-1]
         assert abs(i[-1]) == pytest.approx(current, rel=0.02)
         if power is not None:

@@ -171,7 +171,7 @@ def test_the_interval_is_that_of_leaving_out_each_block_in_turn():
 def test_an_error_depends_on_no_base_and_comes_back_as_it_was_stored():
     error, small = (model_error([played(-0.1, -0.1, base=base)]) for base in (1.0, 1e-9))
     assert (small.value, small.of_S) == pytest.approx((error.value, error.of_S), rel=1e-6)
-    back = ModelError.of(error.to_dict())
+    back = ModelError.from_content(error.to_dict())
     assert back.to_dict() == error.to_dict()
     assert back.square == pytest.approx(error.square)
     assert str(ModelError(0.1, (0.0, 0.2), 0.05)) == "10 % of its response (5 % of S)"
@@ -232,7 +232,7 @@ def test_result_json_and_the_headline_tell_it(fit, tmp_path):
     assert low <= told["value"] <= high
     assert f"within {in_percent(told['value'])} of its response" in fit.headline
     assert f"the held-out dips within {in_percent(told['held_out']['value'])}" in fit.headline
-    assert ModelError.of(told) == fit.model_error
+    assert ModelError.from_content(told) == fit.model_error
 
 
 def test_a_small_reactive_power_is_told_where_its_error_is_divided_by_it(fit):

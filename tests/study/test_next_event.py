@@ -95,10 +95,10 @@ def alike():
     """A bench of three effects, of which two are one, fitted to events with stator resistance."""
     events, model = recorded(hidden(*MILD, effect="stator_resistance", size=1.0)), base()
     known = catalogue(model, events, ("stator_resistance", "speed_dependent_torque"))
-    bench = Context.of(
+    bench = Context.from_records(
         model,
         Catalogue((*known.candidates, candidate(LeakageLoss())), {}),
-        Records.of(events),
+        Records.from_events(events),
         {},
         {},
         Criteria(),
@@ -222,7 +222,7 @@ def test_what_a_model_does_not_survive_tells_nothing(alike):
         for f in (bare, fits["stator_resistance"], fits["leakage_loss"])
     ]
     lost = EventView(np.full(10, np.nan), np.zeros((3, 10)))
-    assert not Separation(sides, bench.criteria).denied([lost] * 3, 1).any()
+    assert not Separation(sides, bench.criteria).find_denied_rivals([lost] * 3, 1).any()
 
 
 def test_dips_switching_phase_jumps_and_rates_are_tried(alike):
@@ -310,8 +310,8 @@ def test_what_rivals_miss_is_missed_in_each_of_its_like(alike):
 
     def chance(error, times):
         views = [seen(bench, noise, side, [event], error)[0] for side in sides]
-        denied = np.stack([separation.denied(views, truth, times) for truth in (1, 2)])
-        return Chances.of(denied, np.zeros((2, 2), bool)).least
+        denied = np.stack([separation.find_denied_rivals(views, truth, times) for truth in (1, 2)])
+        return Chances.from_draws(denied, np.zeros((2, 2), bool)).least
 
     assert chance(0.0, 20) > DECIDED
     assert chance(1.0, 20) < LEAST_CHANCE

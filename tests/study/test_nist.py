@@ -201,7 +201,7 @@ def standard_errors(problem: Regression, box: Box, values: np.ndarray) -> np.nda
     (residual,), (J,) = central_differences(rows, box.to_unit(values)[None], np.zeros(1, dtype=int))
     deviation = np.sqrt(residual @ residual / (len(residual) - len(values)))
     names = [f"b{k}" for k in range(1, len(values) + 1)]
-    return Information.of(
+    return Information.from_jacobian(
         names, values, box.width, J.T / deviation, np.empty((len(residual), 0))
     ).standard_errors
 

@@ -75,7 +75,7 @@ def model(motor, *names):
 def dip(depth=0.5, step=1e-3, U0=1.0):
     t = np.arange(800) * step
     shape = np.clip((t - 0.1) / 0.02, 0, 1) - np.clip((t - 0.25) / 0.02, 0, 1)
-    return Drive.of(
+    return Drive.from_events(
         [Excitation(step, U0 - depth * shape, np.ones(800), np.full(800, 0.6), U0, 1.0, 0.6)]
     )
 
@@ -185,8 +185,8 @@ def test_the_order_that_the_load_has_is_named(higher, own, expected):
     made = drawn(higher, **own)
     found = investigate(model("electromechanical"), made[:2], made[2:], only=FEW)
     assert (found.verdict.word, found.names) == ("named", expected), found.reason
-    assert found.validate.explained > 0.95
-    assert abs(found.validate.closed - 1) < 0.1
+    assert found.validate.explained_share > 0.95
+    assert abs(found.validate.closed_share - 1) < 0.1
 
 
 def test_silent_where_the_order_is_right():

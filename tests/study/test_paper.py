@@ -504,8 +504,8 @@ def test_equal_budgets_are_laid_out_whole_and_equal_for_all(memory, monkeypatch)
     )
     study = replace(_study(), limits=None)
     for name in ("issa", "pso"):
-        study.searched(name, "simulations")
-        study.searched(name, "iterations")
+        study.run_searches(name, "simulations")
+        study.run_searches(name, "iterations")
     assert asked == [
         ({"issa": {"name": "issa"}}, searches.Limits(15_050)),
         ({"issa": {"name": "issa", "iterations": 300}}, searches.Limits()),
@@ -517,8 +517,8 @@ def test_equal_budgets_are_laid_out_whole_and_equal_for_all(memory, monkeypatch)
 def test_only_the_literal_readings_search_the_model_as_it_is_printed(memory):
     study = _study()
     for name in ("pso", "pso_to_the_letter"):
-        study.searched(name)
-    literal, classical = (study.searched(n)[0] for n in ("pso_to_the_letter", "pso"))
+        study.run_searches(name)
+    literal, classical = (study.run_searches(n)[0] for n in ("pso_to_the_letter", "pso"))
     assert literal.objective == study.printed_problem.objective(literal.values[None])[0]
     assert literal.objective != study.problem.objective(literal.values[None])[0]
     assert classical.objective == study.problem.objective(classical.values[None])[0]
@@ -535,7 +535,9 @@ def test_a_reading_is_the_optimizer_of_its_name(name):
         if reading.optimizer == "pso" and reading.literal
         else name
     )
-    assert build("optimizer", reading.node) == Choice.of("optimizer", chosen).build("optimizer")
+    assert build("optimizer", reading.node) == Choice.from_argument("optimizer", chosen).build(
+        "optimizer"
+    )
     assert reading.literal == name.endswith("_to_the_letter")
 
 
@@ -699,7 +701,7 @@ def test_the_second_valley_is_at_the_bound_of_C_and_attracts_whatever_the_bound(
     """
     problem, floor = _recipe(), 3.09e-5
     ends = valleys.run_descents(problem, valleys.draw_uniform_points(problem, 60, 0), floor)
-    (lowest, n, right), (second, m, left), *_ = ends.grouped()
+    (lowest, n, right), (second, m, left), *_ = ends.group_valleys()
     assert n + m > 40
     assert (lowest, second) == pytest.approx((3.085e-5, 4.168e-5), rel=1e-3)
     C = list(problem.space.names).index("C")
@@ -890,6 +892,6 @@ def test_a_table_that_needs_no_held_out_dip_is_made_without_one(tmp_path):
 
 def test_a_study_without_the_dip_it_needs_says_which():
     with pytest.raises(UserError, match="a dip deeper than the fitted one is needed"):
-        Study(_recipe, {}, (SimpleNamespace(depth=0.5),), (SimpleNamespace(depth=0.3),), 1).held(
-            "extrapolation"
-        )
+        Study(
+            _recipe, {}, (SimpleNamespace(depth=0.5),), (SimpleNamespace(depth=0.3),), 1
+        ).select_held_out("extrapolation")

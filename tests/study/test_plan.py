@@ -54,7 +54,9 @@ def problem():
 def test_the_forecast_is_what_the_record_then_gives(problem):
     known = study.judged(problem, study.TYPICAL).uncertainty
     event = problem.events[0]
-    shape = replace(DipShape.of(event), duration=0.2, noise_P=0.004, noise_Q=0.004, memory=0.0)
+    shape = replace(
+        DipShape.from_event(event), duration=0.2, noise_P=0.004, noise_Q=0.004, memory=0.0
+    )
     planned = forecast(problem, study.TYPICAL, shape)
     # The plan's trapezoid has edges of 20 ms, the record's of 30 ms; q_v and C are at other
     # estimates.

@@ -82,7 +82,7 @@ def test_a_set_whose_lead_may_be_chance_hides_none_that_is_clear():
     best.prediction.squares[4] += 3.0
     clear = off("a", "c", error=0.42)
     clear.prediction.squares[3] += 1.5
-    assert best.prediction.left < clear.prediction.left
+    assert best.prediction.excess < clear.prediction.excess
     assert best.prediction.compute_lead(bare.prediction) <= 0
     assert named(bare, best, clear) == [("a", "c")]
     assert find_nearest(table(bare, best), Criteria()) is best
@@ -267,7 +267,9 @@ def dips(depths=(0.5, 0.35, 0.6)):
     for k, depth in enumerate(depths):
         t = np.arange(SAMPLES) * STEP
         shape = np.clip((t - 0.1) / 0.02, 0, 1) - np.clip((t - 0.25) / 0.02, 0, 1)
-        drive = Drive.of([Excitation(STEP, 1 - depth * shape, flat, 0.6 * flat, 1.0, 1.0, 0.6)])
+        drive = Drive.from_events(
+            [Excitation(STEP, 1 - depth * shape, flat, 0.6 * flat, 1.0, 1.0, 0.6)]
+        )
         response = motor.simulate(drive, row, 8).outputs[:, 0]
         unknown = (
             0.01
@@ -307,7 +309,7 @@ def test_a_name_that_leaves_more_than_noise_is_named_and_what_it_leaves_is_told(
     verdict = inexact.verdict
     assert (verdict.word, inexact.names) == ("named", ("undervoltage_trip",)), inexact.reason
     assert not verdict.complete
-    assert inexact.validate.closed > 1 - 1 / inexact.context.criteria.divides**2
+    assert inexact.validate.closed_share > 1 - 1 / inexact.context.criteria.divides**2
     assert inexact.remainder
     assert "beside undervoltage_trip this is left" in inexact.headline
 
@@ -335,7 +337,7 @@ def test_the_sentence_says_why_the_nearest_set_is_not_named(inexact):
     def reason(*sets):
         base, *rows = (replace(row, fit=replace(fit, names=row.names)) for row in sets)
         own = replace(base, tests=inexact.first)
-        rows = sorted(rows, key=lambda row: row.prediction.left)
+        rows = sorted(rows, key=lambda row: row.prediction.excess)
         return reason_of(
             inexact, replace(inexact.evidence, base=own, rows=tuple(rows), others=(), term=None)
         )
@@ -355,9 +357,11 @@ def test_the_sentence_says_why_the_nearest_set_is_not_named(inexact):
 def test_the_sentence_says_that_the_best_sets_have_what_is_named(inexact):
     evidence, near = inexact.evidence, "all sets that come near have it"
     assert near not in inexact.reason
-    trip, left = evidence.row_of(("undervoltage_trip",)), evidence.base.prediction.left
+    trip, left = evidence.row_of(("undervoltage_trip",)), evidence.base.prediction.excess
     own = trip.prediction
-    louder = replace(trip, prediction=replace(own, squares=own.squares * left / own.left / 2.0**2))
+    louder = replace(
+        trip, prediction=replace(own, squares=own.squares * left / own.excess / 2.0**2)
+    )
     names = ("dc_link_lag", "undervoltage_trip")
     better = replace(louder.prediction, squares=louder.prediction.squares / 1.4)
     pair = replace(
@@ -388,15 +392,15 @@ def test_its_share_is_that_which_tripped_though_the_model_is_not_exact(inexact):
     """What is off is a bias by the swing, 3.6 standard errors: a covariance of residuals holds
     scatter alone.
     """
-    share = next(e for e in inexact.after if e.parameter.name == "tripped_share")
+    share = next(e for e in inexact.final_estimates if e.parameter.name == "tripped_share")
     assert share.value == pytest.approx(0.25, rel=0.005)
 
 
 def test_the_covariance_by_least_squares_is_wider_where_residuals_are_correlated(inexact):
-    fit, context = inexact.extended, inexact.context
+    fit, context = inexact.extended_fit, inexact.context
     noise = residual_noise(context, fit)
     tests = least_squares_tests(inexact.base.quiet, fit, noise, seed=0)
-    plain = replace(tests, robust=tangent(context, fit, noise).whitened(noise).R)
+    plain = replace(tests, robust=tangent(context, fit, noise).build_score_test(noise).R)
     wide, narrow = standard_errors(tests), standard_errors(plain)
     assert np.median([wide[name] / narrow[name] for name in wide]) > 1.5
 
@@ -413,7 +417,7 @@ def test_all_is_told_by_the_records_own_noise_and_the_base_model_as_it_is_identi
     alone = tractexp.identify(dips()[:2], progress=False)
     assert inexact.train.before.error.value == pytest.approx(alone.model_error.value, rel=0.03)
     errors = alone.result.standard_errors
-    for e in inexact.before:
+    for e in inexact.base_estimates:
         assert abs(e.value - alone.result.parameters[e.parameter.name]) < errors[e.parameter.name]
 
 
@@ -456,12 +460,12 @@ def test_at_the_powers_measured_a_fit_to_any_number_of_events_is_as_the_identifi
     events = dips((0.5, 0.35, 0.6, 0.4))
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     missing = catalogue(model, events, ("dc_link_lag",))
-    context = Context.of(
-        model, missing, Records.of(events), {}, {}, Criteria(), Effort(lambda line: None)
+    context = Context.from_records(
+        model, missing, Records.from_events(events), {}, {}, Criteria(), Effort(lambda line: None)
     )
     noise = Noise(Noise.white(0.01, 0.01).pairs, np.eye(2))
     alone = tractexp.identify(events, progress=False).result
-    begin = context.coordinates.placed(
+    begin = context.coordinates.place_values(
         context.coordinates.null, {n: 0.97 * v for n, v in alone.parameters.items()}
     )
     fit = refit(context.with_measured_power, noise, [((), begin)], faults=())[0]

@@ -82,8 +82,8 @@ def test_an_investigation_holds_the_motor_by_the_rows_of_an_identification():
     """Eq. (8) with what machines usually are: the same rows at the same parameters."""
     dips, model = contactors()
     lacks = catalogue(model.model, dips, ["stator_resistance"])
-    records = Records.of(dips)
-    context = Context.of(
+    records = Records.from_events(dips)
+    context = Context.from_records(
         model.model, lacks, records, {}, {}, Criteria(), Effort(), None, priors=True
     ).with_measured_power.held_to_usual
     squares = held_to_usual(Likelihood.of_squares(context.kernels.bare, 0.02))
@@ -101,10 +101,10 @@ def test_an_investigation_holds_the_motor_by_the_rows_of_an_identification():
 
 def test_an_investigation_without_priors_or_motor_has_no_such_rows():
     dips, model = contactors()
-    context = Context.of(
+    context = Context.from_records(
         model.model,
         catalogue(model.model, dips, ["stator_resistance"]),
-        Records.of(dips),
+        Records.from_events(dips),
         {},
         {},
         Criteria(),

@@ -111,7 +111,7 @@ def test_an_interval_holds_what_the_records_do_not_rule_out_whatever_its_profile
     likelihood = judged.likelihood
     start = np.repeat(likelihood.to_unit(np.array(study.TYPICAL)), len(judged.names), axis=0)
     held = np.eye(len(judged.names), start.shape[1], dtype=bool)
-    ends = descend(likelihood.rows, start, held, apart=likelihood.apart)
+    ends = descend(likelihood.rows, start, held, apart=likelihood.separable_columns)
     close = ends.deviance - judged.deviance < threshold()
     assert close.sum() >= 2
     low, high = judged.intervals.T

@@ -21,7 +21,7 @@ def planted():
     first = disagreement(base_fit(at), 0)
     settings = at.catalogue["undervoltage_trip"].settings
     units = np.array(
-        [at.coordinates.placed(first.fit.unit, s | {"tripped_share": 0.05}) for s in settings]
+        [at.coordinates.place_values(first.fit.unit, s | {"tripped_share": 0.05}) for s in settings]
     )
     coordinates = at.coordinates
     faults = coordinates.parameters(at.catalogue.of_measurement)
@@ -47,8 +47,8 @@ def test_what_changes_nothing_promises_least(planted):
     size.
     """
     at, noise, units, nuisances = planted
-    never = at.coordinates.placed(units[0], {"trip_level": 0.3, "trip_delay": 0.5})
-    still = at.coordinates.placed(units[1], {"tripped_share": 0.0})
+    never = at.coordinates.place_values(units[0], {"trip_level": 0.3, "trip_delay": 0.5})
+    still = at.coordinates.place_values(units[1], {"tripped_share": 0.0})
     kept = select_promising_starts(
         at, noise, TRIP, np.array([never, *units, still]), nuisances, len(units)
     )

@@ -88,7 +88,11 @@ def events(effect=None, size=1.0, seed=800001, count=3, noise=0.003, recorder=SL
 def fitted_base(made):
     model = base()
     missing = catalogue(model, made, ["stator_resistance"])
-    return base_fit(Context.of(model, missing, Records.of(made), {}, {}, Criteria(), Effort()))
+    return base_fit(
+        Context.from_records(
+            model, missing, Records.from_events(made), {}, {}, Criteria(), Effort()
+        )
+    )
 
 
 def searched(made, held, among=FEW, seed=0):
@@ -106,7 +110,7 @@ def searched(made, held, among=FEW, seed=0):
 def ground():
     fit = fitted_base(events(count=2, recorder=FAST))
     bench = context_of_terms(fit.context)
-    return Ground.at(bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise)
+    return Ground.from_coordinates(bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise)
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +146,9 @@ def test_a_column_is_the_difference_of_two_simulations(ground, name):
 def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small():
     fit = fitted_base(events("load_step", 0.15, count=2))
     bench = context_of_terms(fit.context)
-    there = Ground.at(bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise)
+    there = Ground.from_coordinates(
+        bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise
+    )
     made = term_fits(screen(there, [term(STEP)], 0, 20), [])
     (found,) = scores(there, [(term(STEP), {"instant": made.values(made.fits[0])["instant"]})])
     lowered = made.bare.deviance - made.fits[0].deviance
@@ -265,7 +271,7 @@ def test_what_a_right_term_explains_does_not_hang_on_the_level_of_the_noise(seed
     held = found.proposal.validate
     excess = held.before.deviance - held.context.samples
     assert held.gain / excess == pytest.approx(measured, abs=0.1)
-    assert 0.8 < held.explained <= 1.0
+    assert 0.8 < held.explained_share <= 1.0
     assert found.proposal.term.name == STEP
 
 

@@ -50,7 +50,7 @@ def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
     (event,) = events(count=1, recorder=FAST)
     step, window = event.record.step, 0.02 * cycles
     shown = replace(event, record=replace(event.record, U=mean(event.record.U, window / step)))
-    back = RecorderWindow(window).sharpened(shown).record.U
+    back = RecorderWindow(window).sharpen_event(shown).record.U
     shows, error = shown.record.U - event.record.U, back - event.record.U
     assert np.abs(shows).max() > 0.01
     # What repeats with the window itself cannot be told: corners lose a little where it is shorter
@@ -90,7 +90,7 @@ def test_what_a_triangle_did_is_undone():
     recorder = RecorderWindow(known.length, known, said=True)
     weights = recorder.weights(event.record.step)
     U = np.convolve(np.pad(event.record.U, len(weights) // 2, "edge"), weights, "valid")
-    back = recorder.sharpened(replace(event, record=replace(event.record, U=U))).record.U
+    back = recorder.sharpen_event(replace(event, record=replace(event.record, U=U))).record.U
     shows, error = U - event.record.U, back - event.record.U
     assert np.abs(shows).max() > 0.01
     assert error @ error < 0.2 * (shows @ shows)
@@ -128,14 +128,16 @@ def test_a_model_set_to_a_window_is_looked_at_as_an_investigation_looks(window):
     shape = chosen("estimator", window).window(50.0) if isinstance(window, str) else None
     recorder = RecorderWindow(shape.length if shape else window, shape)
     assert recorder.setting == window
-    behind = Drive.of([phasors(recorder.sharpened(event), load.behind(recorder))])
+    behind = Drive.from_events(
+        [phasors(recorder.sharpen_event(event), load.place_behind_recorder(recorder))]
+    )
     through = tractexp.compose(window=window).model
-    drive = Drive.of([phasors(event, through)])
+    drive = Drive.from_events([phasors(event, through)])
     values = np.array([[p.default for p in load.parameters]])
     assert drive.inputs == pytest.approx(behind.inputs, nan_ok=True)
-    expected = load.behind(recorder).simulate(behind, values).outputs
+    expected = load.place_behind_recorder(recorder).simulate(behind, values).outputs
     assert through.simulate(drive, values).outputs == pytest.approx(expected, abs=1e-12)
-    plain = load.simulate(Drive.of([phasors(event, load)]), values).outputs
+    plain = load.simulate(Drive.from_events([phasors(event, load)]), values).outputs
     assert np.abs(expected - plain).max() > 1e-3
 
 
@@ -183,7 +185,7 @@ def test_the_extended_model_has_the_window_that_was_taken_into_account(tmp_path)
     )
     assert found.names == ("stator_resistance",)
     assert found.content["recorder_window"] == pytest.approx(0.06)
-    assert found.extended.window == pytest.approx(0.06)
+    assert found.extended_model.window == pytest.approx(0.06)
     assert found.fit.result.model["window"] == pytest.approx(0.06)
     found.write_results(tmp_path)
     file = tmp_path / "conf" / "model" / "extended.yaml"

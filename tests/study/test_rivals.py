@@ -14,7 +14,7 @@ def dip():
     """The benchmark's dip and candidates, and the base model's sums of squared errors of them."""
     import simulation
 
-    drive, values = Drive.of([simulation.excitation()]), simulation.candidates(9)
+    drive, values = Drive.from_events([simulation.excitation()]), simulation.candidates(9)
     return simulation.excitation(), values, simulation.ours(simulation.base(), drive)(values)
 
 

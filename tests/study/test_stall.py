@@ -104,9 +104,9 @@ def test_sets_that_stall_are_behind_all_that_survive(stalled):
     rows = [row for row in stalled.steps.evidence.every if row.prediction is not None]
     assert rows
     stalling = [row for row in rows if row.prediction.stalls]
-    assert all(row.prediction.left == np.inf for row in stalling)
+    assert all(row.prediction.excess == np.inf for row in stalling)
     survive = [row for row in rows if not row.prediction.stalls]
-    assert all(np.isfinite(row.prediction.left) for row in survive)
+    assert all(np.isfinite(row.prediction.excess) for row in survive)
 
 
 def test_an_identification_tells_it_too(dips, tmp_path):
@@ -135,7 +135,7 @@ def test_what_diverges_is_no_number(dips):
     """A flux that turns backwards faster than steps can follow."""
     model, event = tractexp.compose().model, dips[2]
     domain = domain_of(model)
-    drive = Drive.of([domain.excitation(event, model)])
+    drive = Drive.from_events([domain.excitation(event, model)])
     values = np.array([{**HEAVY, **WEAK, "M": 2e-5}[name] for name in model.names])
     outputs = model.simulate(drive, values, 1).outputs[:, 0]
     assert np.isfinite(outputs[:, : event.start]).all()

@@ -35,7 +35,9 @@ def dip(depth, duration, rng):
     U = 1 - depth * (np.clip((t - 0.5) / 0.02, 0, 1) - np.clip((t - 0.5 - duration) / 0.06, 0, 1))
     excitation = Excitation(STEP, U, np.ones(len(t)), np.full(len(t), Q0), 1.0, 1.0, Q0)
     of = load("zip")
-    response = of.simulate(Drive.of([excitation]), np.array([ZIP[name] for name in of.names]), 8)
+    response = of.simulate(
+        Drive.from_events([excitation]), np.array([ZIP[name] for name in of.names]), 8
+    )
     P, Q = (power[0] + NOISE * rng.standard_normal(len(t)) for power in (response.P, response.Q))
     return detect(Record(f"dip of {depth:.0%}", t, U, P, Q).check())
 
@@ -50,5 +52,5 @@ def test_a_zip_load_taken_for_an_exponential_one_is_named_with_its_share_of_cons
     only = ("stator_resistance", "polynomial_static_load")
     answer = investigate(of, made[:2], made[2:], {}, {}, only=only)
     assert (answer.verdict.word, answer.names) == ("named", ("polynomial_static_load",))
-    (share,) = [e for e in answer.after if e.parameter.name == "constant_share_P"]
+    (share,) = [e for e in answer.final_estimates if e.parameter.name == "constant_share_P"]
     assert share.value == pytest.approx(0.417, abs=0.02)

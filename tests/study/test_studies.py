@@ -224,7 +224,7 @@ def test_claims_are_judged_and_counted(replicated):
 
 def test_a_setup_poses_the_same_problem_after_travel(dips, model):
     """Through JSON, and through pickle once it holds what cannot be pickled."""
-    setup = Setup.of(
+    setup = Setup.from_arguments(
         dips[1], model, dips[0], "huber", fixed={"C": 0.9}, bounds=None, seed=3, budget=10
     )
     one = setup.problem

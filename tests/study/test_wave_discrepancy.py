@@ -104,7 +104,7 @@ def test_the_page_and_the_extended_model(planted, tmp_path):
     told = json.loads((tmp_path / "discrepancy.json").read_text(encoding="utf-8"))
     assert told["verdict"] == "named"
     again = tractexp.compose(tmp_path / "conf" / "model" / "extended.yaml", domain="waves")
-    assert again.node == planted.extended.node
+    assert again.node == planted.extended_model.node
 
 
 def test_the_page_shows_the_currents_of_the_phases_before_and_after(planted):
@@ -117,7 +117,7 @@ def test_the_page_shows_the_currents_of_the_phases_before_and_after(planted):
     assert shown[1] - shown[0] < 0.3  # s: the dip is in view, not the whole record
     part = slice(first.event.start, None)
     before, after = (
-        np.abs((first.measured - made)[:2, part]).max() for made in (first.before, first.after)
+        np.abs((first.measurements - made)[:2, part]).max() for made in (first.before, first.after)
     )
     assert after < before
 
@@ -135,7 +135,7 @@ def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_
     proposal = proposed.proposal
     assert proposal.term.name == "answer:torque:slip"  # the torque falls with the speed
     assert proposal.values["size"] < 0
-    assert proposal.validate.explained > 0.9
+    assert proposal.validate.explained_share > 0.9
     (tmp_path / "proposed_effect.py").write_text(proposal.source, encoding="utf-8")
     effect = runpy.run_path(str(tmp_path / "proposed_effect.py"))["ProposedEffect"]()
     context, fit = proposal.train.context, proposed.tried[0][1].fit

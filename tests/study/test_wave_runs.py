@@ -190,7 +190,7 @@ def test_a_result_of_waveforms_predicts_from_a_voltage(fit):
 
 def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase(fit):
     problem, values = fit.spec.problem, fit.details.uncertainty.values
-    shape = DipShape.of(problem.events[0])
+    shape = DipShape.from_event(problem.events[0])
     assert shape.domain is WAVES
     assert shape.jump == pytest.approx(0, abs=1)
     shape = replace(shape, depth=0.2, duration=0.1, jump=0.0, noise_P=0.005, noise_Q=0.005)
@@ -219,7 +219,7 @@ def test_a_planned_dip_has_the_sequences_that_were_asked_for():
     np.testing.assert_allclose(event.record.U2[low], 0.24, atol=1e-9)
     np.testing.assert_allclose(np.abs(event.v[low]).max(), 0.84, atol=1e-3)
     assert event.depth == pytest.approx(0.4)
-    again = DipShape.of(event)
+    again = DipShape.from_event(event)
     assert (again.depth, again.unbalance) == pytest.approx((0.4, 0.6), abs=1e-6)
     assert again.jump == pytest.approx(20.0, abs=1e-6)
     with pytest.raises(UserError, match=r"task\.unbalance=1\.5 is out of range"):
@@ -232,7 +232,7 @@ def test_an_unbalanced_dip_tells_more_of_the_locked_rotor(fit):
     """
     problem, values = fit.spec.problem, fit.details.uncertainty.values
     shape = replace(
-        DipShape.of(problem.events[0]),
+        DipShape.from_event(problem.events[0]),
         depth=0.2,
         duration=0.2,
         jump=0.0,
@@ -275,7 +275,7 @@ def test_what_diverges_where_nothing_is_compared_warns_nobody(dip, objective, mo
     """In the zero sequence of a balanced dip, and in the cycles before the record."""
     model = tractexp.compose(motor="stator_flux", static="branch", domain="waves").model
     problem = Problem(model, [dip], substeps=4, loss=get("objective", objective)())
-    endless = np.full((1, *problem.drive.measured.shape), np.inf)
+    endless = np.full((1, *problem.drive.measurements.shape), np.inf)
     monkeypatch.setattr(problem, "_errors", lambda values: (endless, np.zeros((1, 1))))
     assert not np.isfinite(problem.residuals(np.ones((1, 1)))).all()
 

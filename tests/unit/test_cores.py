@@ -86,7 +86,7 @@ def test_a_thread_and_a_worker_of_a_sweep_fork_nothing(monkeypatch):
     assert cores.cores() == 2
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(cores.cores).result() == 1
-    results = Workers(n_jobs=1, apart=True).completed(_cores, [0], 1)
+    results = Workers(n_jobs=1, apart=True).run_items(_cores, [0], 1)
     assert [count for _, count in results] == [1]
 
 

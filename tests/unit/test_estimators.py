@@ -119,7 +119,7 @@ def test_a_jump_passes_through_the_window_the_record_keeps(estimator):
 @pytest.mark.parametrize("step", [1e-3, 2e-3, 0.7e-3, 0.02])
 def test_the_kept_window_averages_what_is_linear_between_samples(estimator, step):
     window = chosen("estimator", estimator).window(50.0)
-    weights = window.on(step)
+    weights = window.compute_weights(step)
     k = np.arange(len(weights)) - len(weights) // 2
     assert weights.sum() == pytest.approx(1)
     assert weights @ (k * step) == pytest.approx(0, abs=1e-12)
@@ -132,7 +132,7 @@ def test_the_kept_window_averages_what_is_linear_between_samples(estimator, step
 
 def test_a_window_is_plain_data_and_back():
     window = chosen("estimator", "p_class").window(50.0)
-    again = Window.of(window.to_dict())
+    again = Window.from_content(window.to_dict())
     assert (again.name, again.at.tolist(), again.weights.tolist()) == (
         "p_class",
         window.at.tolist(),

@@ -422,4 +422,4 @@ def test_one_base_beside_a_record_of_which_nobody_said_the_mva():
         base=SimpleNamespace(power=2.0),
         file_base=SimpleNamespace(power=1.0, in_mva=False, origin=""),
     )
-    assert own.over(there) == 2.5
+    assert own.compute_ratio(there) == 2.5

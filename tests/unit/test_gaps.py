@@ -219,4 +219,4 @@ class TestWaveforms:
     def test_waves_keep_what_was_bridged(self, tmp_path):
         waves = only(recorded(tmp_path / "a.cfg", self.lost)).record.waves
         assert waves.bridged == (0.1875, 0.59375)
-        assert type(waves).of(waves.to_dict()).bridged == waves.bridged
+        assert type(waves).from_content(waves.to_dict()).bridged == waves.bridged

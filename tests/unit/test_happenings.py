@@ -29,7 +29,7 @@ def seen(t, volts, amps, f=50.0, sigma=0.002, seed=0, rate=3200.0, extra=0.0, no
 def of(record, feeder):
     [segment] = record.segments
     return happenings(
-        FeederWaves.of(record, feeder, segment)[:, :],
+        FeederWaves.from_recording(record, feeder, segment)[:, :],
         segment.rate,
         0.0,
         record.frequency,
@@ -348,7 +348,7 @@ def test_the_two_dips_of_the_220_kv_station(shared_data):
     for segment in record.waveforms():
         phasors = phasors_of(record, feeder, segment)
         events += happenings(
-            FeederWaves.of(record, feeder, segment)[:, :],
+            FeederWaves.from_recording(record, feeder, segment)[:, :],
             segment.rate,
             segment.start,
             50.0,

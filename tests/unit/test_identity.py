@@ -37,7 +37,7 @@ def record(number=1, **changes):
 
 
 def test_an_identity_says_all_that_is_known_in_one_line():
-    told = str(Identity.at(record()))
+    told = str(Identity.from_record(record()))
     assert told == (
         "north.cfg dip 1; station North; device R1; load T2; voltages Ua, Ub, Uc; currents Ia, Ib,"
         " Ic;"
@@ -46,22 +46,23 @@ def test_an_identity_says_all_that_is_known_in_one_line():
 
 
 def test_an_identity_comes_back_from_result_json():
-    first = Identity.at(record(original_base=Base(110.0, 100.0)))
+    first = Identity.from_record(record(original_base=Base(110.0, 100.0)))
     assert first.to_dict()["given_base"]["power_MVA"] == 100.0
-    assert Identity.of({"name": "north", "role": "train", **first.to_dict()}) == first
-    assert Identity.of({"name": "of an early version"}).label == ""
+    assert Identity.from_content({"name": "north", "role": "train", **first.to_dict()}) == first
+    assert Identity.from_content({"name": "of an early version"}).label == ""
 
 
 def test_a_base_that_nobody_told_is_said_to_be_unknown():
-    told = str(Identity.at(record(base=Base(), identity={}, source="dip.csv")))
+    told = str(Identity.from_record(record(base=Base(), identity={}, source="dip.csv")))
     assert told == f"dip.csv; {UNKNOWN}"
-    assert str(Identity.at(record(base=Base(), identity={}, source=""))) == ""
+    assert str(Identity.from_record(record(base=Base(), identity={}, source=""))) == ""
 
 
 def test_what_is_unknown_of_several_records_is_said_once_with_those_it_concerns():
-    known = Identity.at(record())
+    known = Identity.from_record(record())
     one, other = (
-        Identity.at(record(base=Base(), identity={}, source=f"{name}.csv")) for name in "ab"
+        Identity.from_record(record(base=Base(), identity={}, source=f"{name}.csv"))
+        for name in "ab"
     )
     assert describe_identities([one, one]) == [f"a.csv; {UNKNOWN}"]
     assert describe_identities([one, other]) == ["a.csv", "b.csv", f"{UNKNOWN} of each"]
@@ -70,7 +71,7 @@ def test_what_is_unknown_of_several_records_is_said_once_with_those_it_concerns(
 
 
 def test_dips_of_one_recording_are_one_load():
-    identities = [Identity.at(record(k)) for k in (1, 2)]
+    identities = [Identity.from_record(record(k)) for k in (1, 2)]
     assert [one.dip for one in identities] == ["dip 1", "dip 2"]
     assert len(distinct(identities)) == 1
     assert (label(identities), title(identities, ["a", "b"])) == ("North, T2", "North, T2: a, b")
@@ -80,7 +81,7 @@ def test_dips_of_one_recording_are_one_load():
 def test_the_console_says_of_each_recording_once_what_it_is_of():
     lines = [*describe_records([detect(record(1)), detect(record(2))], [])]
     assert [line for line in lines if "MVA" in line] == [
-        f"  record: {Identity.at(record()).recording}"
+        f"  record: {Identity.from_record(record()).recording}"
     ]
     assert lines[0].startswith("fit: north_dip1")
 

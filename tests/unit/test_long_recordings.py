@@ -103,7 +103,7 @@ def test_loads_of_one_bus_share_what_was_tracked(long):
 
 def test_waves_are_the_sums_that_the_connection_says(long):
     part = replace(long.segments[0], stop=1000)
-    lines = FeederWaves.of(
+    lines = FeederWaves.from_recording(
         long, replace(FEEDER, connection="line_voltages", reverse_current=True), part
     )
     assert lines.shape == (6, 1000)

@@ -27,17 +27,19 @@ def test_what_turns_with_the_voltage_either_way_is_kept_whole():
     for way in (1, -1):
         turning = 0.3 * np.exp(2j * np.pi * way * F * T)
         np.testing.assert_allclose(
-            NoiseFilter.at(RATE, F)(turning, 2 * NOISE**2)[50:-50], turning[50:-50], atol=1e-7
+            NoiseFilter.from_rate(RATE, F)(turning, 2 * NOISE**2)[50:-50],
+            turning[50:-50],
+            atol=1e-7,
         )
     slow = 0.1 * np.exp(-T / 0.05 + 2j * np.pi * F * T)
     np.testing.assert_allclose(
-        NoiseFilter.at(RATE, F)(slow, 2 * NOISE**2)[50:-50], slow[50:-50], atol=2e-5
+        NoiseFilter.from_rate(RATE, F)(slow, 2 * NOISE**2)[50:-50], slow[50:-50], atol=2e-5
     )
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_noise_becomes_what_the_weights_say(seed):
-    quieting, made = NoiseFilter.at(RATE, F), noise(seed)
+    quieting, made = NoiseFilter.from_rate(RATE, F), noise(seed)
     left = quieting(made, 2 * NOISE**2)[100:-100]
     expected = NOISE * np.sqrt(2 * float(quieting.weights @ quieting.weights))
     assert np.sqrt(np.mean(np.abs(left) ** 2)) == pytest.approx(expected, rel=0.1)
@@ -47,30 +49,30 @@ def test_noise_becomes_what_the_weights_say(seed):
 def test_an_edge_stays_where_it_is():
     """Within twice the noise everywhere, and as noisy as before only about the edges."""
     clean, made = dip(), noise(4)
-    off = np.abs(NoiseFilter.at(RATE, F)(clean + made, 2 * NOISE**2) - clean)
+    off = np.abs(NoiseFilter.from_rate(RATE, F)(clean + made, 2 * NOISE**2) - clean)
     assert off.max() < 5 * NOISE
     assert np.sqrt(np.mean(off[700:900] ** 2)) < 0.6 * NOISE * np.sqrt(2)
-    sums = np.cumsum(NoiseFilter.at(RATE, F)(clean, 2 * NOISE**2) - clean) / RATE
+    sums = np.cumsum(NoiseFilter.from_rate(RATE, F)(clean, 2 * NOISE**2) - clean) / RATE
     # s: an error of the flux, whose noise is 1e-3 s / sqrt(RATE) = 2e-5 s and grows
     assert np.abs(sums).max() < 1e-5
 
 
 def test_what_is_louder_than_noise_is_no_noise():
     ring = 0.05 * np.exp(-T / 0.1) * np.exp(2j * np.pi * 900 * T)
-    off = np.abs(NoiseFilter.at(RATE, F)(ring, 2 * NOISE**2) - ring)
+    off = np.abs(NoiseFilter.from_rate(RATE, F)(ring, 2 * NOISE**2) - ring)
     assert off[50:300].max() < 0.05 * 0.05
     # without noise nothing changes
-    np.testing.assert_allclose(NoiseFilter.at(RATE, F)(dip(), 0.0), dip(), atol=1e-12)
+    np.testing.assert_allclose(NoiseFilter.from_rate(RATE, F)(dip(), 0.0), dip(), atol=1e-12)
 
 
 def test_a_coarse_record_is_left_as_it_is():
-    coarse = NoiseFilter.at(16 * F, F)
+    coarse = NoiseFilter.from_rate(16 * F, F)
     assert len(coarse.weights) == 1
     made = noise(5)
     assert coarse(made, 2 * NOISE**2) is made
-    assert len(NoiseFilter.at(24 * F, F).weights) > 1
+    assert len(NoiseFilter.from_rate(24 * F, F).weights) > 1
 
 
 def test_a_short_departure_is_left_as_it_is():
     short = noise(6)[:40]
-    assert NoiseFilter.at(RATE, F)(short, 2 * NOISE**2) is short
+    assert NoiseFilter.from_rate(RATE, F)(short, 2 * NOISE**2) is short

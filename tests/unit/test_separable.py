@@ -18,10 +18,10 @@ from tractexp.inference.separable import (
 RNG = np.random.default_rng(7)
 LENGTHS = (6, 9, 7)
 K, M, E = 4, 2, len(LENGTHS)
-DRIVE = SimpleNamespace(measured=np.zeros((2, sum(LENGTHS))), events=E)
+DRIVE = SimpleNamespace(measurements=np.zeros((2, sum(LENGTHS))), events=E)
 DRIVE.part = lambda e: slice(sum(LENGTHS[:e]), sum(LENGTHS[: e + 1]))
 APART = SeparableColumns.of_power(DRIVE, K)  # type: ignore[arg-type]
-SIZE = DRIVE.measured.size
+SIZE = DRIVE.measurements.size
 J = Sensitivities(RNG.normal(size=(K + M, SIZE)), K, APART.rows)
 CHANGES, ROWS = RNG.normal(size=(3, K + M * E)), RNG.normal(size=(3, SIZE))
 DENSE = dense(J)
@@ -49,11 +49,13 @@ def test_changes_and_fits_are_those_of_every_entry():
 def test_what_is_projected_out_is_that_of_every_entry():
     Q, _ = np.linalg.qr(DENSE)
     basis = J.basis()
-    np.testing.assert_allclose(basis.without(ROWS), ROWS - (ROWS @ Q) @ Q.T, atol=1e-12)
+    np.testing.assert_allclose(basis.project_out(ROWS), ROWS - (ROWS @ Q) @ Q.T, atol=1e-12)
     np.testing.assert_allclose(basis.energy(ROWS), ((ROWS @ Q) ** 2).sum(axis=1), rtol=1e-12)
     np.testing.assert_allclose(basis.leverage, (Q**2).sum(axis=1), rtol=1e-12)
     own, _ = np.linalg.qr(DENSE[:, K:])
-    np.testing.assert_allclose(J.without_own, J.shared - own @ (own.T @ J.shared), atol=1e-12)
+    np.testing.assert_allclose(
+        J.without_own, J.shared_columns - own @ (own.T @ J.shared_columns), atol=1e-12
+    )
 
 
 def test_coordinates_on_a_bound_take_nothing():
@@ -62,7 +64,7 @@ def test_coordinates_on_a_bound_take_nothing():
     free[[1, 6, 8, 9]] = False
     Q, _ = np.linalg.qr(DENSE[:, free])
     np.testing.assert_allclose(
-        J.only(free).basis().without(ROWS), ROWS - (ROWS @ Q) @ Q.T, atol=1e-12
+        J.only(free).basis().project_out(ROWS), ROWS - (ROWS @ Q) @ Q.T, atol=1e-12
     )
     whole = np.zeros((len(ROWS), K + M * E))
     whole[:, free] = np.linalg.lstsq(DENSE[:, free], ROWS.T)[0].T

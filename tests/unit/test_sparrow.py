@@ -446,7 +446,7 @@ def test_simulations_of_an_iteration():
 
 def covariant_move(x, seed=3, **settings):
     optimizer = build("optimizer", {"name": "covariant_sparrow", "population": len(x), **settings})
-    return optimizer._proposed(x, np.random.default_rng(seed))
+    return optimizer._propose_points(x, np.random.default_rng(seed))
 
 
 def test_the_covariant_flock_moves_as_computed_by_hand():
@@ -470,7 +470,7 @@ def test_the_covariant_flock_moves_as_computed_by_hand():
 
     rng = Numbers(normal=[q, normal], permutation=[[1, 4, 0, 2, 3]], random=[coins])
     settings = {"population": N, "producers": 0.2, "perceivers": 0.4, "factor": 0.6, "mixing": 0.9}
-    got = build("optimizer", {"name": "covariant_sparrow", **settings})._proposed(X, rng)
+    got = build("optimizer", {"name": "covariant_sparrow", **settings})._propose_points(X, rng)
 
     other = [(a + b) % N for a, b in zip(one, step, strict=True)]
     mean = [(X[0, j] + X[1, j]) / 2 for j in range(D)]  # of the better half, two of five

@@ -89,7 +89,7 @@ def test_the_best_of_each_variant_is_kept_and_failures_are_counted(jobs):
     ):
         tally.add(one, ended(one, status, value))
     assert (tally.total, tally.done, tally.failed) == (4, 4, 1)
-    assert tally.ranked() == [("pso c1=1", 1.0), ("pso c1=0", 2.0)]
+    assert tally.rank_variants() == [("pso c1=1", 1.0), ("pso c1=0", 2.0)]
     assert tally.jobs == {"pso c1=0": 2, "pso c1=1": 2}
     assert tally.line().startswith(
         "  4 of 4 jobs, 1 failed, best objectives pso c1=1 1, pso c1=0 2; about 0 s left"
@@ -102,9 +102,9 @@ def test_the_time_left_is_that_of_the_pace_since_the_first_end(jobs, monkeypatch
     tally = progress.Tally(jobs)
     assert tally.line() == "  0 of 4 jobs; time left not known yet"
     tally.add(jobs[0], ended(jobs[0]))
-    assert tally.left == "time left not known yet"
+    assert tally.time_left == "time left not known yet"
     tally.add(jobs[1], ended(jobs[1]))
-    assert tally.left == "about 6 s left"  # one job in 3 s, two more
+    assert tally.time_left == "about 6 s left"  # one job in 3 s, two more
 
 
 def test_a_log_file_gets_a_line_now_and_then(jobs, monkeypatch, capsys):

@@ -29,7 +29,7 @@ def test_a_part_of_the_samples_has_those_from_one_time_to_another():
 @pytest.mark.parametrize("late", [None, np.arange(6.0)])
 def test_samples_come_back_from_plain_data(late):
     waves = Waves(np.arange(12.0).reshape(6, 2), 1.0, RATE, {"name": "one_cycle"}, late)
-    back = Waves.of(waves.to_dict())
+    back = Waves.from_content(waves.to_dict())
     assert (back.start, back.rate, back.estimator) == (1.0, RATE, {"name": "one_cycle"})
     assert (back.samples == waves.samples).all()
     assert (back.late is None) if late is None else (back.late == late).all()
@@ -40,11 +40,13 @@ def test_what_is_periodic_is_fitted_as_far_as_samples_and_rate_allow():
     x = np.array(
         [0.3 + np.cos(2 * np.pi * FREQUENCY * t) + 0.1 * np.sin(6 * np.pi * FREQUENCY * t)]
     )
-    series = Periodic.of(t, x, FREQUENCY, RATE)
+    series = Periodic.from_samples(t, x, FREQUENCY, RATE)
     assert len(series.coefficients) == 2 * int(0.45 * RATE / FREQUENCY) + 1
     assert pytest.approx(x, abs=1e-12) == (series.basis(t) @ series.coefficients).T
     assert series.rest == pytest.approx([0.0], abs=1e-12)
-    few = Periodic.of(t[:20], x[:, :20], FREQUENCY, RATE)  # three samples for each of its numbers
+    few = Periodic.from_samples(
+        t[:20], x[:, :20], FREQUENCY, RATE
+    )  # three samples for each of its numbers
     assert len(few.coefficients) == 2 * ((20 // 3 - 1) // 2) + 1
 
 

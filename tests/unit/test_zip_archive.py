@@ -52,11 +52,11 @@ def test_a_reader_finds_its_record_in_a_zip(pack, tmp_path):
     recording = comtrade.load(DATA / "tibet_50pct.cfg")
     comtrade.write(recording, tmp_path / "b.cff", "BINARY")
     pack({"a.csv": TABLE, "notes.txt": b"of words\n", "b.cff": (tmp_path / "b.cff").read_bytes()})
-    read = build("data", {"name": "comtrade", "path": "r.zip"}).opened()
+    read = build("data", {"name": "comtrade", "path": "r.zip"}).open_recording()
     assert [c.name for c in read.channels] == [c.name for c in recording.channels]
     assert read.source == "r.zip/b.cff"
     with pytest.raises(UserError, match=r"r.zip holds no file that ends in .cev"):
-        build("data", {"name": "sel", "path": "r.zip"}).opened()
+        build("data", {"name": "sel", "path": "r.zip"}).open_recording()
 
 
 def test_look_names_the_file_within(pack):

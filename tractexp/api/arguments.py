@@ -33,7 +33,7 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
     where, open_ended = f"{function.__name__}()", len(named) < len(signature.parameters)
 
     @functools.wraps(function)
-    def called(*args: P.args, **keywords: P.kwargs) -> R:
+    def call_checked(*args: P.args, **keywords: P.kwargs) -> R:
         for name in keywords:
             if name not in named and not open_ended:
                 raise UserError(
@@ -53,7 +53,7 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
         ):
             return function(*args, **keywords)
 
-    return called
+    return call_checked
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Choice(Plain):
     node: Mapping[str, Any]
 
     @classmethod
-    def of(
+    def from_argument(
         cls, group: str, chosen: "str | Mapping[str, Any] | Sequence[Any] | Choice | None"
     ) -> "Choice":
         """The choice of a name, of a mapping of `name` and settings that replace the choice's own,
@@ -99,13 +99,14 @@ class Choice(Plain):
         """
         if isinstance(chosen, Mapping) and "name" not in chosen:
             several = [
-                dataclasses.replace(cls.of(group, one), name=name) for name, one in chosen.items()
+                dataclasses.replace(cls.from_argument(group, one), name=name)
+                for name, one in chosen.items()
             ]
         else:
             listed = (
                 chosen if isinstance(chosen, Sequence) and not isinstance(chosen, str) else [chosen]
             )
-            several = [cls.of(group, one) for one in listed]
+            several = [cls.from_argument(group, one) for one in listed]
         check_distinct(f"{group}s", [one.name for one in several])
         return several
 

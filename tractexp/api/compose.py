@@ -97,7 +97,7 @@ class LoadModel(Portable, Plain, Tabulated):
                 settings[key] = {**getattr(self, key), **settings[key]}
         return replace(self, **settings)
 
-    def fitting(self, events: Sequence["Event"]) -> "LoadModel":
+    def add_shown_effects(self, events: Sequence["Event"]) -> "LoadModel":
         """The model with the effects that some of the events show, where it is one of
         `shown_effects`.
         """
@@ -167,7 +167,7 @@ def compose(
     composed = model_of(model, domain)
     chosen_parts = {"motor": motor, "static": static}
     parts = {
-        part: Choice.of(f"model/{part}", chosen).node
+        part: Choice.from_argument(f"model/{part}", chosen).node
         for part, chosen in chosen_parts.items()
         if chosen is not None
     }
@@ -199,11 +199,11 @@ def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
     showing = [
         cls()
         for cls in (get("effect", name) for name in sorted(names))
-        if cls.shown is not Effect.shown
+        if cls.describe_sign is not Effect.describe_sign
     ]
     taken = [effect for effect in showing if model.acceptance(effect).refusal is None]
     seen = domain_of(model).events(events) if taken else ()
-    how = {effect.name: next(filter(None, map(effect.shown, seen)), "") for effect in taken}
+    how = {effect.name: next(filter(None, map(effect.describe_sign, seen)), "") for effect in taken}
     return {name: sentence for name, sentence in how.items() if sentence}
 
 
@@ -236,7 +236,7 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
             " without)"
         )
     composed: dict[str, Any] = dict(given) | {
-        part: Choice.of(f"model/{part}", given[part]).node for part in PARTS
+        part: Choice.from_argument(f"model/{part}", given[part]).node for part in PARTS
     }
     for item in dataclasses.fields(LoadModel):
         if item.name in composed:

@@ -6,6 +6,7 @@ The investigation itself is `tractexp.discrepancy`; everything this file asks of
 """
 
 import functools
+import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -198,7 +199,7 @@ class Investigation(Written):
         return self.content["proposal"]
 
     @property
-    def proposed(self) -> list[str]:
+    def proposal_sentences(self) -> list[str]:
         """The proposal as sentences; why there is none where nothing explains."""
         from tractexp.discrepancy.proposal.wording import proposed_in_words
 
@@ -244,7 +245,7 @@ class Investigation(Written):
         return Gaps(gap(entry["train"]), held, entry["fitted_to_both"])
 
     @functools.cached_property
-    def extended(self) -> LoadModel:
+    def extended_model(self) -> LoadModel:
         """The model with the effects named: a model again, for any call. Raises `UserError` where
         none was named.
         """
@@ -262,6 +263,8 @@ class Investigation(Written):
             fixed=self.content["held"],
             window=window,
         )
+
+    extended = property(operator.attrgetter("extended_model"))  # its name in version 0.2
 
     @functools.cached_property
     def fit(self) -> Identification:
@@ -382,7 +385,7 @@ def investigate(
     from tractexp.discrepancy.criteria import Criteria
 
     check_range("seed", seed, 0)
-    thresholds = Criteria.of({"false_alarms": false_alarms, **(criteria or {})})
+    thresholds = Criteria.from_choices({"false_alarms": false_alarms, **(criteria or {})})
     base = model_of(model, domain).with_(bounds=bounds, fixed=fixed, substeps=substeps)
     if base.per_event:
         raise UserError(
@@ -390,7 +393,7 @@ def investigate(
             " out"
         )
     train, held = dips_together(records, validate)
-    base = base.fitting(train)
+    base = base.add_shown_effects(train)
     question = Question(
         train=train,
         validate=held,
@@ -419,7 +422,7 @@ def _steps(question: Question, progress: Progress) -> "Steps":
             base.fixed,
             only=q.effects,
             substeps=base.substeps,
-            criteria=Criteria.of({"false_alarms": q.false_alarms, **q.criteria}),
+            criteria=Criteria.from_choices({"false_alarms": q.false_alarms, **q.criteria}),
             priors=base.priors,
             shown=tuple(base.shown),
             search=functools.partial(_search_end, q.seed),
@@ -432,7 +435,7 @@ def _search_end(seed: int, problem: Problem) -> np.ndarray:
     """The free values (d,) at which the search of an identification ends that is asked for nothing
     unusual.
     """
-    end = search(problem, Choice.of("optimizer", None).build("optimizer"), seed)
+    end = search(problem, Choice.from_argument("optimizer", None).build("optimizer"), seed)
     refuse_failed(problem, end)
     return end.values
 
@@ -540,7 +543,7 @@ class Discrepancy(Task, call=investigate):
             artifacts.append(conf)
         return super().track(job, result, artifacts)
 
-    def logged(self, job: Job, result: Investigation) -> dict[str, Any]:
+    def collect_log(self, job: Job, result: Investigation) -> dict[str, Any]:
         """Verdict, gap and page, and below this run one for every set of effects that
         was refitted.
         """

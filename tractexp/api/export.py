@@ -116,7 +116,7 @@ def export(
     ]
     agreement, more = play_back_export(form, text, identified) if playback else (None, [])
     if agreement is not None:
-        more.append(agreement.said(identified.power, ("MW", "Mvar")))
+        more.append(agreement.describe_differences(identified.power, ("MW", "Mvar")))
     share = None if agreement is None else agreement.share
     return Exported(format, form.suffix, identified.model.title, text, (*notes, *more), share)
 
@@ -139,7 +139,7 @@ def _objections(fit: Identification) -> list[str]:
 
 def _powers(load: "Identified") -> str:
     """What the load and its parts draw before the dip, in a sentence."""
-    before, scale = load.before, load.power
+    before, scale = load.steady_state, load.power
     rows = {"load": (load.ratio * load.result.before["P0"], load.ratio * load.result.before["Q0"])}
     rows |= {
         part: (before[f"P_{part}"], before[f"Q_{part}"])

@@ -127,7 +127,7 @@ def generalise(
     Raises `UserError` for wrong names or values, and where no dip is held out.
     """
     check_range("task.seeds", seeds, 1)
-    setup = Setup.of(
+    setup = Setup.from_arguments(
         records,
         model,
         validate,
@@ -275,7 +275,7 @@ class Generalise(Task, call=generalise):
         }
         return super().perform(job.holding_out(self.held_out), optimizers=compared, **instead)
 
-    def logged(self, job: Job, result: Generalised) -> dict[str, Any]:
+    def collect_log(self, job: Job, result: Generalised) -> dict[str, Any]:
         """The residuals of each optimizer's first seed, by the number of the held-out dip."""
         rows = result.residuals
         dips = sum(

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from tractexp.identification.uncertainty import Uncertainty
 
 FIXED = "fixed"
-FORMS[Result] = (asdict, lambda content: Result.of(content, "the saved result"))
+FORMS[Result] = (asdict, lambda content: Result.from_content(content, "the saved result"))
 LEAST_TOLD_MOVE = 2.0  # standard errors from which a rival structure's move is told
 
 
@@ -164,7 +164,9 @@ class Identification(Written):
     behind: "FitDetails | None" = None  # None where it was loaded
 
     @classmethod
-    def of(cls, setup: FitSpec, end: SearchResult, progress: Progress = False) -> "Identification":
+    def from_search(
+        cls, setup: FitSpec, end: SearchResult, progress: Progress = False
+    ) -> "Identification":
         """Judge what a search found."""
         result, details = _conclude_identification(setup, end, progress)
         return cls(result, setup, end, details)
@@ -257,7 +259,7 @@ class Identification(Written):
         """
         from tractexp.exchange.operating_point import OperatingPoint
 
-        return OperatingPoint.of(self.result)
+        return OperatingPoint.from_result(self.result)
 
     @property
     def doubts(self) -> list[str]:
@@ -288,7 +290,7 @@ class Identification(Written):
             raise UserError(
                 "this result.json has no model_error: it is of an earlier version; identify again"
             )
-        return ModelError.of(content)
+        return ModelError.from_content(content)
 
     @property
     def yardstick(self) -> str:
@@ -376,7 +378,7 @@ class Identification(Written):
         ]
 
     @property
-    def astray(self) -> list[str]:
+    def outside_interval(self) -> list[str]:
         """Parameters whose interval does not hold the value that the search ended at."""
         return [
             e.name
@@ -395,14 +397,16 @@ class Identification(Written):
         )
         errors = ", ".join(f"{name} {epsilon(s[name])}" for name in ("epsilon_p", "epsilon_q"))
         end += f" {self.result.objective:.4g}), {errors},"
-        return f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s{self._apart}"
+        return (
+            f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s{self._search_difference}"
+        )
 
     @property
-    def _apart(self) -> str:
+    def _search_difference(self) -> str:
         """Where the search's end differs from the estimate, as the end of a sentence; "" where it
         does not.
         """
-        if not (away := self.astray):
+        if not (away := self.outside_interval):
             return ""
         ratio = (
             self.result.search["objective"] / self.result.objective
@@ -436,7 +440,7 @@ class Identification(Written):
                 **end | {"values": np.array(end["values"], dtype=float), "history": history}
             )
         return cls(
-            Result.of(content["result"], "the saved result"),
+            Result.from_content(content["result"], "the saved result"),
             setup and FitSpec.from_dict(setup),
             end,
         )
@@ -476,7 +480,7 @@ def identify(
 
     `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of
     `validate` are only judged. `model` is a choice of `conf/model`, the path of such a YAML file,
-    or what `tractexp.compose` or an investigation (`found.extended`) made; `bounds`, `fixed`,
+    or what `tractexp.compose` or an investigation (`found.extended_model`) made; `bounds`, `fixed`,
     `per_event`, `substeps`, `domain` and `priors` are as in `tractexp.compose`: with
     `domain="waves"` the records' sampled currents are fitted, not the power that phasors show.
 
@@ -493,7 +497,7 @@ def identify(
     nothing tried can be simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt
     whose `result` holds what was found so far.
     """
-    setup = FitSpec.of(
+    setup = FitSpec.from_arguments(
         records,
         model,
         validate,
@@ -508,15 +512,17 @@ def identify(
         budget=budget,
         time_limit=time_limit,
         target=target,
-        optimizer=Choice.of("optimizer", optimizer),
+        optimizer=Choice.from_argument("optimizer", optimizer),
         check_intervals=check_intervals,
     )
     end = None
     try:
         end = setup.search_end(progress)
-        return Identification.of(setup, end, progress)
+        return Identification.from_search(setup, end, progress)
     except KeyboardInterrupt as stop:
-        raise Stopped.of(stop, result=setup.so_far(end or getattr(stop, "state", None))) from None
+        raise Stopped.from_interrupt(
+            stop, result=setup.so_far(end or getattr(stop, "state", None))
+        ) from None
 
 
 def _conclude_identification(
@@ -578,7 +584,7 @@ def _with_priors(problem: Problem, result: Result) -> list[str]:
     """
     from tractexp.exchange.operating_point import OperatingPoint
 
-    point = OperatingPoint.of(result)
+    point = OperatingPoint.from_result(result)
     if (
         problem.priors
         or not (point and point.doubt)
@@ -601,7 +607,7 @@ class Identify(Task, call=identify):
     def draws(self, job: Job) -> bool:
         return not job.of_many if self.figures is None else self.figures
 
-    def logged(self, job: Job, result: Identification) -> dict[str, Any]:
+    def collect_log(self, job: Job, result: Identification) -> dict[str, Any]:
         from tractexp.api.logged import logged_fit
 
         predictor = not job.of_many if self.predictor is None else self.predictor

@@ -75,8 +75,8 @@ class NetworkFit(Written):
         the power before it. Raises `UserError` where the event lacks the samples of its domain.
         """
         (one,) = dips_of("event", event, least=1)[:1]
-        own = OwnBase.at(self.train[0].record)
-        return response_of(_play(self.box, own.put(one), "validate"), one, own)
+        own = OwnBase.from_record(self.train[0].record)
+        return response_of(_play(self.box, own.convert_event(one), "validate"), one, own)
 
     def table(self) -> Table:
         from tractexp.report.linear_network import poles
@@ -171,9 +171,9 @@ def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[s
         own = model_errors(_play_network(one, of))
         held = own["held_out"] and own["held_out"]["value"]
         by_poles.append({"poles": len(one.poles), "model_error": own["value"], "held_out": held})
-    sentence = f"{network_in_words(len(box.poles))} leaves {ModelError.of(error)}"
+    sentence = f"{network_in_words(len(box.poles))} leaves {ModelError.from_content(error)}"
     if error["held_out"]:
-        sentence += f", and of the held-out dips {ModelError.of(error['held_out'])}"
+        sentence += f", and of the held-out dips {ModelError.from_content(error['held_out'])}"
     return {
         "sentence": sentence,
         "poles": box.poles,
@@ -182,7 +182,8 @@ def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[s
         "events": [fit.to_dict() for fit in fits],
         "by_poles": by_poles,
         "records": [
-            {"role": f.role, "name": f.event.record.name} | Identity.at(f.event.record).to_dict()
+            {"role": f.role, "name": f.event.record.name}
+            | Identity.from_record(f.event.record).to_dict()
             for f in fits
         ],
         "tractexp_version": provenance.version(),
@@ -205,7 +206,7 @@ class LinearNetwork(Task, call=linear_network):
     def perform(self, job: Job, **instead: Any) -> NetworkFit:
         return super().perform(job, domain=job.config["model"]["domain"], **instead)
 
-    def logged(self, job: Job, result: NetworkFit) -> dict[str, Any]:
+    def collect_log(self, job: Job, result: NetworkFit) -> dict[str, Any]:
         error = result.content["model_error"]
         metrics = {"model_error": error["value"], "poles": len(result.poles)}
         if error["held_out"]:

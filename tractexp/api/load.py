@@ -30,7 +30,7 @@ def load(path: str | Path) -> Outcome:
         raise UserError(
             f"{path} holds a result of kind '{content['kind']}', which is not known{why}"
         )
-    return kinds[content["kind"]].revived(content)
+    return kinds[content["kind"]].from_saved(content)
 
 
 def _bare(path: str | Path) -> bool:

@@ -202,11 +202,13 @@ class Look(Written):
 
         return look_console.summary(self.content)
 
-    def everything(self) -> Report:
+    def build_full_report(self) -> Report:
         """Notes, channels, why the loads are such, all events and all commands."""
         from tractexp.report import look_console
 
         return look_console.build_full_report(self.content)
+
+    everything = build_full_report  # its name in version 0.2
 
     def report(self) -> Report:
         from tractexp.report import look

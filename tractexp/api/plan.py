@@ -54,7 +54,7 @@ class Forecasts(Written):
     behind: "Planned | None" = None  # None where it was loaded
 
     @functools.cached_property
-    def planned(self) -> Planned:
+    def forecast(self) -> Planned:
         """What stands behind the page; of a loaded result it is computed again."""
         return self.behind or _forecast_plan(self.setup, **self.asked)
 
@@ -76,7 +76,7 @@ class Forecasts(Written):
         return shown.summary(self.content)
 
     def report(self) -> Report:
-        return shown.report(self.planned, self.content)
+        return shown.report(self.forecast, self.content)
 
 
 @public
@@ -129,7 +129,9 @@ def plan(
         check_range("task.least", least, 0.0, 1.0)
         check_range("task.events", events, 1)
         check_range("task.noise", noise, 1e-9, 1.0)
-    setup = Setup.of(records, model, bounds=bounds, fixed=fixed, substeps=substeps, domain=domain)
+    setup = Setup.from_arguments(
+        records, model, bounds=bounds, fixed=fixed, substeps=substeps, domain=domain
+    )
     if rivals:
         return recommend_event(setup, rivals, progress)
     error = 0.0
@@ -213,7 +215,7 @@ def _shape(
     replaced.
     """
     shape = replace(
-        DipShape.of(event, seen),
+        DipShape.from_event(event, seen),
         **{key: value for key, value in given.items() if value is not None},
     )  # type: ignore[arg-type]
     if noise is not None:
@@ -235,7 +237,7 @@ def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, No
         origin = f"the estimate of {event.record.name}"
         if not fit.surprise.adequate:
             origin += ", though more than noise is left there, which the forecast counts as noise"
-        at, noise = fit.uncertainty.values, fit.uncertainty.likelihood.noise.of(0)
+        at, noise = fit.uncertainty.values, fit.uncertainty.likelihood.noise.select_event(0)
         missed = 0.0 if fit.surprise.adequate else model_error(play(problem, at)).value
         return at, origin, noise, missed
     if values == DEFAULT:
@@ -261,13 +263,13 @@ def _missed_by(result: Result) -> float:
     told = result.model_error
     if not told or result.adequacy.get("grade") == Grade.ADEQUATE:
         return 0.0
-    return ModelError.of(told.get("held_out") or told).value
+    return ModelError.from_content(told.get("held_out") or told).value
 
 
 def _scans(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
     """{label: (x, forecasts)}: one property of the dip varied at a time."""
 
-    def over(key: str, grid: tuple[float, ...]) -> Any:
+    def scan_shapes(key: str, grid: tuple[float, ...]) -> Any:
         shapes = [replace(shape, **{key: x}) for x in grid]
         return grid, [planning.forecast(problem, values, s) for s in shapes]
 
@@ -276,10 +278,10 @@ def _scans(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
     loud = [replace(shape, noise_P=x * P, noise_Q=x * P) for x in NOISES]
     scans = {
         DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth),
-        DURATION: over("duration", DURATIONS),
+        DURATION: scan_shapes("duration", DURATIONS),
     }
-    scans |= {GRIDS[name][0]: over(name, GRIDS[name][1]) for name in shape.domain.shaped_by}
-    scans[RATE] = over("rate", shape.domain.rates(shape.frequency))
+    scans |= {GRIDS[name][0]: scan_shapes(name, GRIDS[name][1]) for name in shape.domain.shaped_by}
+    scans[RATE] = scan_shapes("rate", shape.domain.rates(shape.frequency))
     return scans | {
         shape.domain.planned_noise: (NOISES, [planning.forecast(problem, values, s) for s in loud])
     }
@@ -335,7 +337,7 @@ class Plan(Task, call=plan):
     earlier result.json.
     """
 
-    def logged(self, job: Job, result: Forecasts | Recommended) -> dict[str, Any]:
+    def collect_log(self, job: Job, result: Forecasts | Recommended) -> dict[str, Any]:
         if isinstance(result, Recommended):
             name = f"plan to tell {len(result.rivals)} explanations apart"
             return {"name": name, "metrics": {"probability": result.probability}}

@@ -39,7 +39,7 @@ class Sampled(Written):
     behind: "PosteriorSample | None" = None  # None where it was loaded
 
     @functools.cached_property
-    def drawn(self) -> "PosteriorSample":
+    def sample(self) -> "PosteriorSample":
         """The sample; of a loaded result it is drawn again, from the same seed."""
         from tractexp.identification.posterior import sample
 
@@ -51,7 +51,7 @@ class Sampled(Written):
     @property
     def draws(self) -> dict[str, np.ndarray]:
         """Draws (n,) of each free parameter, by name."""
-        return dict(zip(self.drawn.names, self.drawn.draws.T, strict=True))
+        return dict(zip(self.sample.names, self.sample.draws.T, strict=True))
 
     def table(self) -> Table:
         span, r = "{:.4g} .. {:.4g}".format, self.fit.result
@@ -79,7 +79,7 @@ class Sampled(Written):
     def report(self) -> Report:
         from tractexp.report import posterior
 
-        return posterior.report(self.fit.details.uncertainty, self.drawn, self.fit.headline)
+        return posterior.report(self.fit.details.uncertainty, self.sample, self.fit.headline)
 
     def write_results(self, folder: Path) -> list[Path]:
         packed = io.BytesIO()
@@ -120,7 +120,7 @@ def posterior(
         "intervals": dict(zip(drawn.names, drawn.intervals.tolist(), strict=True)),
         "autocorrelation": drawn.autocorrelation,
         "acceptance": drawn.acceptance,
-        "converged": drawn.converged,
+        "converged": drawn.has_converged,
         "seconds": time.perf_counter() - started,
     }
     return Sampled(fit, settings, files.plain(content), drawn)
@@ -132,7 +132,7 @@ class Posterior(Task, call=posterior):
     .json and .npz.
     """
 
-    def logged(self, job: Job, result: Sampled) -> dict[str, Any]:
+    def collect_log(self, job: Job, result: Sampled) -> dict[str, Any]:
         from tractexp.api.logged import logged_fit
 
         return logged_fit(job, result.fit)

@@ -149,7 +149,7 @@ class Profile(Task, call=profile):
     profile.json.
     """
 
-    def logged(self, job: Job, result: Profiled) -> dict[str, Any]:
+    def collect_log(self, job: Job, result: Profiled) -> dict[str, Any]:
         from tractexp.api.logged import logged_fit
 
         return logged_fit(job, result.identification)

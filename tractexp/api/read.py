@@ -227,7 +227,7 @@ def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     if not files.exists(path):
         shipped = choices(GROUP, files=True)
         if path in shipped:
-            return {**Choice.of(GROUP, path).node, **settings}
+            return {**Choice.from_argument(GROUP, path).node, **settings}
         if not Path(path).suffix:
             raise UserError(
                 f"{path} is neither a file with an ending nor a shipped"
@@ -265,9 +265,9 @@ def record_from_dict(content: Mapping[str, Any]) -> Record:
     }
     base, notes = Base(**content["base"]), tuple(content["notes"])
     original = Base(**content["given_base"]) if content.get("given_base") else None
-    window = Window.of(content["window"]) if content.get("window") else None
+    window = Window.from_content(content["window"]) if content.get("window") else None
     more = {name: np.array(values, dtype=float) for name, values in content.get("more", {}).items()}
-    waves = Waves.of(content["waves"]) if content.get("waves") else None
+    waves = Waves.from_content(content["waves"]) if content.get("waves") else None
     return Record(
         content["name"],
         base=base,

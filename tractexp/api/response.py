@@ -120,7 +120,9 @@ def respond_to(
     from tractexp.identification.result import respond
 
     return response_of(
-        respond(model, values, event if own is None else own.put(event), "validate"), event, own
+        respond(model, values, event if own is None else own.convert_event(event), "validate"),
+        event,
+        own,
     )
 
 
@@ -128,7 +130,7 @@ def response_of(fit: "Fit", event: Event, own: OwnBase | None = None) -> Respons
     """What was calculated of an event on the base `own`, on that of its file."""
     # of waveforms, as the estimator sees recorded and calculated currents
     record = fit.event.record
-    ratio = OwnBase.at(record).ratio if own is not None else 1.0
+    ratio = OwnBase.from_record(record).ratio if own is not None else 1.0
     P, Q, *measured = (ratio * power for power in (fit.P, fit.Q, record.P, record.Q))
     errors, notes = (
         (fit.epsilon_p, fit.epsilon_q),

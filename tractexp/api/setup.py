@@ -44,7 +44,7 @@ class Setup(Given):
     target: float | None = None
 
     @classmethod
-    def of(
+    def from_arguments(
         cls, records: Any, model: Any, validate: Any = (), objective: Any = None, **given: Any
     ) -> Self:
         """From the arguments of a call: those of the model replace its own where they
@@ -54,12 +54,12 @@ class Setup(Given):
             check_range(key, given.get(key), least)
         train, held = dips_together(records, validate)
         of_model = {key: given.pop(key) for key in OF_MODEL if key in given}
-        load = model_of(model, of_model.get("domain")).with_(**of_model).fitting(train)
+        load = model_of(model, of_model.get("domain")).with_(**of_model).add_shown_effects(train)
         return cls(
             train=train,
             validate=held,
             model=load,
-            objective=Choice.of("objective", objective),
+            objective=Choice.from_argument("objective", objective),
             **given,
         )
 
@@ -116,7 +116,7 @@ def describe_records(
             yield f"{role}: {describe(event)}"
             if (
                 event.record.source
-                and (identity := Identity.at(event.record).recording) not in said
+                and (identity := Identity.from_record(event.record).recording) not in said
             ):
                 said.append(identity)
                 yield f"  record: {identity}"

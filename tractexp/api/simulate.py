@@ -263,7 +263,7 @@ class Simulate(Task, call=simulate):
         instead["records"] = () if self.by_hand else [*job.events.train, *job.events.validate]
         return super().perform(job, **instead)
 
-    def logged(self, job: Job, result: Simulation) -> dict[str, Any]:
+    def collect_log(self, job: Job, result: Simulation) -> dict[str, Any]:
         errors = {
             f"event_{k}_epsilon_{c}": error
             for k, one in enumerate(result.responses, start=1)

@@ -212,7 +212,7 @@ def _best(
     if not names:
         raise UserError(f"no event in {folder} is worth fitting; the table says why")
     events = [detect(record) for record in archive.records(folder, list(names), DATA.train)]
-    return chosen_events(Setup.of(events, model, **settings), values, most)
+    return chosen_events(Setup.from_arguments(events, model, **settings), values, most)
 
 
 @plugin
@@ -251,7 +251,7 @@ class Survey(Task, call=survey, given=("folder", "keep")):
         data = {"name": node["name"], "path": node["path"], "train": result.informative}
         return Surveyed({**result.content, "command": build_typed_command(data, *model)})
 
-    def logged(self, job: Job, result: Surveyed) -> dict[str, Any]:
+    def collect_log(self, job: Job, result: Surveyed) -> dict[str, Any]:
         rows = result.content["rows"]
         metrics = {
             "files": result.content["files"],

@@ -107,7 +107,7 @@ def _without_events(view: View) -> dict[str, str]:
     """
     unexamined = list(dict.fromkeys(shown.unexamined for shown in view.sights if shown.unexamined))
     if not view.sights or (
-        len(unexamined) and all(shown.unexamined or not shown.loaded for shown in view.sights)
+        len(unexamined) and all(shown.unexamined or not shown.is_loaded for shown in view.sights)
     ):
         return {"kind": UNEXAMINED, "why": "; ".join(unexamined) or UNRECOGNISED}
     return {"kind": QUIET, "why": _quiet(view)}

@@ -69,7 +69,7 @@ SOURCES = {
     "model": Source(LOAD, lambda job: job.config["model"]),
     "optimizer": Source(("optimizer",), lambda job: job.chosen),
     "seed": Source((), lambda job: job.seed),
-    "fit": Source(("data", "model", *SEARCH), lambda job: job.identified()),
+    "fit": Source(("data", "model", *SEARCH), lambda job: job.identify_load()),
     # of many jobs nobody reads each profile
     "check_intervals": Source((), lambda job: not job.of_many),
     "progress": Source((), lambda job: job.tell),
@@ -174,9 +174,9 @@ class Task(Plugin):
     def track(self, job: "Job", result: Any, paths: list[Path]) -> "TrackedRun | None":
         """The run as it is logged, with files of its folder; None where none is."""
         content = {"name": self.name, "artifacts": [*paths, job.folder / ".hydra"]}
-        return job.track(**content | self.logged(job, result))
+        return job.track(**content | self.collect_log(job, result))
 
-    def logged(self, job: "Job", result: Any) -> dict[str, Any]:
+    def collect_log(self, job: "Job", result: Any) -> dict[str, Any]:
         """What is logged of a result: fields of `tractexp.tracking.TrackedRun`, and `values` that
         were given.
         """
@@ -296,7 +296,7 @@ class Job:
         """The identification problem (a `Problem`)."""
         from tractexp.api.setup import Setup
 
-        return Setup.of(
+        return Setup.from_arguments(
             self.events.train, self.config["model"], objective=self.config["objective"]
         ).problem
 
@@ -333,7 +333,7 @@ class Job:
         self.prepare_log()
         say(line)
 
-    def identified(self, **instead: Any) -> Any:
+    def identify_load(self, **instead: Any) -> Any:
         """The identification that model, objective, optimizer and limits describe (an
         `Identification`).
         """
@@ -362,7 +362,10 @@ class Job:
         named = self.choices["data"] != self.config["data"]["name"]
         if named or not get("task", self.config["task"]["name"]).takes_records():
             return []
-        return [Identity.at(event.record) for event in (*self.events.train, *self.events.validate)]
+        return [
+            Identity.from_record(event.record)
+            for event in (*self.events.train, *self.events.validate)
+        ]
 
     @property
     def label(self) -> str:
@@ -473,7 +476,7 @@ class Job:
                 if "_logger" in self.__dict__
                 else tracking.log(entry.run, self.store)
             )
-            entry.logged(run_id)
+            entry.mark_logged(run_id)
         except UserError as error:
             say(f"not logged: {error}")
             named = (

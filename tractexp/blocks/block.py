@@ -239,7 +239,7 @@ class Report:
         return self.add(Figure(drawing, caption or path.stem))
 
     @contextmanager
-    def folded(self, summary: str) -> Iterator[None]:
+    def fold_blocks(self, summary: str) -> Iterator[None]:
         """What is added inside is hidden on a page until the reader opens it."""
         outside, self.blocks = self.blocks, []
         yield

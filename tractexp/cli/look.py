@@ -52,7 +52,7 @@ def look(arguments: list[str]) -> int:
 
     view = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
     rest = f"  everything: {quoting.shell('tractexp', 'look', *chosen.file, '--all')}"
-    show(view.everything() if chosen.all else view.summary().text(rest), console())
+    show(view.build_full_report() if chosen.all else view.summary().text(rest), console())
     usual = FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
     print_paths(view.write(chosen.folder or files.new_folder(usual)))
     return 0

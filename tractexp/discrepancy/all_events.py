@@ -60,16 +60,20 @@ class AllEvents:
     @functools.cached_property
     def context(self) -> Context:
         records = self.fitted.records
-        return self.fitted.on(Records.of((*records.recorded, *self.events), records.window))
+        return self.fitted.move_to_records(
+            Records.from_events((*records.recorded, *self.events), records.window)
+        )
 
     @functools.cached_property
     def quiet(self) -> QuietNoise:
-        return QuietNoise.at(self.context, self.context.coordinates.widened(self.bare.unit))
+        return QuietNoise.from_context(
+            self.context, self.context.coordinates.widen_coordinates(self.bare.unit)
+        )
 
     @functools.cached_property
     def level(self) -> Noise:
         """The noise of all events."""
-        return self.noise.on(self.context.problem.power, self.quiet.input_modes)
+        return self.noise.apply_to_events(self.context.problem.power, self.quiet.input_modes)
 
     @functools.cached_property
     def plain(self) -> Refit:
@@ -77,7 +81,7 @@ class AllEvents:
         return refit(
             self.context,
             self.level,
-            [((), self.context.coordinates.widened(self.bare.unit))],
+            [((), self.context.coordinates.widen_coordinates(self.bare.unit))],
             faults=(),
         )[0]
 
@@ -116,7 +120,7 @@ class AllEvents:
             if len(fit.names) > 1
         }
         at = self.fitted.coordinates
-        wanted = [(names, at.without(fit.unit, [left])) for left, names in rest.items()]
+        wanted = [(names, at.remove_effects(fit.unit, [left])) for left, names in rest.items()]
         there = [self.refits[names] for names, _ in wanted if names in self.refits]
         wanted += [(f.names, at.without_faults(f.unit, self.faults)) for f in there]
         fits = (
@@ -140,7 +144,8 @@ class AllEvents:
         if not np.isfinite(self.plain.deviance):
             return 1.0
         wide = [
-            self.context.coordinates.widened(minimum) for minimum in (self.bare.unit, *local_minima)
+            self.context.coordinates.widen_coordinates(minimum)
+            for minimum in (self.bare.unit, *local_minima)
         ]
         return disagreement(fitted_from(self.context, wide, wide[1:]), seed).p_left
 
@@ -150,7 +155,10 @@ class AllEvents:
             settings += itertools.chain.from_iterable(
                 self.context.catalogue[name].settings for name in alone.names
             )
-        wanted = [(alone.names, at.placed(at.widened(alone.unit), setting)) for setting in settings]
+        wanted = [
+            (alone.names, at.place_values(at.widen_coordinates(alone.unit), setting))
+            for setting in settings
+        ]
         return (wide_refit if anew else refit)(self.context, self.level, wanted, self.faults)
 
     def _narrow(self, fit: Refit) -> np.ndarray:

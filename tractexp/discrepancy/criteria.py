@@ -111,7 +111,7 @@ class Criteria:
             )
 
     @classmethod
-    def of(cls, chosen: Mapping[str, float]) -> "Criteria":
+    def from_choices(cls, chosen: Mapping[str, float]) -> "Criteria":
         """The criteria with some of them chosen. Raises `UserError` for an unknown name or a value
         out of range.
         """
@@ -125,7 +125,7 @@ class Criteria:
         return cls(**{name: float(value) for name, value in chosen.items()})
 
     @property
-    def naming(self) -> float:
+    def naming_false_alarms(self) -> float:
         """The false-alarm rate that naming may spend."""
         return NAMING_SHARE * self.false_alarms
 

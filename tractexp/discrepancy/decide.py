@@ -114,7 +114,7 @@ def needs_all_events(rows: Sequence[SetEvidence], criteria: Criteria) -> bool:
     first = rows[0]
     if len(rows) > 1 or len(first.names) > 1 or first.names != first.family or first.gap is None:
         return True
-    return first.gap.explained < share_gone(criteria.divides) or not holds(first, criteria)
+    return first.gap.explained_share < share_gone(criteria.divides) or not holds(first, criteria)
 
 
 def is_confirmed(row: SetEvidence, evidence: Evidence) -> bool:

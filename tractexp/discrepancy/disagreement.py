@@ -57,10 +57,10 @@ class Disagreement:
     def context(self) -> Context:
         return self.tangent.context
 
-    def at(self, context: Context, fit: Refit, noise: Noise) -> "Disagreement":
+    def score_fit(self, context: Context, fit: Refit, noise: Noise) -> "Disagreement":
         """The scores at another fit under a noise, by what chance does at this one."""
         t = tangent(context, fit, noise)
-        projection = t.whitened(noise)
+        projection = t.build_score_test(noise)
         return Disagreement(fit, noise, t, projection, self.chance, projection.scores())
 
     @property
@@ -73,7 +73,7 @@ class Disagreement:
         return GoodnessOfFit(self.chance.surprises(self.projection, self.context))
 
     @property
-    def left(self) -> dict[str, float]:
+    def p_by_test(self) -> dict[str, float]:
         """How often chance leaves as much, by each test."""
         return self.goodness_of_fit.p_by_test
 
@@ -88,7 +88,7 @@ class Disagreement:
         return self.p_left >= self.criteria.adequate_p
 
     @property
-    def undecided(self) -> bool:
+    def is_undecided(self) -> bool:
         """Whether the draws leave that open: their scales are not exact."""
         level = self.criteria.adequate_p
         return not self.chance.scales and level / MISSED < self.p_left < level * MISSED
@@ -99,7 +99,7 @@ class Disagreement:
         return self.goodness_of_fit.most_significant_test
 
     @property
-    def resting(self) -> list[str]:
+    def parameters_at_bound(self) -> list[str]:
         """Parameters that rest on a bound: better values lie beyond it."""
         names = {k: name for name, k in self.context.coordinates.column.items()}
         return [names[k] for k in self.tangent.held]
@@ -112,7 +112,7 @@ class Disagreement:
     @property
     def level(self) -> float:
         """The p that one more name must undercut."""
-        level = self.chance.critical_p(self.criteria.naming)
+        level = self.chance.critical_p(self.criteria.naming_false_alarms)
         return min(level, self.criteria.further_name_p) if self.fit.names else level
 
     @property
@@ -155,19 +155,21 @@ def examine_fit(
     context = quiet.context
     t = tangent(context, fit, noise)
     for _ in range(NOISE_ROUNDS):
-        noise = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
+        noise = quiet.estimate_noise(
+            fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining_columns
+        )
         fit = refit(context, noise, [(fit.names, fit.unit)])[0]
         t = tangent(context, fit, noise)
         if fit.deviance > QUIETER * context.samples:
             break  # else this is the noise of a worse fit
-    projection = t.whitened(noise)
+    projection = t.build_score_test(noise)
     scores = projection.scores()
     chance = chance_at(t, projection, noise, quiet, seed, plain=True)
     result = Disagreement(fit, noise, t, projection, chance, scores)
     plain = plain or is_noise_exact(context, noise) or (bool(scores) and scores[0].p < PLAIN)
     if not plain and result.doubtful:
         result = replace(result, chance=chance_at(t, projection, noise, quiet, seed, plain=False))
-    if result.undecided:
+    if result.is_undecided:
         result = replace(
             result, chance=replace(result.chance, scales=scales(t, projection, noise, seed))
         )

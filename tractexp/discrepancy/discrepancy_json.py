@@ -51,7 +51,7 @@ def content(investigation: Findings) -> dict[str, Any]:
             {"effects": list(names), "model_error": files.plain(error)}
             for names, error in investigation.contributions
         ],
-        "left": investigation.last.left,
+        "left": investigation.last.p_by_test,
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
         "remainder": _remainder(investigation),
@@ -63,7 +63,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         else investigation.next_event.to_dict(),
         "base_adequacy": investigation.base_grade.adequacy.to_dict(),
         "adequacy": investigation.final_grade.adequacy.to_dict(),
-        "held": investigation.held,
+        "held": investigation.undetermined_values,
         "extended": MODEL_FILE.as_posix() if investigation.names else None,
         "noise": investigation.context.describe(investigation.last.noise),
         "phasor_window": None if window is None else window.window,
@@ -97,7 +97,7 @@ def recommendation(investigation: Findings) -> str:
                 "find what is missing still: by further events, or with the extended model as the"
                 " base model"
             )
-        held = investigation.held
+        held = investigation.undetermined_values
         rest = (
             f"; these events cannot tell {join_words(list(held))}, which it holds" if held else ""
         )
@@ -222,7 +222,8 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     near, tests = investigation.nearest, investigation.tests
     nearest = near and (near.carried or near.curves)[1].error
     before, after = (
-        investigation.judged(one) for one in (investigation.base_grade, investigation.final_grade)
+        investigation.select_misfit(one)
+        for one in (investigation.base_grade, investigation.final_grade)
     )
     return {
         "model_error": _error(nearest or after.error),
@@ -262,7 +263,7 @@ def write_left(investigation: Findings, path: Path) -> Path:
     near = (investigation.train.after if nearest is None else nearest.curves[1]).calculated
     lines = [",".join(["event", "t", *drive.names])]
     for e, event in enumerate(investigation.context.events):
-        left = drive.measured[:, drive.part(e)] - near[:, drive.part(e)]
+        left = drive.measurements[:, drive.part(e)] - near[:, drive.part(e)]
         rows = list(zip(event.record.t, *left, strict=True))[event.first :]
         lines += [
             ",".join([quoting.csv(event.record.name), *(f"{x:.9g}" for x in row)]) for row in rows
@@ -388,7 +389,7 @@ def write_model(
     settings = {
         part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")
     }
-    held, window = investigation.held, recorder_window(investigation)
+    held, window = investigation.undetermined_values, recorder_window(investigation)
     extended: dict[str, Any] = {
         "defaults": [
             {"motor": node["motor"]["name"]},
@@ -421,7 +422,7 @@ def _explain_model(
     """What the extended model is, and why it holds what it holds, a sentence each."""
     lines = [f"The base model with what was found missing: {join_words(investigation.names)}."]
     if not investigation.verdict.complete:
-        left = investigation.judged(investigation.final_grade).error.value
+        left = investigation.select_misfit(investigation.final_grade).error.value
         lines.append(
             f"Something is missing still: it misses {in_percent(left)} of the load's response."
         )

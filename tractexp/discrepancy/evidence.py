@@ -42,7 +42,7 @@ class PredictedError:
     stalls: tuple[str, ...] = ()
 
     @property
-    def left(self) -> float:
+    def excess(self) -> float:
         """The squares beyond the noise, no less than can be told of them."""
         noise = float(self.noise.sum())
         return max(float(self.squares.sum()) - noise, FINEST * noise, LEAST_SQUARED_ERROR)
@@ -50,7 +50,7 @@ class PredictedError:
     @property
     def error(self) -> float:
         """The model's error, of the response."""
-        return float(np.sqrt(self.left / max(self.response.sum(), 1e-30)))
+        return float(np.sqrt(self.excess / max(self.response.sum(), 1e-30)))
 
     def compute_lead(self, other: "Prediction") -> float:
         """By how much it leaves less, beyond chance: of the ratio's logarithm, by a jackknife over
@@ -88,7 +88,7 @@ class PredictedDeviance:
         return self.curves.error.stalls
 
     @property
-    def left(self) -> float:
+    def excess(self) -> float:
         if not np.isfinite(self.curves.error.value):
             return np.inf
         return self.beyond_chance if self.beyond_chance > self.least else 0.0
@@ -145,13 +145,13 @@ class SetEvidence:
         return () if self.gap is None else (self.gap, *self.without.values())
 
     @property
-    def predicted(self) -> Prediction:
+    def held_out_prediction(self) -> Prediction:
         """What it leaves of the held-out events, where that was asked."""
         assert self.prediction is not None
         return self.prediction
 
     @property
-    def told(self) -> Refit:
+    def reported_fit(self) -> Refit:
         """The fit that is told of it."""
         return self.fit if self.final is None else self.final
 
@@ -210,6 +210,6 @@ class Evidence:
             ]
             if not found:
                 break
-            steps.append(min(found, key=lambda row: row.predicted.left))
+            steps.append(min(found, key=lambda row: row.held_out_prediction.excess))
             missing -= set(steps[-1].fit.names)
         return steps

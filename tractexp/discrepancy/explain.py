@@ -55,7 +55,7 @@ class Nearest:
         return self.row.fit.names
 
     @property
-    def closed(self) -> tuple[float, float]:
+    def closed_shares(self) -> tuple[float, float]:
         """The share of the gap that is closed on the fitted and on the held-out events, nan without
         any.
         """
@@ -96,7 +96,7 @@ def choose_next_event(verdict: Verdict, evidence: Evidence, context: Context) ->
     if verdict.word != TIED:
         return None
     assert evidence.noise is not None
-    fits = [row.told for row in verdict.kept]
+    fits = [row.reported_fit for row in verdict.kept]
     labels = [join_words(label_effects(names, context)) for names in verdict.sets]
     error = min(_measure_error(row, evidence.noise, context) for row in verdict.kept)
     return next_event(context, evidence.noise, evidence.base.fit, fits, labels, error=error)
@@ -110,7 +110,7 @@ def _measure_error(row: SetEvidence, noise: Noise, context: Context) -> float:
         return row.prediction.error
     if row.gap is not None:
         return row.gap.after.error.certain
-    return curves(context, row.told.unit, noise, row.told.names).error.certain
+    return curves(context, row.reported_fit.unit, noise, row.reported_fit.names).error.certain
 
 
 def explain(
@@ -137,8 +137,8 @@ def explain(
     if (window := context.records.window) is not None:
         clauses.append(f"{window.describe()}, which is taken into account")
     tests = evidence.base.tests if verdict.chosen is None else verdict.chosen.tests or evidence.last
-    if tests is not None and tests.resting:
-        clauses.append(f"on a bound: {', '.join(tests.resting)}")
+    if tests is not None and tests.parameters_at_bound:
+        clauses.append(f"on a bound: {', '.join(tests.parameters_at_bound)}")
     return "; ".join(clauses)
 
 
@@ -195,7 +195,7 @@ def label_effects(names: Sequence[str], context: Context) -> list[str]:
     """Effects as a sentence tells them: by the names of the catalogue, and what differs from its
     law or place.
     """
-    return [context.catalogue.spoken(name) for name in names]
+    return [context.catalogue.label_effect(name) for name in names]
 
 
 def _describe_name(names: Sequence[str], evidence: Evidence, context: Context) -> str:
@@ -230,7 +230,7 @@ def _describe_tie(sets: Sequence[Sequence[str]]) -> str:
 def describe_deviance(verdict: Verdict, evidence: Evidence, context: Context) -> str:
     """What the sets explain on the held-out events, and what became of the others."""
     shares = list_figures(
-        [row.gap.explained for row in verdict.kept if row.gap is not None], percent
+        [row.gap.explained_share for row in verdict.kept if row.gap is not None], percent
     )
     labels = alternatives([label_effects(names, context) for names in verdict.sets])
     others = sum(bool(context.criteria.rejects(row.behind)) for row in evidence.rows)
@@ -251,11 +251,13 @@ def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) 
     """
     chosen = verdict.kept
     first = chosen[0]
-    size, most = len(first.fit.names), first.predicted.left
+    size, most = len(first.fit.names), first.held_out_prediction.excess
     rest = [
         row
         for row in rank_sets(evidence, context.criteria)
-        if len(row.fit.names) <= size and row not in chosen and row.predicted.left > most
+        if len(row.fit.names) <= size
+        and row not in chosen
+        and row.held_out_prediction.excess > most
     ]  # what leaves less does so by chance
     worse = [f"the base model misses {_size(evidence.base)}"]
     if rest:
@@ -263,7 +265,7 @@ def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) 
         worse.append(f"the next best of {len(rest)} other sets ({following}) {_size(rest[0])}")
     worse.append(_describe_term(evidence))
     labels = alternatives([label_effects(names, context) for names in verdict.sets])
-    off = list_figures([row.predicted.error for row in chosen], in_percent)
+    off = list_figures([row.held_out_prediction.error for row in chosen], in_percent)
     if len(chosen) > 1:
         sentence = (
             f"{labels}: they predict the held-out events within {off} of the response, which cannot"
@@ -288,7 +290,7 @@ def _describe_shared(chosen: SetEvidence, evidence: Evidence, context: Context) 
         return ""
     best = min(
         (row for row in evidence.every if row.prediction is not None),
-        key=lambda row: row.predicted.left,
+        key=lambda row: row.held_out_prediction.excess,
     )
     labels = join_words(label_effects(best.names, context))
     return f"; {labels} miss {_size(best)}, the least, and all sets that come near have it"
@@ -313,8 +315,8 @@ def explain_rest(evidence: Evidence, nearest: Nearest | None, context: Context) 
     )
     ending = "s" if len(names or faults) == 1 else ""
     share = f"help{ending}"
-    if nearest and np.isfinite(nearest.closed[0]):
-        share = f"close{ending} {nearest.closed[0]:.0%} of the gap"
+    if nearest and np.isfinite(nearest.closed_shares[0]):
+        share = f"close{ending} {nearest.closed_shares[0]:.0%} of the gap"
     none = f"{_deny_all(context, len(best.fit.names))} explains it all"
     return f"{none}: {sentence}, the nearest, {share}, but what is left {chance}; {loudest}"
 
@@ -361,8 +363,10 @@ def _describe_term(evidence: Evidence) -> str:
 
 def _size(row: SetEvidence) -> str:
     """The model's error on the held-out events, as a sentence tells it."""
-    stalls = row.predicted.stalls
-    return f"all ({describe_stall(stalls)})" if stalls else in_percent(row.predicted.error)
+    stalls = row.held_out_prediction.stalls
+    return (
+        f"all ({describe_stall(stalls)})" if stalls else in_percent(row.held_out_prediction.error)
+    )
 
 
 def _deny_all(context: Context, most: int = 1) -> str:

@@ -144,7 +144,7 @@ def without_needless(
     if len(fit.names) < 2:
         return tests
     wanted = [
-        (tuple(n for n in fit.names if n != left), at.without(fit.unit, [left]))
+        (tuple(n for n in fit.names if n != left), at.remove_effects(fit.unit, [left]))
         for left in fit.names
     ]
     fewer = refit(context, tests.noise, wanted)[0]
@@ -207,9 +207,11 @@ def beneath(first: Disagreement, fit: Refit) -> Disagreement:
     another.
     """
     context = first.context
-    bare = refit(context, first.noise, [((), context.coordinates.without(fit.unit, fit.names))])[0]
+    bare = refit(
+        context, first.noise, [((), context.coordinates.remove_effects(fit.unit, fit.names))]
+    )[0]
     away = np.linalg.norm((bare.unit - first.fit.unit)[context.coordinates.base])
-    return first.at(context, bare, first.noise) if away > DISTINCT else first
+    return first.score_fit(context, bare, first.noise) if away > DISTINCT else first
 
 
 def searched_widely(
@@ -247,7 +249,7 @@ def _every_setting(context: Context, fit: Refit, unit: np.ndarray) -> list[Start
     at, sized = context.coordinates, unit.copy()
     sized[at.sizes(fit.names)] = fit.unit[at.sizes(fit.names)]
     return [
-        (fit.names, at.placed(sized, setting))
+        (fit.names, at.place_values(sized, setting))
         for setting in context.catalogue[fit.names[0]].settings
     ]
 
@@ -329,8 +331,8 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
     units[:, at.base] = points
     for p, column in zip(candidate.sizes, at.sizes(fit.names), strict=True):
         size = at.value(p.name, fit.unit) - p.absent
-        units[:, column] = at.to_unit(p.name, candidate.sized(p, size, least=1.0))
-    problem, values = context.kernels.at(fit.names, units)
+        units[:, column] = at.to_unit(p.name, candidate.compute_sized_value(p, size, least=1.0))
+    problem, values = context.kernels.select_problem(fit.names, units)
     context.effort.spend(BOX_POINTS)
     chosen = best_distinct(points, problem.objective(values), BOX_APART, BOX_STARTS, norm=2)
     return [(fit.names, units[k]) for k in chosen]
@@ -338,9 +340,9 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
 
 def _place_candidate(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndarray:
     """Coordinates (D,) with a candidate at its one-step size and its `rank`-th best setting."""
-    ranked, candidate = at.projection.ranked[name], at.context.catalogue[name]
+    ranked, candidate = at.projection.ranked_scores[name], at.context.catalogue[name]
     score = ranked[min(rank, len(ranked) - 1)]
     values = dict(score.setting)
     for p in candidate.sizes:
-        values[p.name] = candidate.sized(p, score.size[p.name], LEAST_START)
-    return at.context.coordinates.placed(unit, values)
+        values[p.name] = candidate.compute_sized_value(p, score.size[p.name], LEAST_START)
+    return at.context.coordinates.place_values(unit, values)

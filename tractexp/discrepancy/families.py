@@ -80,7 +80,7 @@ def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -
     textbook = refits.get((effect.family,)) if effect.as_textbook else None
     begun: list[tuple[np.ndarray, dict[str, float]]] = []
     if textbook is not None:
-        ground = at.without(textbook.unit, [effect.family])
+        ground = at.remove_effects(textbook.unit, [effect.family])
         textbook_values = {
             own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()
         }
@@ -97,10 +97,10 @@ def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -
     for ground, textbook_values in begun:
         start = dict(textbook_values)
         for size in member.sizes:
-            start.setdefault(size.name, member.sized(size, 0.0, BEGUN))
+            start.setdefault(size.name, member.compute_sized_value(size, 0.0, BEGUN))
         for setting in open_settings(member, tuple(start)):
             values = {p.name: (setting | start).get(p.name, p.default) for p in effect.parameters}
-            wanted.append(((member.name,), at.placed(ground, values)))
+            wanted.append(((member.name,), at.place_values(ground, values)))
     return wanted
 
 

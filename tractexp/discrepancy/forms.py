@@ -86,7 +86,7 @@ def _curve(findings: Findings, effect: Effect) -> FittedLaw | None:
     """The law found with its band, by the slopes of the curve along the parameters; None of what is
     no curve.
     """
-    at, unit, tests = findings.context.coordinates, findings.extended.unit, findings.tests
+    at, unit, tests = findings.context.coordinates, findings.extended_fit.unit, findings.tests
     values = {p.name: at.value(p.name, unit) for p in effect.parameters}
     curve = effect.curve(**values)
     if curve is None:

@@ -64,12 +64,12 @@ class GapTest:
     by_event: tuple[float, ...] = ()
 
     @property
-    def closed(self) -> float:
+    def closed_share(self) -> float:
         """The share of the squared model error that is gone."""
         return measure_closed_share(self.before, self.after)
 
     @property
-    def explained(self) -> float:
+    def explained_share(self) -> float:
         """The share of what could be explained: of what was gained and what is left. 0 where that
         is nothing.
         """
@@ -119,7 +119,7 @@ def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str
     """What a fit with the named effects leaves; beyond all measure where it has no steady state."""
     residual = context.residuals(unit[None], names)
     white = context.whiten(noise, residual)[0]
-    measured = context.drive.measured
+    measured = context.drive.measurements
     calculated = residual[0] + measured
     deviance = float(np.nan_to_num(white @ white, nan=np.inf))
     each = [

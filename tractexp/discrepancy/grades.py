@@ -62,7 +62,7 @@ class Grader:
             fitted, judged = (
                 ((*self.train, *self.validate), ()) if fit_all else (self.train, self.validate)
             )
-            model = self._extended(names, window)
+            model = self._extend_base(names, window)
             problem = Problem(model, fitted, self.bounds, fixed, self.substeps, priors=self.priors)
             start = self._choose_start(problem, found or {})
             self.known[key] = grade_playable(problem, judged, start, self.shown)
@@ -80,7 +80,7 @@ class Grader:
             return None
         return starts[int(np.argmin(problem.objective(np.array(starts))))]
 
-    def _extended(self, names: Sequence[str], window: float | str | None) -> Model:
+    def _extend_base(self, names: Sequence[str], window: float | str | None) -> Model:
         base, own = self.base, {effect.name for effect in self.base.effects}
         added = [self.catalogue[name].effect for name in names if name not in own]
         return compose(

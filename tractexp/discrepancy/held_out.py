@@ -99,7 +99,7 @@ def assess(both: AllEvents, rows: Sequence[SetEvidence], seed: int) -> list[SetE
     than chance does, since the fitted events may leave a part of it open; such a row is judged and
     told as fitted to all.
     """
-    criteria, fits = both.fitted.criteria, [row.told for row in rows]
+    criteria, fits = both.fitted.criteria, [row.reported_fit for row in rows]
     without = {fit.names: both.without_each(fit) for fit in fits}
     judged = judge_fits(both, rows, fits, without)
     if not needs_all_events(judged, criteria):
@@ -193,13 +193,13 @@ def carry_fits(
     Returns the context of those events, the coordinates of each fit there, and the noise of the
     last one that has a steady state there.
     """
-    other = context.on(Records.of(events, context.records.window))
+    other = context.move_to_records(Records.from_events(events, context.records.window))
     at = other.coordinates.at_measured_power
     units = [fit_initial_power(other, at(fit.unit), white(other), fit.names) for fit in fits]
     noise = white(other)
     for unit, fit in zip(reversed(units), reversed(fits), strict=True):
         if np.isfinite(left := other.residuals(unit[None], fit.names)[0]).all():
-            noise = QuietNoise.at(other, unit).of(unit, left)
+            noise = QuietNoise.from_context(other, unit).estimate_noise(unit, left)
             break
     return (
         other,

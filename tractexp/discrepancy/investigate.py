@@ -122,7 +122,7 @@ class Findings:
         steps: list[tuple[str, ...]] = [(), self.names]
         if self.evidence.is_predicted:
             steps = [row.fit.names for row in self.evidence.contributions(self.names)]
-        return [(names, self.judged(self.grade_of(names)).error.value) for names in steps]
+        return [(names, self.select_misfit(self.grade_of(names)).error.value) for names in steps]
 
     @property
     def bare(self) -> Refit:
@@ -130,10 +130,10 @@ class Findings:
         return self.evidence.base.fit
 
     @property
-    def extended(self) -> Refit:
+    def extended_fit(self) -> Refit:
         """The model with the names of the verdict added; the base model where there are none."""
         chosen = self.verdict.chosen
-        return self.bare if chosen is None else chosen.told
+        return self.bare if chosen is None else chosen.reported_fit
 
     @property
     def next_event(self) -> NextEvent | None:
@@ -152,11 +152,11 @@ class Findings:
         predictions = [row.prediction for row in (self.evidence.base, chosen)]
         units = [one.unit for one in predictions if isinstance(one, PredictedError)]
         left = there.residuals(units[1][None], chosen.fit.names)[0]
-        noise = QuietNoise.at(there, units[1]).of(units[1], left)
+        noise = QuietNoise.from_context(there, units[1]).estimate_noise(units[1], left)
         return gap(there, units[0], units[1], chosen.fit.names, noise, there.coordinates.before)
 
     @functools.cached_property
-    def held(self) -> dict[str, float]:
+    def undetermined_values(self) -> dict[str, float]:
         """Parameters of the extended model that the events cannot tell (to half their size), at the
         values found.
         """
@@ -164,7 +164,7 @@ class Findings:
             return {}
         return {
             e.parameter.name: e.value
-            for e in self.after
+            for e in self.final_estimates
             if e.verdict.startswith(UNIDENTIFIED) or e.half > size(e.value, *e.parameter.bounds) / 2
         }
 
@@ -196,10 +196,10 @@ class Findings:
             p.name
             for p in self.catalogue.parameters([name for name in self.names if name not in names])
         }
-        held = {name: value for name, value in self.held.items() if name not in own}
+        held = {name: value for name, value in self.undetermined_values.items() if name not in own}
         at = self.context.coordinates
         found = (
-            {name: at.value(name, self.extended.unit) for name in at.names}
+            {name: at.value(name, self.extended_fit.unit) for name in at.names}
             if names == self.names
             else {}
         )
@@ -211,22 +211,22 @@ class Findings:
         """
         split = len(self.grader.train)
         fitted, held_out = graded.fits[:split], graded.fits[split:]
-        return Misfit.of(fitted), Misfit.of(held_out) if held_out else None
+        return Misfit.from_fits(fitted), Misfit.from_fits(held_out) if held_out else None
 
-    def judged(self, graded: GradedModel) -> Misfit:
+    def select_misfit(self, graded: GradedModel) -> Misfit:
         """The same on the held-out events, where there are any."""
         fitted, held_out = self.misfits(graded)
         return held_out or fitted
 
     @functools.cached_property
-    def before(self) -> list[ParameterEstimate]:
+    def base_estimates(self) -> list[ParameterEstimate]:
         """The parameters of the base model alone."""
         return estimates(self.first, self.bare.unit, ())
 
     @functools.cached_property
-    def after(self) -> list[ParameterEstimate]:
+    def final_estimates(self) -> list[ParameterEstimate]:
         """The parameters of the model that the investigation ends with."""
-        return estimates(self.tests, self.extended.unit, self.names)
+        return estimates(self.tests, self.extended_fit.unit, self.names)
 
     @functools.cached_property
     def overlays(self) -> list[Overlay]:
@@ -250,7 +250,7 @@ class Findings:
         declared = {p.name: p for p in self.final_grade.problem.model.parameters}
         held = [
             ParameterEstimate(declared[name], value, np.nan, HELD)
-            for name, value in self.held.items()
+            for name, value in self.undetermined_values.items()
         ]
         return [*self.final_grade.parameters, *held]
 
@@ -262,7 +262,7 @@ class Findings:
         On the held-out events only where the fitted ones show none: what explains those may not
         hold beyond them.
         """
-        return [] if self.verdict.complete else self._left(self.overlays)
+        return [] if self.verdict.complete else self._find_remainder(self.overlays)
 
     @functools.cached_property
     def remainder_of_base(self) -> list[Remainder]:
@@ -274,10 +274,14 @@ class Findings:
         """
         if self.names:
             return []
-        alone = [self._left([replace(overlay, nearest=None) for overlay in self.overlays])]
+        alone = [
+            self._find_remainder([replace(overlay, nearest=None) for overlay in self.overlays])
+        ]
         if self.by_likelihood is not self.evidence:
             alone.append(
-                self._left(of_fit(self.context, self.by_likelihood.base.fit, self.last.noise))
+                self._find_remainder(
+                    of_fit(self.context, self.by_likelihood.base.fit, self.last.noise)
+                )
             )
         return max(alone, key=_share_of)
 
@@ -302,7 +306,7 @@ class Findings:
         where = " on the held-out events" if held_out else ""
         return f"{whose}{where}: {shapes[0]}"
 
-    def _left(self, overlays: Sequence[Overlay]) -> list[Remainder]:
+    def _find_remainder(self, overlays: Sequence[Overlay]) -> list[Remainder]:
         noise, level = self.last.noise, self.context.criteria.false_alarms
         fitted, beyond = ([o for o in overlays if o.held_out == there] for there in (False, True))
         return find_remainder(fitted, noise, level) or find_remainder(
@@ -314,7 +318,7 @@ class Findings:
         """The free parameters of the base model (n, d), alone and as the model that the
         investigation ends with.
         """
-        fits = np.stack([self.bare.unit, self.extended.unit])
+        fits = np.stack([self.bare.unit, self.extended_fit.unit])
         return self.context.kernels.bare.space.from_unit(fits[:, self.context.coordinates.base])
 
     @property
@@ -329,7 +333,9 @@ class Findings:
         """
         if len(self.verdict.kept) != 1:
             return False
-        before, after = (self.judged(one).error for one in (self.base_grade, self.final_grade))
+        before, after = (
+            self.select_misfit(one).error for one in (self.base_grade, self.final_grade)
+        )
         return share_closed(before, after) >= share_gone(self.context.criteria.ahead)
 
 
@@ -370,8 +376,16 @@ def investigate(
         some, others = len(missing.candidates), len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
 
-        given = model, missing, Records.of(train), bounds or {}, fixed or {}, criteria, effort
-        context = Context.of(*given, substeps, priors=priors)
+        given = (
+            model,
+            missing,
+            Records.from_events(train),
+            bounds or {},
+            fixed or {},
+            criteria,
+            effort,
+        )
+        context = Context.from_records(*given, substeps, priors=priors)
         grader = Grader(
             model,
             missing,
@@ -387,7 +401,7 @@ def investigate(
         findings = _findings(base_fit(context), validate, seed, grader)
         if context.kernels.too_coarse(findings.base_values):
             effort.say("the fits lie where the motor is fast: again with shorter steps")
-            finer = Context.of(*given, context.kernels.box_substeps, priors=priors)
+            finer = Context.from_records(*given, context.kernels.box_substeps, priors=priors)
             findings = _findings(base_fit(finer), validate, seed, grader)
         return findings
 
@@ -462,7 +476,7 @@ def _share_of(shapes: Sequence[Remainder]) -> float:
 def _gap(context: Context, evidence: Evidence, verdict: Verdict) -> GapTest:
     """The gap on the fitted events before and after."""
     at, chosen, base = context.coordinates, verdict.chosen, evidence.base.fit
-    after = chosen.told if chosen else base
+    after = chosen.reported_fit if chosen else base
     tests = (chosen and chosen.tests) or evidence.last
     assert tests is not None
     fitted = [*at.base, *at.before, *at.parameters(verdict.names)]

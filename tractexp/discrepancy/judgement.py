@@ -32,7 +32,7 @@ def judgements(investigation: Findings) -> list[Judgement]:
     chosen model.
     """
     criteria = investigation.context.criteria
-    critical = investigation.first.chance.critical_p(criteria.naming)
+    critical = investigation.first.chance.critical_p(criteria.naming_false_alarms)
     scores = {s.name: s for s in investigation.last.scores}
     judged_effects = [
         Judgement(name, "not testable", why)

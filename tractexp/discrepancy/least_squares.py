@@ -40,9 +40,11 @@ def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) 
     """
     quiet = replace(quiet, context=quiet.context.with_measured_power)
     t = tangent(quiet.context, fit, noise)
-    root = _robust(quiet.context, t.whitened(noise))
-    own = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
-    projection = t.whitened(own)
+    root = _robust(quiet.context, t.build_score_test(noise))
+    own = quiet.estimate_noise(
+        fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining_columns
+    )
+    projection = t.build_score_test(own)
     chance = chance_at(t, projection, own, quiet, seed, plain=True)
     return Disagreement(fit, own, t, projection, chance, projection.scores(), root)
 
@@ -53,7 +55,7 @@ def _robust(context: Context, projection: ScoreTest) -> np.ndarray:
     """
     J = projection.Q @ projection.R  # with the rows of the prior
     r = projection.r[0] + projection.Q @ projection.along[0]
-    measured = context.drive.measured
+    measured = context.drive.measurements
     columns, rows = (
         J[: measured.size].reshape(*measured.shape, -1),
         r[: measured.size].reshape(measured.shape),

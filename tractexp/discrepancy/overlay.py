@@ -38,9 +38,9 @@ class Overlay:
     places: tuple[DisagreementInterval, ...]
 
     @property
-    def measured(self) -> np.ndarray:
+    def measurements(self) -> np.ndarray:
         """What the models are compared with (C, n) [pu], nan in gaps."""
-        return domain_of(self.event).excitation(self.event).measured
+        return domain_of(self.event).excitation(self.event).measurements
 
 
 def on_fitted(
@@ -81,7 +81,7 @@ def on_held_out(
     fits = [bare, *([nearest.row.fit] if nearest else [])]
     other, units, noise = carry_fits(context, withheld, fits)
     before, *near = [
-        other.residuals(unit[None], fit.names)[0] + other.drive.measured
+        other.residuals(unit[None], fit.names)[0] + other.drive.measurements
         for unit, fit in zip(units, fits, strict=True)
     ]
     return _each(other, noise, (before, None, near[0] if near else None), (), held_out=True)
@@ -108,7 +108,7 @@ def draw_graded(
 
 def of_fit(context: Context, fit: Refit, noise: Noise) -> list[Overlay]:
     """The fitted events by one fit alone."""
-    calculated = context.residuals(fit.unit[None], fit.names)[0] + context.drive.measured
+    calculated = context.residuals(fit.unit[None], fit.names)[0] + context.drive.measurements
     return _each(context, noise, (calculated, None, None), (), held_out=False)
 
 
@@ -120,7 +120,7 @@ def find_remainder(
         return []
     curves = [next(m for m in (o.nearest, o.after, o.before) if m is not None) for o in overlays]
     rest = np.concatenate(
-        [np.nan_to_num(o.measured - m) for o, m in zip(overlays, curves, strict=True)], axis=1
+        [np.nan_to_num(o.measurements - m) for o, m in zip(overlays, curves, strict=True)], axis=1
     )
     return remainders(rest, [o.event for o in overlays], noise, false_alarms)
 

@@ -95,7 +95,9 @@ def _words(
     lower, upper = (
         np.array([bound[at.column[n]] for n in names]) for bound in (at.box.lower, at.box.upper)
     )
-    information = Information.of(names, np.array(values), upper - lower, R[:, own], R[:, others])
+    information = Information.from_jacobian(
+        names, np.array(values), upper - lower, R[:, own], R[:, others]
+    )
     factors = np.full(len(errors), interval_factor(tests.freedom))
     assessment = judge(information, lower, upper, factors * np.array(errors), factors)
     return {name: str(verdict) for name, verdict in assessment.items()}

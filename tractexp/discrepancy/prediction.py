@@ -52,7 +52,7 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
     if context.prior:  # its rows stand beside what the base model leaves, as in an identification
         start = plain.coordinates.at_measured_power(explained.steps[0].fit.unit)
         noise = residual_noise(plain, refit(plain, noise, [((), start)], faults=())[0])
-    there = context.on(Records.of(events, context.records.window))
+    there = context.move_to_records(Records.from_events(events, context.records.window))
 
     def fill(fits: Sequence[Refit]) -> list[SetEvidence]:
         predicted = each_apart(functools.partial(predict, there), fits, context.effort)
@@ -93,9 +93,9 @@ def _find_best_term(context: Context, table: Evidence) -> SetEvidence:
     assert table.noise is not None
     assert table.there is not None
     of_terms, fits = best_terms(context, table.base.fit, table.noise)
-    beside = of_terms.on(table.there.records)
+    beside = of_terms.move_to_records(table.there.records)
     rows = [SetEvidence(fit, fit.names, fit.names, prediction=predict(beside, fit)) for fit in fits]
-    return min(rows, key=lambda row: (row.predicted.left, row.names))
+    return min(rows, key=lambda row: (row.held_out_prediction.excess, row.names))
 
 
 def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> list[Refit]:
@@ -114,7 +114,7 @@ def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> li
     bare = refit(
         context, noise, [((), unit) for unit in (*by_likelihood, *minima_of(context, squares))]
     )[0]
-    ground = explained.steps[0].at(context, bare, noise)
+    ground = explained.steps[0].score_fit(context, bare, noise)
     refits: dict[Names, Refit] = {(): bare}
 
     def add(fits: Iterable[Refit]) -> None:
@@ -133,7 +133,7 @@ def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> li
     # members of families have no columns
     of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]
     for single in of_load[:MOST_TRIED_FAMILIES]:
-        add(search_effect_sets([ground, ground.at(context, single, noise)], refits, 2, say))
+        add(search_effect_sets([ground, ground.score_fit(context, single, noise)], refits, 2, say))
     return refit(
         context,
         noise,
@@ -145,7 +145,7 @@ def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> li
 def predict(there: Context, fit: Refit) -> PredictedError:
     """What a fit leaves of other events."""
     unit = there.coordinates.at_measured_power(fit.unit)
-    calculated = there.residuals(unit[None], fit.names)[0] + there.drive.measured
+    calculated = there.residuals(unit[None], fit.names)[0] + there.drive.measurements
     played = [
         there.domain.comparison(event, calculated[:, there.drive.part(e)])
         for e, event in enumerate(there.events)

@@ -61,7 +61,7 @@ def rank_sets(evidence: Evidence, criteria: Criteria) -> list[SetEvidence]:
 
 
 def _rank(row: SetEvidence) -> tuple[float, int, Names]:
-    left = float("inf") if row.prediction is None else row.predicted.left
+    left = float("inf") if row.prediction is None else row.held_out_prediction.excess
     return left, len(row.fit.names), row.fit.names
 
 
@@ -88,10 +88,10 @@ def beats(one: SetEvidence, other: SetEvidence, criteria: Criteria) -> bool:
     than chance.
     """
     is_ahead = compute_factor(one, other) > criteria.ahead
-    return is_ahead and one.predicted.compute_lead(other.predicted) > 0
+    return is_ahead and one.held_out_prediction.compute_lead(other.held_out_prediction) > 0
 
 
 def compute_factor(one: SetEvidence, other: SetEvidence) -> float:
     """The factor by which a set divides what another leaves, as a root of squares."""
-    own, others = one.predicted.left, other.predicted.left
+    own, others = one.held_out_prediction.excess, other.held_out_prediction.excess
     return (others / own) ** 0.5 if own > 0 else float("inf") if others > 0 else 1.0

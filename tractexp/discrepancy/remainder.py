@@ -136,7 +136,7 @@ class _Stretch:
     drive: Drive
 
     @classmethod
-    def of(
+    def from_event(
         cls, event: Event, residual: np.ndarray, noise: Noise, input_modes: np.ndarray | None
     ) -> "_Stretch":
         """The color of the noise is that before the dip, where that tells it: what is left would
@@ -144,7 +144,7 @@ class _Stretch:
 
         Of waveforms it stays what it is, for what is left cannot color that.
         """
-        drive, domain = Drive.of([domain_of(event).excitation(event)]), domain_of(event)
+        drive, domain = Drive.from_events([domain_of(event).excitation(event)]), domain_of(event)
         valid, before = drive.weights > 0, slice(0, event.start)
         if (
             not domain.noise_from_model
@@ -163,7 +163,7 @@ class _Stretch:
         """(m, C, n) [pu] to independent rows (m, C, n) of unit variance."""
         return self.noise.whiten(rows, self.drive, self.drive.weights > 0).reshape(rows.shape)
 
-    def fitted(self, shape: _Shape, channel: int) -> tuple[float, np.ndarray, np.ndarray]:
+    def fit_shape(self, shape: _Shape, channel: int) -> tuple[float, np.ndarray, np.ndarray]:
         """By how much a shape in one channel lowers the deviance, its sizes (1 or 2,) [pu], and
         itself (C, n).
         """
@@ -195,10 +195,10 @@ def remainders(
     ends = np.cumsum([0, *(event.record.samples for event in events)])
     parts = [slice(a, b) for a, b in itertools.pairwise(ends.tolist())]
     stretches = [
-        _Stretch.of(
+        _Stretch.from_event(
             event,
             residual[:, part],
-            noise.of(e),
+            noise.select_event(e),
             None if noise.input_modes is None else noise.input_modes[:, :, part],
         )
         for e, (event, part) in enumerate(zip(events, parts, strict=True))
@@ -210,7 +210,7 @@ def remainders(
         candidates := [(one, e) for e, one in enumerate(loudest) if one]
     ):
         (gain, shape, channel), e = max(candidates, key=lambda f: f[0][0])
-        _, sizes, curve = stretches[e].fitted(shape, channel)
+        _, sizes, curve = stretches[e].fit_shape(shape, channel)
         shapes.append(
             _describe_shape(stretches[e], shape, channel, sizes, gain / max(excess, gain))
         )
@@ -295,13 +295,13 @@ def _refine_shape(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float
 
     def gain(shape: _Shape) -> float:
         visible = shape.rings(n) or not shape.frequency
-        return stretch.fitted(shape, channel)[0] if visible else 0.0
+        return stretch.fit_shape(shape, channel)[0] if visible else 0.0
 
     for _ in range(POLISH_ROUNDS):
         if np.isfinite(shape.decay):
             start, ringing = shape.start, bool(shape.frequency)
 
-            def at(x: np.ndarray, start: int = start, ringing: bool = ringing) -> _Shape:
+            def build_shape(x: np.ndarray, start: int = start, ringing: bool = ringing) -> _Shape:
                 return _Shape(
                     start,
                     float(np.exp(np.clip(x[0], 0.0, np.log(20 * n)))),
@@ -314,9 +314,9 @@ def _refine_shape(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float
             )
             options = {"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-3, "maxfev": 80}
             done = minimize(
-                lambda x, at=at: -gain(at(x)), begin, method="Nelder-Mead", options=options
+                lambda x, at=build_shape: -gain(at(x)), begin, method="Nelder-Mead", options=options
             )
-            shape = max(shape, at(done.x), key=gain)
+            shape = max(shape, build_shape(done.x), key=gain)
         period = 1 / shape.frequency if shape.frequency else 4.0
         reach = int(np.clip(period / 2, 3, 25))
         near = range(max(shape.start - reach, 0), min(shape.start + reach, n - SHORTEST_SHAPE) + 1)
@@ -349,7 +349,7 @@ def _describe_shape(
     pace = None if tau is None or frequency is None else np.hypot(2 * np.pi * frequency * tau, 1.0)
     return Remainder(
         event=event.record.name,
-        channel=stretch.drive.spoken[channel],
+        channel=stretch.drive.labels[channel],
         kind=kind,
         start=start,
         after=start - (event.t_end if ended else event.t_start),

@@ -52,7 +52,7 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
     for window in windows_of(context.events):
         if tried and tried[0].gained <= 0 and window.averages:
             continue  # an average over several cycles is one of averages over one
-        behind = context.on(Records.of(context.records.recorded, window))
+        behind = context.move_to_records(Records.from_events(context.records.recorded, window))
         local_minima = (first.fit.unit, *base.local_minima)  # the load's: no window moves them far
         begun = rough_refit(behind, noise, [((), start) for start in local_minima])[0]
         fit = refit(behind, noise, [((), begun.unit)])[0]
@@ -96,11 +96,13 @@ def behind_window(
         return None
     tests = examine_fit(base.quiet, best, noise, seed, plain=True)
     for window in windows_of(context.events) if tests.faults else ():
-        behind = context.on(Records.of(context.records.recorded, window))
+        behind = context.move_to_records(Records.from_events(context.records.recorded, window))
         fit = refit(behind, tests.noise, [(best.names, best.unit)])[0]
         if not fit.deviance < bare.deviance:
             break  # it costs more than the explanation gains
-        there = examine_fit(QuietNoise.at(behind, fit.unit), fit, tests.noise, seed, plain=True)
+        there = examine_fit(
+            QuietNoise.from_context(behind, fit.unit), fit, tests.noise, seed, plain=True
+        )
         if there.adequate and not there.faults:
             context.effort.say(f"{window.describe()}: taken into account from here on")
             return fitted_from(behind, [bare.unit], base.local_minima)

@@ -73,4 +73,4 @@ def find_averaging(event: Event, model: Model | None) -> Averaging | None:
         shape = event.record.window
     else:
         shape = estimator_of(window).window(event.record.base.frequency)
-    return None if shape is None else Averaging(shape.on(step), shape.length)
+    return None if shape is None else Averaging(shape.compute_weights(step), shape.length)

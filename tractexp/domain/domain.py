@@ -93,7 +93,7 @@ class Domain(ABC):
         """
 
     @abstractmethod
-    def smoothed(self, event: Event) -> SmoothedEvent:
+    def smooth_event(self, event: Event) -> SmoothedEvent:
         """The event with the noise taken out of its voltage, where that can be told from it."""
 
     @abstractmethod
@@ -183,7 +183,7 @@ class Domain(ABC):
         """
 
     @abstractmethod
-    def planned(
+    def plan_event(
         self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int
     ) -> Event:
         """A dip as if it had been recorded at times t (N,) [s], `course` (N,) of it

@@ -47,7 +47,7 @@ class PhasorDomain(Domain):
     ) -> Excitation:
         return excitation.phasors(event, model, weights)
 
-    def smoothed(self, event: Event) -> SmoothedEvent:
+    def smooth_event(self, event: Event) -> SmoothedEvent:
         return smooth_voltage(event)
 
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
@@ -60,7 +60,7 @@ class PhasorDomain(Domain):
         return FINEST_STEP
 
     def values(self, drive: Drive) -> int:
-        return drive.measured.size
+        return drive.measurements.size
 
     def noise(
         self,
@@ -116,7 +116,7 @@ class PhasorDomain(Domain):
             " held by what is physically likely."
         )
 
-    def planned(
+    def plan_event(
         self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int
     ) -> Event:
         """P and Q hold the steady state, for no forecast looks at them."""
@@ -191,5 +191,5 @@ class PhasorDomain(Domain):
             omega_s0=omega_s0,
             omega_n=2 * np.pi * before["frequency"],
         )
-        outputs = simulate_compared(model, values, Drive.of([event]))
+        outputs = simulate_compared(model, values, Drive.from_events([event]))
         return outputs[0], outputs[1]

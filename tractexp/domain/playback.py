@@ -107,7 +107,7 @@ def current_error(event: WaveEvent, currents: np.ndarray) -> float:
     before = slice(event.first, event.start)
     rms = lambda i, part: float(np.sqrt(np.mean(event.of_phases(i)[:, part] ** 2)))  # noqa: E731
     recorded = np.nan_to_num(event.currents)
-    compared = np.array(event.compared)[:, None]
+    compared = np.array(event.compared_channels)[:, None]
     return rms((currents - recorded) * compared, window) / rms(recorded, before)
 
 

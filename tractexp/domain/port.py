@@ -67,7 +67,7 @@ def current_ports(event: WaveEvent) -> tuple[Port, ...]:
         (u[0] + 1j * u[1]) / event.turn, vector / event.turn, step, event.start, Y, event.f0
     )
     zero = Port(u[2] + 0j, i[2] + 0j, step, event.start, None, series=True)
-    return (vectors, zero) if event.compared[2] else (vectors,)
+    return (vectors, zero) if event.compared_channels[2] else (vectors,)
 
 
 def periodic_course(event: WaveEvent, channels: np.ndarray) -> np.ndarray:
@@ -77,5 +77,7 @@ def periodic_course(event: WaveEvent, channels: np.ndarray) -> np.ndarray:
     t, part = event.record.t, event.steady
     there = np.isfinite(channels[:, part]).all(axis=1)
     course = np.zeros(channels.shape)
-    course[there] = Periodic.of(t[part], channels[there][:, part], event.f0, event.rate).at(t)
+    course[there] = Periodic.from_samples(
+        t[part], channels[there][:, part], event.f0, event.rate
+    ).evaluate_at(t)
     return course

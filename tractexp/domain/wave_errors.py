@@ -71,7 +71,7 @@ def _of_voltage(problem: "Problem", values: np.ndarray, event: int) -> np.ndarra
     plain = problem.events[event]
     assert isinstance(plain, WaveEvent)
     off = _differences(problem, values, event, [*_shift_voltage_offsets(plain), *_between(plain)])
-    shapes = np.zeros((len(off), *drive.measured.shape))
+    shapes = np.zeros((len(off), *drive.measurements.shape))
     shapes[:, :, part] = off * (drive.weights[:, part] > 0)
     return shapes
 
@@ -82,7 +82,9 @@ def _differences(
     """What variants of an event's voltage change in its currents, (n, 3, N) [pu]; what diverged
     tells nothing.
     """
-    drive = Drive.of([problem.domain.excitation(e) for e in (problem.events[event], *variants)])
+    drive = Drive.from_events(
+        [problem.domain.excitation(e) for e in (problem.events[event], *variants)]
+    )
     own = np.tile(problem.by_event(values)[[event]], (drive.events, 1, 1))
     response = problem.model.simulate(
         drive, own, np.tile(problem.step.substeps[[event]], drive.events)
@@ -139,7 +141,7 @@ def offsets(drive: Drive) -> np.ndarray:
     for e in range(drive.events):
         for c in range(drive.channels):
             if drive.weights[c, drive.part(e)].any():
-                shapes.append(np.zeros(drive.measured.shape))
+                shapes.append(np.zeros(drive.measurements.shape))
                 shapes[-1][c, drive.part(e)] = OFFSET
     return np.array(shapes)
 

@@ -53,7 +53,7 @@ class WaveDomain(Domain):
     ) -> WaveformDrive:
         return excitation.waveforms(cast(WaveEvent, event))
 
-    def smoothed(self, event: Event) -> SmoothedEvent:
+    def smooth_event(self, event: Event) -> SmoothedEvent:
         """As recorded: within a cycle nothing tells noise of the voltage from the voltage."""
         return SmoothedEvent(event, np.empty((0, event.record.samples)))
 
@@ -151,7 +151,7 @@ class WaveDomain(Domain):
         free = f"Faults of the measurement ({join_words(faults)}) are free in every fit, {how}."
         return f"{origin} {free}"
 
-    def planned(
+    def plan_event(
         self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int
     ) -> Event:
         """Of a fault between two phases, types C and D of Bollen 2000, where the unbalance is 1."""
@@ -174,7 +174,7 @@ class WaveDomain(Domain):
         turn = np.exp(1j * (omega_n + like.omega_s0) * (np.arange(n) * step))
         U, U2 = like.U0 * (1 - depth * course), like.U0 * unbalance * depth * course
         v = U * np.exp(1j * np.radians(jump) * course) + U2 * np.conj(turn) ** 2
-        compared = np.where(np.array(like.compared)[:, None], 0.0, np.nan) * np.ones(n)
+        compared = np.where(np.array(like.compared_channels)[:, None], 0.0, np.nan) * np.ones(n)
         return WaveformDrive(
             step,
             v,
@@ -220,6 +220,6 @@ class WaveDomain(Domain):
         event = synthetic_event(
             "played", fine, v, means, nominal + omega_s0 / (2 * np.pi), 1, len(fine) - 1
         )
-        i = simulate_compared(model, values, Drive.of([self.excitation(event)]))
+        i = simulate_compared(model, values, Drive.from_events([self.excitation(event)]))
         power = (v * np.conj((i[0] + 1j * i[1]) / event.turn))[::every]
         return power.real, power.imag

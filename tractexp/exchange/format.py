@@ -67,7 +67,7 @@ class Identified:
         return self.values["M"] * self.omega_n / 2
 
     @cached_property
-    def before(self) -> dict[str, float]:
+    def steady_state(self) -> dict[str, float]:
         """States and named quantities before the event. Raises `UserError` where there is no steady
         state.
         """
@@ -75,7 +75,7 @@ class Identified:
         P0, Q0 = self.ratio * stored["P0"], self.ratio * stored["Q0"]
         event = Excitation(1e-3, flat, flat, flat, stored["U0"], P0, Q0, omega_n=self.omega_n)
         drive, values = (
-            Drive.of([event]),
+            Drive.from_events([event]),
             np.array([self.values[name] for name in self.model.names]),
         )
         if refusal := self.model.refusal(values, drive):
@@ -152,7 +152,7 @@ class Format(Plugin):
         """The load that the file's own numbers describe; None where the format reads none back."""
         return None
 
-    def simulated(self, text: str, load: Identified) -> Simulated | None:
+    def play_back_dip(self, text: str, load: Identified) -> Simulated | None:
         """A dip that the simulator of this format has played through the file; None where that is
         not at hand.
 
@@ -181,11 +181,11 @@ class Format(Plugin):
         """Whether this format can represent a part of the model: a "motor", a "static load" or an
         "effect".
         """
-        names = cls._represented(kind)
+        names = cls._list_represented(kind)
         return names is None or name in names
 
     @classmethod
-    def _represented(cls, kind: str) -> Collection[str] | None:
+    def _list_represented(cls, kind: str) -> Collection[str] | None:
         return {"motor": cls.motors, "static load": cls.statics, "effect": cls.effects}[kind]
 
     def _instead(self, kind: str, name: str) -> str:
@@ -199,6 +199,5 @@ class Format(Plugin):
             [other for other, cls in sorted(formats.items()) if cls.represents(kind, name)], "or"
         )
         by = f"; {TASK.format}={others} can represent '{name}'" if others else ""
-        return (
-            f"{why}; it can represent {', '.join(sorted(self._represented(kind) or ['none']))}{by}"
-        )
+        represented = ", ".join(sorted(self._list_represented(kind) or ["none"]))
+        return f"{why}; it can represent {represented}{by}"

@@ -32,12 +32,12 @@ class OperatingPoint:
     units: tuple[str, str]
 
     @classmethod
-    def of(cls, result: Result) -> "OperatingPoint | None":
+    def from_result(cls, result: Result) -> "OperatingPoint | None":
         """None where the model has no motor, or no steady state of its own."""
         own = result.base
         load = Identified(result)
         try:
-            before = load.before
+            before = load.steady_state
         except UserError:
             return None
         if "P_motor" not in before or "Q_motor" not in before:

@@ -38,7 +38,7 @@ class Agreement:
             off / moved if moved else 0.0 for off, moved in zip(self.off, self.moved, strict=True)
         )
 
-    def said(self, scale: float, units: tuple[str, str]) -> str:
+    def describe_differences(self, scale: float, units: tuple[str, str]) -> str:
         """In a sentence, with powers times `scale` in `units`."""
         parts = [
             f"{power} differs by at most {scale * off:.2g} {unit} where it moves by"
@@ -78,7 +78,7 @@ def play_back_export(
 
 def _elsewhere(form: Format, text: str, load: Identified) -> Agreement | None:
     """In the simulator of the format; None where that is not at hand."""
-    there = form.simulated(text, load)
+    there = form.play_back_dip(text, load)
     return there and _measure_agreement(
         there.by, response(load, there, there.P[0], there.Q[0]), (there.P, there.Q)
     )
@@ -114,7 +114,10 @@ def response(
         float(along.speed[0]),
         load.omega_n,
     )
-    drive, values = Drive.of([one]), np.array([load.values[name] for name in load.model.names])
+    drive, values = (
+        Drive.from_events([one]),
+        np.array([load.values[name] for name in load.model.names]),
+    )
     if refusal := load.model.refusal(values, drive):
         raise UserError(f"not played back: {refusal}")
     answer = load.model.simulate(drive, values, STEPS_A_SAMPLE)
@@ -130,7 +133,9 @@ def _simulate_restored_load(
     result = replace(load.result, model=dict(restored.model), parameters=dict(restored.parameters))
     of_file = Identified(replace(result, own_base={}), load.bus, load.power, load.voltage)
     U0, flat = float(along.U[0]), np.full(2, float(along.U[0]))
-    probe = Drive.of([Excitation(along.step, flat, flat, flat, U0, 1.0, 0.0, omega_n=load.omega_n)])
+    probe = Drive.from_events(
+        [Excitation(along.step, flat, flat, flat, U0, 1.0, 0.0, omega_n=load.omega_n)]
+    )
     at_rest = of_file.model.at_rest(
         np.array([of_file.values[name] for name in of_file.model.names]), probe
     )

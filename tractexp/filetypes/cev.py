@@ -146,13 +146,13 @@ def table(path: Path, encoding: str | None = None) -> Rows:
             and channel.form == "waveform"
             and channel.phase in ("A", "B", "C", "AB", "BC", "CA")
         ):
-            x = channel.ratio * channel.recorded()
+            x = channel.ratio * channel.read_values()
             X = (x[quarter:] + 1j * x[:-quarter]) * back
             columns += [
                 (channel.name, channel.unit, np.abs(X)),
                 (f"{channel.name} angle", "rad", np.angle(X)),
             ]
-    return Rows.of(path, columns, 1 + quarter, remarks.notes())
+    return Rows.from_columns(path, columns, 1 + quarter, remarks.notes())
 
 
 @dataclass(frozen=True, eq=False)

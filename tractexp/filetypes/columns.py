@@ -374,7 +374,7 @@ def order_of(names: Sequence[str], units: Sequence[str]) -> str:
     first of several.
     """
 
-    def marked(order: str) -> int:
+    def count_marked_channels(order: str) -> int:
         roles = (role(name, unit, order) for name, unit in zip(names, units, strict=True) if name)
         ours = [one for one in roles if one and one.key[:1] in tuple("UIPQ")]
         keys = {one.key.removesuffix("_angle") for one in ours}
@@ -387,7 +387,7 @@ def order_of(names: Sequence[str], units: Sequence[str]) -> str:
             grounded, sum(max(singles if singles == 3 else 0, pairs) for singles, pairs in counts)
         )
 
-    return max(TABLE_ORDERS, key=marked)
+    return max(TABLE_ORDERS, key=count_marked_channels)
 
 
 def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:

@@ -60,7 +60,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
         columns.append(
             (
                 *_heading(name, channel, names.count(name) > 1),
-                channel.ratio * channel.recorded()[part],
+                channel.ratio * channel.read_values()[part],
             )
         )
     notes = list(recording.notes)
@@ -70,7 +70,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
             " Hz from "
             f"{segment.start:.3f} s"
         )
-    rows = Rows.of(
+    rows = Rows.from_columns(
         path, [(name, unit, np.asarray(v, float)) for name, unit, v in columns], 1, tuple(notes)
     )
     rows.start, rows.frequency = recording.start, recording.frequency

@@ -57,7 +57,7 @@ def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
     if not unit and np.nanmedian(x) > LARGEST_DIRECT_KILOVOLTS:
         x = x / 1000
     rate = (len(t) - 1) / float(t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else 0.0
-    direct = DirectVoltage.of(x, rate) if rate else None
+    direct = DirectVoltage.from_values(x, rate) if rate else None
     if direct is None or not direct.is_direct:
         return ""
     if not any(named) and not (_is_railway(direct.mean) and keys & {"I", "P"}):
@@ -87,7 +87,9 @@ def check_alternating(
     t, U, P, Q = (columns[key] for key in "tUPQ")
     level = float(np.nanmedian(U))
     rate = (len(t) - 1) / float(t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else 0.0
-    direct = DirectVoltage.of(U, rate) if rate and not declared and _is_railway(level) else None
+    direct = (
+        DirectVoltage.from_values(U, rate) if rate and not declared and _is_railway(level) else None
+    )
     if direct is None or not direct.is_direct:
         return []
     without = np.nanmax(np.abs(Q), initial=0.0) <= NO_Q * np.nanmax(np.abs(P), initial=0.0)

@@ -253,7 +253,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     fullest = _fullest(stretches, remarks)
     t, columns = _longest(fullest, remarks)
     every = [("t", "s", t - t[0]), *((*names[k], values) for k, values in columns.items())]
-    return Rows.of(path, every, 1, remarks.notes())
+    return Rows.from_columns(path, every, 1, remarks.notes())
 
 
 def _logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:

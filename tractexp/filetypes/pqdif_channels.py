@@ -213,7 +213,7 @@ class Observed:
         instances = []
         for one in every:
             if not 0 <= one.number < len(self.definitions):
-                raise body.body.damaged(
+                raise body.body.describe_damage(
                     f"channel {one.number} is observed, and {len(self.definitions)} are defined"
                 )
             channel = self.definitions[one.number]
@@ -290,7 +290,7 @@ class Observed:
             return None
         with np.errstate(all="ignore"):
             if definition.storage & STEPPED:
-                values = self._stepped(
+                values = self._expand_steps(
                     one, raw.astype(float) if len(raw) <= longest + MOST_STEPPED else raw, longest
                 )
             else:
@@ -299,19 +299,19 @@ class Observed:
             if definition.storage & SCALED:
                 values = values * one.number(SCALE, 1.0) + one.number(OFFSET, 0.0)
             if (np.abs(values) > HUGE).any():
-                raise one.own.body.damaged(f"a series has a value beyond {HUGE:g}")
+                raise one.own.body.describe_damage(f"a series has a value beyond {HUGE:g}")
         return values
 
-    def _stepped(self, one: "_Series", raw: np.ndarray, longest: int) -> np.ndarray:
+    def _expand_steps(self, one: "_Series", raw: np.ndarray, longest: int) -> np.ndarray:
         """Values of [runs, count, step, count, step, ...]: each run goes on from the one before."""
         runs = int(raw[0]) if len(raw) and 0 <= raw[0] <= len(raw) / 2 else -1
         counts, steps = raw[1 : 1 + 2 * max(runs, 0) : 2], raw[2 : 2 + 2 * max(runs, 0) : 2]
         if runs < 0 or len(steps) < runs or not np.isfinite(raw).all() or (counts < 0).any():
-            raise one.own.body.damaged(
+            raise one.own.body.describe_damage(
                 "a series of equal steps does not say how many there are of each"
             )
         if (total := float(counts.sum())) > max(longest, MOST_STEPPED):
-            raise one.own.body.damaged(
+            raise one.own.body.describe_damage(
                 f"a series of equal steps has {total:.0f} of them, for {longest} values"
             )
         self._take(one, total)

@@ -79,12 +79,12 @@ class Body:
         there.
         """
         if at < 0 or count < 0 or at + count * dtype.itemsize > len(self.data):
-            raise self.damaged(
+            raise self.describe_damage(
                 f"an element of {count} values lies at byte {at} of a body of {len(self.data)}"
             )
         return np.frombuffer(self.data, dtype, count, at) if count else np.empty(0, dtype)
 
-    def damaged(self, why: str) -> UserError:
+    def describe_damage(self, why: str) -> UserError:
         return UserError(
             f"{self.where}: {why}: the file is damaged; get it from the recorder again"
         )
@@ -102,7 +102,7 @@ class Collection:
         count = int(body.part(at, 1, COUNT)[0])
         body.entries += max(count, 0)
         if count < 0 or body.entries * ENTRY.size > len(body.data) or body.entries > MOST_ELEMENTS:
-            raise body.damaged(
+            raise body.describe_damage(
                 f"a collection at byte {at} has {count} elements, more than fit into the record"
             )
         self.body = body

@@ -68,7 +68,7 @@ def _window(file: Any, content: Any) -> Window | None:
     if not isinstance(content, dict):
         return None
     try:
-        return Window.of(content)
+        return Window.from_content(content)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise UserError(f"{file}: window is not as task=convert writes it; leave it out") from error
 

@@ -127,7 +127,7 @@ class Rows(TableFile):
     notes: tuple[str, ...] = field(default=())
 
     @classmethod
-    def of(
+    def from_columns(
         cls,
         path: Path,
         columns: Sequence[tuple[str, str, np.ndarray]],

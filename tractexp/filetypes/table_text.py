@@ -215,17 +215,17 @@ class TextTable(TableFile):
         short: tuple[int, int] | None = None
         for line, row in _parse_rows(self._body(), self.delimiter, self.source, self.line):
             if short is not None:
-                raise self._ragged(*short)
+                raise self._describe_ragged_line(*short)
             if len(row) <= last:
                 short = (line, len(row))
                 continue
             if len(row) > self.width and any(cell.strip() for cell in row[self.width :]):
-                raise self._ragged(line, len(row))
+                raise self._describe_ragged_line(line, len(row))
             yield line, row
         if short is not None:
             self.notes += (f"line {short[0]}, the last one, is cut short and not used",)
 
-    def _ragged(self, line: int, cells: int) -> UserError:
+    def _describe_ragged_line(self, line: int, cells: int) -> UserError:
         return UserError(
             f"{self.source}: line {line} has {count_noun(cells, 'cell')} where the others have"
             f" {self.width}; a "

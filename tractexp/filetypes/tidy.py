@@ -172,7 +172,7 @@ def _read_raw_values(channel: Channel) -> np.ndarray:
     """
     if channel.gain == 1 and channel.offset == 0 and channel.missing is None:
         return np.asarray(channel.raw)
-    return channel.recorded()
+    return channel.read_values()
 
 
 def _content(recording: Recording) -> dict[str, Any]:

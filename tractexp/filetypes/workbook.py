@@ -93,18 +93,18 @@ def _serve(memory: int, seconds: int) -> None:
             resource.setrlimit(kind, (own, hard))
     import python_calamine
 
-    def tried(read: Callable[[Any], Any], question: Any) -> Any:
+    def try_reading(read: Callable[[Any], Any], question: Any) -> Any:
         with contextlib.suppress(python_calamine.CalamineError, OSError, ValueError):
             return read(question)
 
-    book: Any = tried(
+    book: Any = try_reading(
         lambda data: python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data)), _question()
     )
     _give(book and list(book.sheet_names))
     with contextlib.suppress(EOFError):
         while True:
             _give(
-                tried(
+                try_reading(
                     lambda name: book.get_sheet_by_name(name).to_python(skip_empty_area=False),
                     _question(),
                 )

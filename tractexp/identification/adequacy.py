@@ -104,20 +104,21 @@ def surprise(
     drawn /= _level(likelihood, observed, rng)[:, None, None]
     basis, split = J.basis(), of_each_event(J, steady)
 
-    def left(rest: np.ndarray) -> dict[str, np.ndarray]:
+    def compute_statistics(rest: np.ndarray) -> dict[str, np.ndarray]:
         by_test = goodness_of_fit.statistics(
             rest.reshape(len(rest), observed.drive.channels, -1), observed.problem
         )
         return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
 
-    excess = squares and Excess.of(squares, unit, J, least)
-    own = basis.without(rows[None])
-    parts = [left(own) | ({APART: excess.of_records} if excess else {})]
+    excess = squares and Excess.from_fit(squares, unit, J, least)
+    own = basis.project_out(rows[None])
+    parts = [compute_statistics(own) | ({APART: excess.of_records} if excess else {})]
     together = max(1, MOST_NUMBERS // len(rows))
     for some in np.split(drawn, range(together, FIT_DRAWS, together)):
         white = likelihood.whiten(some)
         parts.append(
-            left(basis.without(white)) | ({APART: excess.of_draws(white, some)} if excess else {})
+            compute_statistics(basis.project_out(white))
+            | ({APART: excess.of_draws(white, some)} if excess else {})
         )
     by_test = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     values, draws = (
@@ -156,7 +157,9 @@ class Excess:
     squares: SeparableBasis
 
     @classmethod
-    def of(cls, squares: Likelihood, unit: np.ndarray, J: Sensitivities, least: float) -> "Excess":
+    def from_fit(
+        cls, squares: Likelihood, unit: np.ndarray, J: Sensitivities, least: float
+    ) -> "Excess":
         """Of the fit at coordinates (D,), where `least` is the least sum of squares."""
         likelihood = squares.with_initial_power
         rows, plain = likelihood.jacobian(unit)
@@ -169,7 +172,7 @@ class Excess:
         raw, k = self.likelihood.whiten(drawn), self.plain.k
         likely = raw - self.inside.times(self.J.fit(white))
         shifted = raw + self.plain.times(np.pad(_means(self.likelihood, drawn), ((0, 0), (k, 0))))
-        rest = self.squares.without(shifted)
+        rest = self.squares.project_out(shifted)
         return (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)
 
 
@@ -210,7 +213,7 @@ def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]
     is.
     """
     windows = goodness_of_fit.residual_windows(problem)
-    row = problem.drive.spoken.index
+    row = problem.drive.labels.index
     level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in windows]
     k = int(np.argmax(level))
     window = windows[k]

@@ -138,11 +138,11 @@ def _deviances(
     """What the best fits to groups of events alone leave, from coordinates (D,), as many at once as
     memory allows.
     """
-    together = max(1, MOST_NUMBERS // (2 * likelihood.problem.drive.measured.size))
+    together = max(1, MOST_NUMBERS // (2 * likelihood.problem.drive.measurements.size))
     parts = [groups[k : k + together] for k in range(0, len(groups), together)]
     start = np.tile(unit, (together, 1))
     ends = [
-        descend(only(likelihood, part), start[: len(part)], apart=likelihood.apart)
+        descend(only(likelihood, part), start[: len(part)], apart=likelihood.separable_columns)
         for part in parts
     ]
     return np.concatenate([descent.deviance for descent in ends])
@@ -151,7 +151,7 @@ def _deviances(
 def only(likelihood: Likelihood, groups: Sequence[Sequence[int]]) -> Rows:
     """Rows in which lane k counts the events of `groups[k]` alone."""
     drive = likelihood.problem.drive
-    masks = np.zeros((len(groups), *drive.measured.shape), dtype=bool)
+    masks = np.zeros((len(groups), *drive.measurements.shape), dtype=bool)
     for mask, group in zip(masks, groups, strict=True):
         for e in group:
             mask[:, drive.part(e)] = True

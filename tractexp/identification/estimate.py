@@ -115,18 +115,18 @@ class DescentEnds:
             Descent(self.descent.unit[near], self.descent.deviance[near], 0), self.likelihood.free
         )
 
-    def joined(self, more: Descent, origin: str) -> "DescentEnds":
+    def join_descent(self, more: Descent, origin: str) -> "DescentEnds":
         """These and further ends of one origin."""
         return replace(
             self,
-            descent=self.descent.joined(more),
+            descent=self.descent.join_descent(more),
             origins=(*self.origins, *[origin] * len(more.unit)),
         )
 
     def looked_beside(self) -> "DescentEnds":
         """These and the ends of descents from beside the best."""
         beside = along_least_certain(self.likelihood, self.best)
-        return self.joined(self.likelihood.descent(beside), "beside the best")
+        return self.join_descent(self.likelihood.descent(beside), "beside the best")
 
     def no_worse(self, unit: np.ndarray) -> bool:
         """Whether coordinates (D,) of the likelihood fit as well by Eq. (8) as the best do, as far
@@ -180,7 +180,7 @@ def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
         return _robust(problem, values)
     ends, best = _of_box(problem)
     own = ends.likelihood.descent(ends.likelihood.to_unit(values))
-    whole = ends.joined(own, "search")
+    whole = ends.join_descent(own, "search")
     if best is None or own.deviance[0] < ends.lowest - LEAST_MINIMUM_GAIN:
         return _choose_estimate(whole.looked_beside())
     return replace(best, starts=whole.starts)
@@ -188,7 +188,7 @@ def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
 
 def _robust(problem: Problem, values: np.ndarray) -> EstimationResult:
     """The estimate of a robust loss, from where the search ended."""
-    observed = Observed.of(problem)
+    observed = Observed.from_problem(problem)
     squares = Likelihood.of_squares(observed.problem, _level(observed.problem, values))
     squares = drop_outliers(squares, squares.to_unit(values))
     ends = DescentEnds(observed, squares, squares.descent(squares.to_unit(values)), ("search",))
@@ -211,7 +211,7 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
     ]
     key = f"{problem.digest()} {events}"
     if key not in _remembered:
-        observed = Observed.of(problem)
+        observed = Observed.from_problem(problem)
         points, least = screen_points(observed.problem)
         likelihood = Likelihood.of_squares(
             observed.problem, max(float(np.sqrt(least)), SMALLEST_DEVIATION)
@@ -224,7 +224,7 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
         for _ in range(ESTIMATE_ROUNDS):
             ends = _without_offsets(ends)
         refined = ends.likelihood.descent(distinct(ends.descent, likelihood.free))
-        ends = ends.joined(refined, "box").looked_beside()
+        ends = ends.join_descent(refined, "box").looked_beside()
         _remembered[key] = ends, _choose_estimate(ends)
         if len(_remembered) > REMEMBERED:
             _remembered.popitem(last=False)
@@ -237,7 +237,7 @@ def _in_own_units(ends: DescentEnds) -> DescentEnds:
     """
     variance = max(ends.lowest / ends.likelihood.samples, 1e-12)
     descent = replace(ends.descent, deviance=ends.descent.deviance / variance)
-    return replace(ends, likelihood=ends.likelihood.scaled(np.sqrt(variance)), descent=descent)
+    return replace(ends, likelihood=ends.likelihood.scale_noise(np.sqrt(variance)), descent=descent)
 
 
 def _without_offsets(ends: DescentEnds) -> DescentEnds:
@@ -323,7 +323,7 @@ def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.nda
     first.
     """
     observed, likelihood = ends.observed, ends.likelihood.with_initial_power
-    units = likelihood.placed(ends.near)
+    units = likelihood.place_parameters(ends.near)
     input_modes = observed.input_errors(likelihood.values(units[0]))
     for _ in range(ESTIMATE_ROUNDS):
         if robust:
@@ -350,7 +350,7 @@ def noise_at(
     The whole tells more, too, where only noise is left. `input_modes` is that of
     `Observed.input_errors`.
     """
-    measured = likelihood.problem.drive.measured
+    measured = likelihood.problem.drive.measurements
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
     residual = rows.reshape(measured.shape)
     values = likelihood.values(unit)
@@ -372,7 +372,9 @@ def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
         for c in range(drive.channels):
             pieces = stretches(residuals[c, part], likelihood.valid[c, part])
             enough = sum(map(len, pieces)) >= FEWEST_NOISE_SAMPLES
-            pair.append(fit_autoregression(pieces).scaled(back) if enough else white_noise(1.0))
+            pair.append(
+                fit_autoregression(pieces).scale_noise(back) if enough else white_noise(1.0)
+            )
         pairs.append(tuple(pair))
     return Noise(tuple(pairs))
 
@@ -414,7 +416,7 @@ def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertaint
     for minimum in local_minima:
         for j in np.flatnonzero((minimum.values < own[:, 0]) | (minimum.values > own[:, 1])):
             name, value = uncertainty.names[j], float(minimum.values[j])
-            verdicts[name] = verdicts[name].weakened(
+            verdicts[name] = verdicts[name].add_objection(
                 f"another valley, at {value:.4g}, fits as well"
             )
     return replace(uncertainty, verdicts=verdicts, local_minima=tuple(local_minima))

@@ -104,7 +104,7 @@ class Misfit:
     epsilon_i: float | None
 
     @classmethod
-    def of(cls, fits: Sequence[Fit]) -> "Misfit":
+    def from_fits(cls, fits: Sequence[Fit]) -> "Misfit":
         """Of some events together."""
         currents = [fit.epsilon_i**2 for fit in fits if fit.epsilon_i is not None]
         of_currents = float(np.sqrt(np.mean(currents))) if currents else None
@@ -170,8 +170,8 @@ def grade_estimate(
     held_out = errors["held_out"]
     adequacy = grade_errors(
         estimation.surprise,
-        ModelError.of(errors),
-        held_out and ModelError.of(held_out),
+        ModelError.from_content(errors),
+        held_out and ModelError.from_content(held_out),
         active_bounds(problem, values, _nuisances(problem, shown)),
     )
     if said := _describe_swings(problem.events):

@@ -55,7 +55,7 @@ class DipShape:
     error: float = 0.0  # what the model misses of the response, beside the noise
 
     @classmethod
-    def of(cls, event: Event, noise: Noise | None = None) -> "DipShape":
+    def from_event(cls, event: Event, noise: Noise | None = None) -> "DipShape":
         """The shape of a recorded event, with the noise that a fit found there, or that before the
         dip.
         """
@@ -113,7 +113,7 @@ class DipShape:
         fall, back = (np.clip((t - s) / edge, 0.0, 1.0) for s in (BEFORE, BEFORE + self.duration))
         start, end = (int(np.searchsorted(t, s)) for s in (BEFORE, BEFORE + self.duration + edge))
         name = f"{100 * self.depth:.0f} % for {1000 * self.duration:.0f} ms"
-        return self.domain.planned(self, name, t, fall - back, start, end)
+        return self.domain.plan_event(self, name, t, fall - back, start, end)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ def forecast(
 def _weigh_model_error(planned: Problem, values: np.ndarray, shape: DipShape) -> float:
     """By how many times the noise's variance the model's error adds to it in a planned dip."""
     model, full = planned.model, planned.full(values)
-    still = Drive.of([planned.domain.excitation(shape.still.event(), model)])
+    still = Drive.from_events([planned.domain.excitation(shape.still.event(), model)])
     dip, rest = (
         model.simulate(drive, full, planned.step.substeps).outputs[:, 0]
         for drive in (planned.drive, still)
@@ -189,7 +189,7 @@ def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> li
     """
     if refusal := problem.model.refusal(problem.full(values)[0], problem.drive):
         raise UserError(f"nothing can be planned at these parameters: {refusal}")
-    likelihood = Likelihood.of(problem, noise)
+    likelihood = Likelihood.from_problem(problem, noise)
     _, J = likelihood.jacobian(likelihood.to_unit(values)[0])
     width = problem.upper - problem.lower
     # a dip in which the motor stalls tells nothing

@@ -34,7 +34,7 @@ class PosteriorSample:
         return np.quantile(self.draws, [tails, 1 - tails], axis=0).T
 
     @property
-    def converged(self) -> bool:
+    def has_converged(self) -> bool:
         return self.steps >= ENOUGH * self.autocorrelation
 
 

@@ -199,7 +199,7 @@ def profiles(
             )
         descent = uncertainty.likelihood.descent(drawing.better[None])
         simulations += descent.simulations
-        uncertainty = uncertainty.at(descent.unit[0])
+        uncertainty = uncertainty.judge_point(descent.unit[0])
         restarts += 1
 
 
@@ -255,7 +255,7 @@ class _Drawing:
         lanes.run(points, ended)
         self.simulations += lanes.simulations
         self.better = lanes.better
-        self.region = self.region.joined(lanes.region)
+        self.region = self.region.join_region(lanes.region)
 
 
 def _in_range(

@@ -67,7 +67,7 @@ class Region:
     unit: np.ndarray
     rise: np.ndarray
 
-    def joined(self, other: "Region") -> "Region":
+    def join_region(self, other: "Region") -> "Region":
         return Region(
             np.concatenate([self.unit, other.unit]), np.concatenate([self.rise, other.rise])
         )
@@ -182,7 +182,7 @@ class Lanes:
         j = int(self.column[2 * k])
         optimum = (float(self.origin[k, j]), float(self.risen[k]))
         down, up = (np.array([optimum, *self.path[lane]]) for lane in (2 * k, 2 * k + 1))
-        (lowest, below), (highest, above) = self._crossing(down), self._crossing(up)
+        (lowest, below), (highest, above) = self._find_crossing(down), self._find_crossing(up)
         joined = np.concatenate((down[:0:-1], up))
         low = self.uncertainty.lower[j]
         scale = self.uncertainty.upper[j] - low
@@ -195,7 +195,7 @@ class Lanes:
             minima=tuple(float(low + scale * m) for side in (down, up) for m in self._minima(side)),
         )
 
-    def _crossing(self, path: np.ndarray) -> tuple[float, End]:
+    def _find_crossing(self, path: np.ndarray) -> tuple[float, End]:
         """Where the path (n, 2) last rises through the threshold, on the root of the deviance."""
         over = path[:, 1] > self.limit
         if not over[-1]:

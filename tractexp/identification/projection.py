@@ -42,7 +42,7 @@ class Projection:
     rate: float  # samples per second
 
     @classmethod
-    def of(cls, ports: Sequence[Port]) -> "Projection":
+    def from_ports(cls, ports: Sequence[Port]) -> "Projection":
         seconds = max((len(port.u) - port.start) * port.step for port in ports)
         current = _rows(ports, lambda port: port.i - port.steady_response)
         return cls(ports, current, 1 / seconds, 1 / max(port.step for port in ports))
@@ -71,13 +71,13 @@ class Projection:
         """The pole of the grid that takes most of what these leave, beside them."""
         _, base, residual = self.linear_part(poles)
 
-        def taken(pole: complex) -> float:
+        def measure_correlation(pole: complex) -> float:
             response = _rows(self.ports, lambda port: of_pole(port, pole))
             apart = response - base @ (base.conj().T @ response)
             least = PARALLEL * np.linalg.norm(response) + np.finfo(float).tiny
             return float(abs(np.vdot(residual, apart)) / max(np.linalg.norm(apart), least))
 
-        return max(self.grid, key=taken)
+        return max(self.grid, key=measure_correlation)
 
     def optimum(self, poles: Complex) -> Complex:
         """The poles that leave least, near these."""

@@ -92,7 +92,7 @@ def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
     """
     domain = domain_of(model)
     event = domain.event(event)
-    drive = Drive.of([domain.excitation(event, model)])
+    drive = Drive.from_events([domain.excitation(event, model)])
     if refusal := model.refusal(values, drive):
         raise UserError(f"{event.record.name}: {refusal}")
     substeps, _ = model.substeps(drive, values)
@@ -103,7 +103,10 @@ def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
 def explain_refusal(model: Model, values: np.ndarray, event: Event) -> str:
     """Return why an event cannot be played through the model at these values; "" where it can."""
     domain = domain_of(model)
-    return model.refusal(values, Drive.of([domain.excitation(domain.event(event), model)])) or ""
+    return (
+        model.refusal(values, Drive.from_events([domain.excitation(domain.event(event), model)]))
+        or ""
+    )
 
 
 @dataclass(frozen=True)
@@ -164,7 +167,7 @@ class Result:
     commit: str = ""  # of the package's repository; "" for a wheel
 
     @classmethod
-    def of(cls, content: Any, where: str) -> "Result":
+    def from_content(cls, content: Any, where: str) -> "Result":
         """The result that a file holds; `where` names it. Values outside their bounds are warned
         of.
 
@@ -204,11 +207,11 @@ class Result:
     @property
     def identities(self) -> list[Identity]:
         """Which load each record is of, in the order of `records`."""
-        return [Identity.of(record) for record in self.records]
+        return [Identity.from_content(record) for record in self.records]
 
     def on_base_of(self, record: Record) -> dict[str, float]:
         """The parameters on the base that a record is on."""
-        ratio = self.base.over(record)
+        ratio = self.base.compute_ratio(record)
         motor, static, effects, *_ = parts(self.model)
         exponents = {
             p.name: p.power_exponent for part in (motor, static, *effects) for p in part.parameters
@@ -330,7 +333,7 @@ def load(path: Path) -> Result:
     if path.is_dir():
         path = path / FILE
     try:
-        return Result.of(files.read_json(path), str(path))
+        return Result.from_content(files.read_json(path), str(path))
     except FileNotFoundError:
         raise UserError(
             f"there is no result file {path}; run an identification first, it writes {FILE}"
@@ -354,7 +357,7 @@ def conclude(
     refuse_failed(problem, end)
     epsilon_p, epsilon_q = relative_errors([fit for fit in fits if fit.role == TRAIN])
     first, estimates = problem.events[0], _values(problem, free)
-    own = OwnBase.at(first.record)
+    own = OwnBase.from_record(first.record)
     exponents = {p.name: p.power_exponent for p in problem.parameters}
     return Result(
         **estimates,
@@ -379,7 +382,8 @@ def conclude(
         search=describe_search(problem, end),
         notes=[note for f in fits for note in f.event.record.notes],
         records=[
-            {"name": f.event.record.name, "role": f.role} | Identity.at(f.event.record).to_dict()
+            {"name": f.event.record.name, "role": f.role}
+            | Identity.from_record(f.event.record).to_dict()
             for f in fits
         ],
         own_base=asdict(own),
@@ -417,7 +421,7 @@ def refuse_failed(problem: Problem, end: SearchResult) -> None:
 
 def _meant(problem: Problem) -> str:
     """On which base bounds are meant, where that is not the file's."""
-    own = OwnBase.at(problem.events[0].record)
+    own = OwnBase.from_record(problem.events[0].record)
     return "" if own.ratio == 1 else f", which are meant on the record's own base of {own}"
 
 

@@ -77,7 +77,7 @@ def _find_moved_parameters(
         half = max(abs(far - value), float(np.ptp(beside.intervals[j])) / 2)
         wide = half > IDENTIFIED_SHARE * size(value, own.lower[j], own.upper[j])
         if by and ((wide and verdict.word == IDENTIFIED) or not low <= far <= high):
-            yield name, verdict.weakened(f"with {by} it is {far:.4g}", enough=wide)
+            yield name, verdict.add_objection(f"with {by} it is {far:.4g}", enough=wide)
 
 
 def _structures(model: Model) -> Iterator[tuple[str, Model]]:
@@ -137,7 +137,7 @@ def _fit_rival(uncertainty: Uncertainty, name: str, model: Model) -> RivalStruct
     except UserError:
         return None
     likelihood = replace(uncertainty.likelihood, problem=other)
-    start = likelihood.placed(_starts(uncertainty, other))
+    start = likelihood.place_parameters(_starts(uncertainty, other))
     if uncertainty.exact:
         start[:, likelihood.free :] = uncertainty.unit[uncertainty.likelihood.free :]
     ended = likelihood.descent(start, iterations=RIVAL_ITERATIONS, tolerance=0.01)

@@ -232,7 +232,7 @@ def search(
         status = str(stop)
     except KeyboardInterrupt as stop:
         ended = _result(counter, rows, f"was stopped after {counter.simulations} simulations")
-        raise Stopped.of(stop, state=ended) from None
+        raise Stopped.from_interrupt(stop, state=ended) from None
     if not rows or rows[-1][0] < counter.simulations:
         note()
     return _result(counter, rows, status)

@@ -74,7 +74,7 @@ class Uncertainty:
         """Half of the 95 % interval by curvature, inf where not identifiable."""
         return self.factors * self.information.standard_errors
 
-    def at(self, unit: np.ndarray) -> "Uncertainty":
+    def judge_point(self, unit: np.ndarray) -> "Uncertainty":
         """The same judgement of another point (D,) of the same likelihood."""
         return conclude(self.likelihood, unit, None if self.exact else self.of_noise, self.notes)
 
@@ -89,17 +89,17 @@ class Uncertainty:
         return self.likelihood.of_records.jacobian(self.unit)
 
     @functools.cached_property
-    def whitened(self) -> np.ndarray:
+    def whitened_residual(self) -> np.ndarray:
         """The residual of the estimate over the noise, (2 N,)."""
         return self.of_noise.rows(
-            self.unit[None] if self.exact else self.of_noise.placed(self.unit[None])
+            self.unit[None] if self.exact else self.of_noise.place_parameters(self.unit[None])
         )[0]
 
     @functools.cached_property
     def tests(self) -> list[dict[str, Any]]:
         """Whiteness and normality of the whitened residual of each event and channel."""
         problem, valid = self.of_noise.problem, self.of_noise.valid
-        white, results = self.whitened.reshape(problem.drive.channels, -1), []
+        white, results = self.whitened_residual.reshape(problem.drive.channels, -1), []
         for e, event in enumerate(problem.events):
             part = problem.drive.part(e)
             for c, channel in enumerate(problem.drive.names):
@@ -298,8 +298,8 @@ def _scatter(squares: Likelihood, unit: np.ndarray) -> Spread:
     left = float(np.sum(squares.of_records.rows(unit[None])[0] ** 2)) / max(
         squares.samples - len(unit), 1
     )
-    scattered = scatter(squares.scaled(np.sqrt(left)), unit)
-    likelihood = squares.scaled(np.sqrt(left) * scattered.spread)
+    scattered = scatter(squares.scale_noise(np.sqrt(left)), unit)
+    likelihood = squares.scale_noise(np.sqrt(left) * scattered.spread)
     rows = likelihood.rows(unit[None])[0]
     factors = np.full(len(unit), scattered.quantile)
     limits = (factors * scattered.ratio / scattered.spread) ** 2

@@ -33,7 +33,7 @@ class ParameterVerdict:
     word: str
     detail: str
 
-    def weakened(self, also: str, *, enough: bool = True) -> "ParameterVerdict":
+    def add_objection(self, also: str, *, enough: bool = True) -> "ParameterVerdict":
         """With what speaks against it as well: weak where it was identified, if that
         is `enough`.
         """

@@ -43,7 +43,7 @@ class BaseFit:
 def base_fit(context: Context) -> BaseFit:
     """Fit the base model from all over its box, where its own fast kernel fits it best."""
     # the first may not stay the best: faults are free
-    minima = minima_of(context, Likelihood.of(context.kernels.bare))
+    minima = minima_of(context, Likelihood.from_problem(context.kernels.bare))
     return fitted_from(context, minima, minima)
 
 
@@ -65,7 +65,7 @@ def fitted_from(
     """
     noise = white(context)
     fit = refit(context, noise, [((), start) for start in starts])[0]
-    quiet = QuietNoise.at(context, fit.unit)
+    quiet = QuietNoise.from_context(context, fit.unit)
     for _ in range(BASE_FIT_ROUNDS):
         noise = quiet.of_fit(fit.unit)
         fit = refit(context, noise, [((), fit.unit)])[0]

@@ -47,7 +47,7 @@ class Candidate:
         low, high = parameter.bounds
         return float(self.effect.relevant.get(parameter.name, 0.1 * (high - low)))
 
-    def sized(self, parameter: Parameter, size: float, least: float) -> float:
+    def compute_sized_value(self, parameter: Parameter, size: float, least: float) -> float:
         """The value of one of `sizes` that is `size` off its null, or `least` relevant sizes where
         that is more.
 
@@ -71,10 +71,10 @@ class Catalogue:
     members: tuple[Candidate, ...] = ()
 
     def __getitem__(self, name: str) -> Candidate:
-        return self._named[name]
+        return self._candidates_by_name[name]
 
     @functools.cached_property
-    def _named(self) -> dict[str, Candidate]:
+    def _candidates_by_name(self) -> dict[str, Candidate]:
         return {c.name: c for c in (*self.candidates, *self.members)}
 
     def parameters(self, names: Sequence[str]) -> list[Parameter]:
@@ -93,7 +93,7 @@ class Catalogue:
         """The names by which effects are told, whatever place and law they were found at."""
         return tuple(self.family(name) for name in names)
 
-    def spoken(self, name: str) -> str:
+    def label_effect(self, name: str) -> str:
         """An effect as a sentence tells it: by its textbook name, and what differs from that."""
         differs = self[name].effect.differs
         if not differs:

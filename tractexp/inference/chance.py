@@ -97,7 +97,7 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
     """
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        drawn = own.of(_white(t, noise, np.random.default_rng((seed, k))))
+        drawn = own.replace_residuals(_white(t, noise, np.random.default_rng((seed, k))))
         by_test = goodness_of_fit.statistics(drawn.channels(t.context.problem), t.context.problem)
         return {
             name: (values.mean(axis=0), (values**2).mean(axis=0))
@@ -117,13 +117,17 @@ def _draw_null_distribution(
 ) -> Chance:
     rng = np.random.default_rng(seed)
     if plain:
-        return _chance(t, own.of(_white(t, noise, rng)), noise)
+        return _chance(t, own.replace_residuals(_white(t, noise, rng)), noise)
     drawn = noise.draw(rng, NULL_DRAWS, np.diff(t.context.drive.first).tolist()) * t.context.valid
     rest = rich_residuals(t, drawn)
 
     def anew(b: int) -> Chance:
-        seen = quiet.of(t.unit, rest[b])
-        return _chance(t, t.whitened(seen).of(t.context.whiten(seen, drawn[b : b + 1])), noise)
+        seen = quiet.estimate_noise(t.unit, rest[b])
+        return _chance(
+            t,
+            t.build_score_test(seen).replace_residuals(t.context.whiten(seen, drawn[b : b + 1])),
+            noise,
+        )
 
     each = each_apart(anew, range(NULL_DRAWS), t.context.effort)
     left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}

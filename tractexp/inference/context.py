@@ -49,7 +49,7 @@ class Context:
     prior: float = 0.0  # weight of rows that hold the motor to what machines usually are
 
     @classmethod
-    def of(
+    def from_records(
         cls,
         load: Model,
         catalogue: Catalogue,
@@ -67,7 +67,7 @@ class Context:
         there is one.
         """
         kernels = Kernels(
-            family(load.behind(records.window), catalogue),
+            family(load.place_behind_recorder(records.window), catalogue),
             records.events,
             bounds,
             fixed,
@@ -77,14 +77,14 @@ class Context:
         coordinates = FreeSet.of_effects(kernels.bare, kernels.whole, catalogue, FAULT_PRIOR)
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
 
-    def on(self, records: Records) -> "Context":
+    def move_to_records(self, records: Records) -> "Context":
         """The same model and catalogue on other records, with the same Runge-Kutta steps and a
         count of its own.
         """
         kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
         same = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
         priors = kernels.bare.priors
-        there = Context.of(
+        there = Context.from_records(
             self.load, self.catalogue, records, *same, type(kernels.family), priors=priors
         )
         return there if len(self.coordinates.before) else there.with_measured_power
@@ -163,7 +163,7 @@ class Context:
 
     def describe(self, noise: Noise) -> str:
         """Level and color of the noise of what is compared, as a run prints them."""
-        labels = noise.describe(self.drive.spoken).split(", ")
+        labels = noise.describe(self.drive.labels).split(", ")
         return ", ".join(
             part
             for part, there in zip(labels, [*np.any(self.valid, axis=1), True], strict=True)
@@ -255,7 +255,7 @@ class Context:
         return raw[0], np.concatenate([white, prior], axis=1)
 
     @property
-    def apart(self) -> SeparableColumns:
+    def separable_columns(self) -> SeparableColumns:
         """P0 and Q0 of each event where they are free, which act on its own rows only."""
         first = len(self.coordinates.base) if len(self.coordinates.before) else None
         return SeparableColumns.of_power(self.drive, first)

@@ -32,7 +32,7 @@ def forward_differences(
     event. One that cannot be simulated is zero.
     """
     n, d = unit.shape
-    shared, steps = apart.shared(d), apart.moves(d)
+    shared, steps = apart.find_shared_columns(d), apart.moves(d)
     h = np.where(unit > 0.5, -RANGE_DIFFERENCE, RANGE_DIFFERENCE)
     moved = unit[:, None, :] + steps * h[:, None, :]
     J = rows(moved.reshape(-1, d), np.repeat(lanes, len(steps))).reshape(n, len(steps), -1)
@@ -57,7 +57,7 @@ def central_differences(
     n, d = unit.shape
     up = np.minimum(unit + CENTRAL, 1.0) - unit
     down = unit - np.maximum(unit - CENTRAL, 0.0)
-    shared, moves = apart.shared(d), apart.moves(d)
+    shared, moves = apart.find_shared_columns(d), apart.moves(d)
     steps = np.concatenate(
         [np.zeros((n, 1, d)), moves * up[:, None], moves * -down[:, None]], axis=1
     )

@@ -46,9 +46,9 @@ class FitProblem:
 
     def to_unit(self, values: np.ndarray) -> np.ndarray:
         """Free values (n, free), at the measured power before each event, as coordinates (n, D)."""
-        return self.placed(self.problem.space.to_unit(np.atleast_2d(values)))
+        return self.place_parameters(self.problem.space.to_unit(np.atleast_2d(values)))
 
-    def placed(self, unit: np.ndarray) -> np.ndarray:
+    def place_parameters(self, unit: np.ndarray) -> np.ndarray:
         """Parameters (n, free or more) in the unit cube as coordinates (n, D), at the measured
         power before each event.
 
@@ -73,7 +73,7 @@ class FitProblem:
             drive, problem.candidates(self.values(unit)), problem.step.substeps, before
         )
         rows = response.by_candidate
-        rows -= drive.measured
+        rows -= drive.measurements
         if self.gaps:
             with np.errstate(invalid="ignore"):  # what diverged is no number in gaps either
                 rows *= self.valid
@@ -82,7 +82,7 @@ class FitProblem:
         return rows
 
     @functools.cached_property
-    def apart(self) -> SeparableColumns:
+    def separable_columns(self) -> SeparableColumns:
         """P0 and Q0 of each event, which act on its own rows only."""
         return SeparableColumns.of_power(
             self.problem.drive, self.free if self.initial_power else None

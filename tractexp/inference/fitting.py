@@ -309,7 +309,7 @@ def _run_descents(
     # the last column takes what no lane has
     starts = np.array([np.r_[start, 0.0] for _, start in wanted])
 
-    def descended(group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def descend_group(group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
             whole = starts[group[lanes]]
             np.put_along_axis(whole, table[group[lanes]], x, axis=1)
@@ -318,12 +318,14 @@ def _run_descents(
             )
 
         begin = np.take_along_axis(starts[group], table[group], axis=1)
-        done = descend(rows, begin, table[group] == at.dimension, *effort, context.apart)
+        done = descend(
+            rows, begin, table[group] == at.dimension, *effort, context.separable_columns
+        )
         return done.unit, done.deviance
 
     def all_descended() -> tuple[np.ndarray, ...]:
         groups = np.array_split(np.arange(len(wanted)), -(-len(wanted) // fit_effort.FITS_AT_ONCE))
-        units, deviances = zip(*each_apart(descended, groups, context.effort), strict=True)
+        units, deviances = zip(*each_apart(descend_group, groups, context.effort), strict=True)
         return (
             np.concatenate(units),
             np.concatenate(deviances),

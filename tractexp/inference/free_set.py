@@ -63,7 +63,10 @@ class FreeSet:
         model is `bare`.
         """
         members = tuple(p for member in catalogue.members for p in member.effect.parameters)
-        parameters, power = join_boxes(whole.space, Box.of(members)), power_before(whole)
+        parameters, power = (
+            join_boxes(whole.space, Box.from_parameters(members)),
+            power_before(whole),
+        )
         nulls = {
             p.name: p.default if p.null is None else p.null for p in (*whole.parameters, *members)
         }
@@ -150,14 +153,14 @@ class FreeSet:
         """Columns of the effects' parameters that are held to their defaults by what is likely."""
         return [self.column[name] for n in effects for name in self.catalogue[n].effect.likely]
 
-    def placed(self, unit: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
+    def place_values(self, unit: np.ndarray, values: Mapping[str, float]) -> np.ndarray:
         """Coordinates (D,) with these parameters at these values."""
         moved = unit.copy()
         for name, value in values.items():
             moved[self.column[name]] = self.to_unit(name, value)
         return moved
 
-    def without(self, unit: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    def remove_effects(self, unit: np.ndarray, names: Sequence[str]) -> np.ndarray:
         """Coordinates (D,) with all parameters of these effects back at their nulls."""
         moved, columns = unit.copy(), self.parameters(names)
         moved[columns] = self.null[columns]
@@ -173,7 +176,7 @@ class FreeSet:
             [parameters, np.broadcast_to(measured, (*unit.shape[:-1], len(measured)))], axis=-1
         )
 
-    def widened(self, unit: np.ndarray) -> np.ndarray:
+    def widen_coordinates(self, unit: np.ndarray) -> np.ndarray:
         """Coordinates (D,) from those of the first of these events, the others as before any fit.
 
         Their first numbers, as many as those had, are the first events' again.
@@ -184,7 +187,7 @@ class FreeSet:
         """Coordinates (D,) with the faults of the measurement that are not `free` back at their
         nulls.
         """
-        return self.without(
+        return self.remove_effects(
             unit, [name for name in self.catalogue.of_measurement if name not in free]
         )
 

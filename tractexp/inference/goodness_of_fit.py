@@ -177,7 +177,7 @@ def residual_windows(problem: Problem) -> list[ResidualWindow]:
             part = slice(first + i, first + j)
             cells += [
                 ResidualWindow(e, c, part, origin + i * step, origin + (j - 1) * step)
-                for c in problem.drive.spoken
+                for c in problem.drive.labels
             ]
     return cells
 
@@ -193,7 +193,7 @@ def energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
         keepdims=True,
     )
     square /= np.where(quiet > 0, quiet, 1.0)  # a current that is not compared is zero throughout
-    row = problem.drive.spoken.index
+    row = problem.drive.labels.index
     return np.stack(
         [square[:, row(c.channel), c.part].sum(axis=1) for c in residual_windows(problem)], axis=1
     )

@@ -33,7 +33,7 @@ class Information:
     held: tuple[str, ...] = ()
 
     @classmethod
-    def of(
+    def from_jacobian(
         cls,
         names: Sequence[str],
         values: np.ndarray,

@@ -77,7 +77,7 @@ def perturbations(context: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.
     points, groups = [], []
     for g, push in enumerate(PERTURBATIONS):
         for a, b in spans:
-            point = at.placed(unit, {"window_on": a, "window_off": b})
+            point = at.place_values(unit, {"window_on": a, "window_off": b})
             point[at.column[push]] += PUSH / at.width(push)
             points.append(point)
             groups.append(g)

@@ -37,7 +37,7 @@ def _jumps(context: Context, key: bytes) -> np.ndarray:
     at, unit = context.coordinates, np.frombuffer(key)
     there = at.present(unit)
     if not there:
-        return np.empty((0, *context.drive.measured.shape))
+        return np.empty((0, *context.drive.measurements.shape))
     without = unit.copy()
     columns = at.sizes(there)
     without[columns] = at.null[columns]
@@ -47,9 +47,9 @@ def _jumps(context: Context, key: bytes) -> np.ndarray:
         part = context.drive.part(e)
         for c, change in enumerate(np.nan_to_num(added[:, part])):
             for k, size in _at_jumps(change):
-                shapes.append(np.zeros(context.drive.measured.shape))
+                shapes.append(np.zeros(context.drive.measurements.shape))
                 shapes[-1][c, part.start + k] = size
-    return np.array(shapes).reshape(-1, *context.drive.measured.shape)
+    return np.array(shapes).reshape(-1, *context.drive.measurements.shape)
 
 
 def _at_jumps(added: np.ndarray) -> list[tuple[int, float]]:

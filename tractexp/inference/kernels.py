@@ -51,7 +51,7 @@ class Family:
             base.domain,
             base.window,
         )
-        return model.behind(base.recorder)
+        return model.place_behind_recorder(base.recorder)
 
     def _effect(self, name: str) -> Effect:
         return Injection() if name == PUSHES else self.catalogue[name].effect
@@ -78,7 +78,7 @@ class Family:
             tested = self.cheap if beside in self.cheap else frozenset((beside,))
         return load - tested, tested
 
-    def of(self, key: Key) -> Model:
+    def build_model(self, key: Key) -> Model:
         """The model of a kernel. An effect that a member of a family does not take beside it is not
         tested there.
         """
@@ -147,22 +147,22 @@ class Kernels:
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, C, N) [pu] at coordinates (n, D)."""
-        fit_problem, columns = self._of(key)
+        fit_problem, columns = self._build_fit_problem(key)
         return fit_problem.residuals(unit[:, columns])
 
-    def at(self, names: Iterable[str], unit: np.ndarray) -> tuple[Problem, np.ndarray]:
+    def select_problem(self, names: Iterable[str], unit: np.ndarray) -> tuple[Problem, np.ndarray]:
         """The problem of a set of names, and its free values (..., d) at coordinates (..., D)."""
-        fit_problem, columns = self._of(self.family.key(names))
+        fit_problem, columns = self._build_fit_problem(self.family.key(names))
         return fit_problem.problem, fit_problem.values(unit[..., columns])
 
     def simulate(self, names: Iterable[str], unit: np.ndarray, drive: Drive) -> np.ndarray:
         """What is compared (n, C, N) [pu] under other voltages, with these effects at coordinates
         (n, D).
         """
-        problem, free = self.at(names, unit)
+        problem, free = self.select_problem(names, unit)
         return problem.model.simulate(drive, problem.full(free), self.substeps).by_candidate
 
-    def _of(self, key: Key) -> tuple[FitProblem, np.ndarray]:
+    def _build_fit_problem(self, key: Key) -> tuple[FitProblem, np.ndarray]:
         """The fit problem of one kernel, and where its coordinates stand among all."""
         if key not in self._fit_problems:
             problem = self._problem(key, self.substeps)
@@ -178,7 +178,7 @@ class Kernels:
         return self._fit_problems[key]
 
     def _problem(self, key: Key, substeps: int) -> Problem:
-        model = self.family.of(key)
+        model = self.family.build_model(key)
         bounds = {n: v for n, v in self.bounds.items() if n in model.names}
         fixed = {n: v for n, v in self.fixed.items() if n in model.names}
         return Problem(model, self.events, bounds, fixed, substeps)

@@ -34,7 +34,7 @@ class Descent:
         """Coordinates (D,) of the least deviance."""
         return self.unit[self.deviance.argmin()]
 
-    def joined(self, more: "Descent") -> "Descent":
+    def join_descent(self, more: "Descent") -> "Descent":
         """These ends and further ones."""
         unit, deviance = (
             np.concatenate([self.unit, more.unit]),
@@ -68,7 +68,9 @@ def normal(
             J = forward_differences(rows, unit[part], base[part], lanes[part], apart)
         parts.append(_products(J, base[part], unit.shape[1], apart))
     gradient, shared, cross, own = (np.concatenate(pieces) for pieces in zip(*parts, strict=True))
-    return gradient, NormalMatrix(shared, cross, own, apart.shared(unit.shape[1]), apart)
+    return gradient, NormalMatrix(
+        shared, cross, own, apart.find_shared_columns(unit.shape[1]), apart
+    )
 
 
 def _products(
@@ -77,7 +79,7 @@ def _products(
     """Gradient (n, D) and the blocks of a `NormalMatrix`, of derivatives (n, k + m, R) as the
     differences have them.
     """
-    shared, m = apart.shared(size), apart.count
+    shared, m = apart.find_shared_columns(size), apart.count
     n, k, events = len(J), len(shared), len(apart.rows)
     gradient, own = np.zeros((n, size)), J[:, :k]
     gradient[:, shared] = (own @ base[:, :, None])[:, :, 0]

@@ -32,7 +32,7 @@ def before_the_event(event: Event) -> Pair:
         color = fit_autoregression(
             stretches(quiet, np.isfinite(quiet)), domain_of(event).quiet_order
         )
-        pair.append(color.scaled(max(level, SMALLEST_DEVIATION) / color.deviation[0]))
+        pair.append(color.scale_noise(max(level, SMALLEST_DEVIATION) / color.deviation[0]))
     return tuple(pair)
 
 
@@ -48,7 +48,7 @@ class Likelihood(FitProblem):
     prior: float = 0.0
 
     @classmethod
-    def of(cls, problem: Problem, noise: Noise | None = None) -> "Likelihood":
+    def from_problem(cls, problem: Problem, noise: Noise | None = None) -> "Likelihood":
         """The likelihood under `noise`, by default that of the samples before each dip; gaps do not
         count.
         """
@@ -71,9 +71,9 @@ class Likelihood(FitProblem):
         """The same with P0 and Q0 of each event free."""
         return replace(self, initial_power=True)
 
-    def scaled(self, factor: float) -> "Likelihood":
+    def scale_noise(self, factor: float) -> "Likelihood":
         """The same with noise `factor` times as loud."""
-        return replace(self, noise=self.noise.scaled(factor), prior=self.prior / factor)
+        return replace(self, noise=self.noise.scale_noise(factor), prior=self.prior / factor)
 
     @property
     def of_records(self) -> "Likelihood":
@@ -103,8 +103,10 @@ class Likelihood(FitProblem):
 
     def jacobian(self, unit: np.ndarray) -> tuple[np.ndarray, Sensitivities]:
         """Whitened rows (R,) at one point (D,) of the unit cube, and their central differences."""
-        rows, J = central_differences(self.rows, unit[None], np.zeros(1, dtype=int), self.apart)
-        return rows[0], Sensitivities(J[0], self.free, self.apart.rows)
+        rows, J = central_differences(
+            self.rows, unit[None], np.zeros(1, dtype=int), self.separable_columns
+        )
+        return rows[0], Sensitivities(J[0], self.free, self.separable_columns.rows)
 
     def descent(
         self,
@@ -114,4 +116,4 @@ class Likelihood(FitProblem):
         tolerance: float = 1e-4,
     ) -> Descent:
         """The ends of descents of the deviance from coordinates (n, D); see `descend`."""
-        return descend(self.rows, start, frozen, iterations, tolerance, self.apart)
+        return descend(self.rows, start, frozen, iterations, tolerance, self.separable_columns)

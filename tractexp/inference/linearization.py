@@ -46,12 +46,12 @@ class Linearization:
     held: tuple[int, ...]  # columns of the base model's parameters that rest on a wall
 
     @functools.cached_property
-    def explaining(self) -> np.ndarray:
+    def explaining_columns(self) -> np.ndarray:
         """All that the fit or any candidate could change, (k, C, N)."""
         return np.concatenate([self.nuisance, *(c.raw for c in self.columns)])
 
-    def whitened(self, noise: Noise) -> ScoreTest:
-        """Project under this noise; `ScoreTest.of` puts other residuals in place of
+    def build_score_test(self, noise: Noise) -> ScoreTest:
+        """Project under this noise; `ScoreTest.replace_residuals` puts other residuals in place of
         the fit's own.
         """
         raw = [
@@ -182,7 +182,7 @@ def _candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, np.ndar
             first = len(points)
             for p in candidate.sizes:
                 step = CANDIDATE_STEP * candidate.relevant(p) * (candidate.sign(p) or 1)
-                points.append(at.placed(fit.unit, setting | {p.name: p.absent + step}))
+                points.append(at.place_values(fit.unit, setting | {p.name: p.absent + step}))
                 spans.append(step)
             labels.append((candidate, setting, first, len(points)))
     return np.array(points).reshape(-1, at.dimension), np.array(spans), labels
@@ -195,7 +195,7 @@ def rich_residuals(t: Linearization, residuals: np.ndarray) -> np.ndarray:
     Each is divided by what is left of its variance then, so that the noise does not come out too
     small.
     """
-    right = compute_basis(t.explaining.reshape(-1, residuals[0].size), 1e-6)
+    right = compute_basis(t.explaining_columns.reshape(-1, residuals[0].size), 1e-6)
     flat = residuals.reshape(len(residuals), -1)
     rest = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_VARIANCE)
     return ((flat - (flat @ right.T) @ right) / np.sqrt(rest)).reshape(residuals.shape)

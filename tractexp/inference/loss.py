@@ -46,7 +46,7 @@ class Loss(Plugin):
         if self.quadratic:
             return np.ones((2, 1))
         given = getattr(self, "scale", None)
-        usual = np.empty(drive.measured.shape)
+        usual = np.empty(drive.measurements.shape)
         for e, event in enumerate(events):
             for c, channel in enumerate(drive.names):
                 level = given or event.levels[c]

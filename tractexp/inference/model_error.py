@@ -48,7 +48,7 @@ class ModelError:
         return {"value": self.value, "interval": list(self.interval), "of_S": self.of_S} | own
 
     @classmethod
-    def of(cls, content: Mapping[str, Any]) -> "ModelError":
+    def from_content(cls, content: Mapping[str, Any]) -> "ModelError":
         if stalls := content.get("stalls"):
             return cls.of_stall(stalls)
         low, high = content["interval"]

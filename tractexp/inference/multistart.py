@@ -35,7 +35,7 @@ def explore_minima(likelihood: Likelihood, points: np.ndarray | None = None) -> 
     most 10.
     """
     points = screen_points(likelihood.problem)[0] if points is None else points
-    begun = likelihood.descent(likelihood.placed(points), None, FEW, TOLERANCE)
+    begun = likelihood.descent(likelihood.place_parameters(points), None, FEW, TOLERANCE)
     free = slice(points.shape[1])
     promising = begun.unit[
         best_distinct(begun.unit[:, free], begun.deviance, SAME, PROMISING, norm=2)
@@ -54,7 +54,7 @@ def valleys(likelihood: Likelihood) -> np.ndarray:
     """
     ends = explore_minima(likelihood)
     beside = likelihood.descent(along_least_certain(likelihood, ends.best))
-    return distinct(ends.joined(beside), likelihood.free)
+    return distinct(ends.join_descent(beside), likelihood.free)
 
 
 def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
@@ -65,7 +65,7 @@ def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
     do, so that there is one valley on either side of it.
     """
     _, J = likelihood.jacobian(unit)
-    direction = np.linalg.svd(J.shared, full_matrices=False)[2][-1]
+    direction = np.linalg.svd(J.shared_columns, full_matrices=False)[2][-1]
     points = []
     for way in (direction, -direction):
         room = np.where(way > 0, 1 - unit[: len(way)], unit[: len(way)]) / np.maximum(

@@ -33,7 +33,7 @@ class QuietNoise:
     input_modes: np.ndarray | None
 
     @classmethod
-    def at(cls, context: Context, unit: np.ndarray) -> "QuietNoise":
+    def from_context(cls, context: Context, unit: np.ndarray) -> "QuietNoise":
         """Where errors of the record act as they do on the base model at coordinates (D,)."""
         observed = Observed(context.kernels.bare, context.records.smoothed)
         return cls(
@@ -43,9 +43,9 @@ class QuietNoise:
 
     def of_fit(self, unit: np.ndarray, names: Sequence[str] = ()) -> Noise:
         """The noise of the quiet residuals at coordinates (D,), of a fit with these effects."""
-        return self.of(unit, self.context.residuals(unit[None], names)[0])
+        return self.estimate_noise(unit, self.context.residuals(unit[None], names)[0])
 
-    def of(
+    def estimate_noise(
         self,
         unit: np.ndarray,
         residual: np.ndarray,
@@ -63,7 +63,7 @@ class QuietNoise:
             shapes for shapes in (self.input_modes, jumps(context, unit)) if shapes is not None
         ]
         shapes = np.concatenate(errors) if errors else None
-        there = context.kernels.at(context.coordinates.present(unit), unit)
+        there = context.kernels.select_problem(context.coordinates.present(unit), unit)
         return estimate_noise(
             problem,
             residual,

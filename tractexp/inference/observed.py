@@ -38,9 +38,9 @@ class Observed:
     smoothed: tuple[SmoothedEvent, ...]
 
     @classmethod
-    def of(cls, problem: Problem) -> "Observed":
+    def from_problem(cls, problem: Problem) -> "Observed":
         """The same problem with the noise taken out of the voltage of each event."""
-        clean = tuple(map(problem.domain.smoothed, problem.events))
+        clean = tuple(map(problem.domain.smooth_event, problem.events))
         return cls(problem.driven_by([s.event for s in clean]), clean)
 
     @property
@@ -132,7 +132,9 @@ class Observed:
         """
         problem, count = self.problem, len(shapes)
         events = [s.event if k is None else s.off_by(k) for k in shapes for s in self.smoothed]
-        drive = Drive.of([problem.domain.excitation(event, problem.model) for event in events])
+        drive = Drive.from_events(
+            [problem.domain.excitation(event, problem.model) for event in events]
+        )
         own = np.tile(problem.by_event(values), (count, 1, 1))
         response = problem.model.simulate(drive, own, np.tile(problem.step.substeps, count))
         return response.outputs[:, 0].reshape(drive.channels, count, -1).swapaxes(0, 1)

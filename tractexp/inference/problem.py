@@ -173,7 +173,10 @@ class Problem:
                 else f"a {model.title} has no parameters"
             )
             raise UserError(f"{why}; leave at least one free to identify")
-        self.space, self.defaults = Box.of(tuple(free)), np.array([p.default for p in free])
+        self.space, self.defaults = (
+            Box.from_parameters(tuple(free)),
+            np.array([p.default for p in free]),
+        )
         self.lower, self.upper = self.space.lower, self.space.upper
         self.per_event = tuple(name for name in model.names if name in own)
         self.loss = loss or Loss()
@@ -224,7 +227,14 @@ class Problem:
         )
         content = self.model.source, [repr(effect) for effect in self.model.measurements], free
         sha = hashlib.sha256(repr(content).encode())
-        arrays = drive.inputs, drive.measured, drive.weights, drive.first, drive.event, drive.before
+        arrays = (
+            drive.inputs,
+            drive.measurements,
+            drive.weights,
+            drive.first,
+            drive.event,
+            drive.before,
+        )
         arrays += tuple(window for window in drive.windows if window is not None)
         for array in (*arrays, self.lower, self.upper, self.step.substeps):
             sha.update(np.ascontiguousarray(array).tobytes())
@@ -259,12 +269,14 @@ class Problem:
     @property
     def power(self) -> Load:
         """What the load takes, over what it took before each event."""
-        return Load.of(self.drive.measured, self.drive.before, self.drive.first)
+        return Load.from_powers(self.drive.measurements, self.drive.before, self.drive.first)
 
     def _driven(self) -> Drive:
         """The events end to end, squared errors weighed as the loss says."""
         weights = self.loss.weight_P, self.loss.weight_Q
-        return Drive.of([self.domain.excitation(e, self.model, weights) for e in self.events])
+        return Drive.from_events(
+            [self.domain.excitation(e, self.model, weights) for e in self.events]
+        )
 
     def by_event(self, values: np.ndarray) -> np.ndarray:
         """Free values (n, free) -> all parameters of the model in each event (E, n, d)."""
@@ -325,7 +337,7 @@ class Problem:
         (E, n).
         """
         response = self.model.simulate(self.drive, self.candidates(values), self.step.substeps)
-        return response.by_candidate - self.drive.measured, response.miss
+        return response.by_candidate - self.drive.measurements, response.miss
 
     def _losses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Weighted losses (n, C, N) [pu²], and the misses as above."""
@@ -335,7 +347,7 @@ class Problem:
                 (errors / self._scale) ** 2
             ), miss
 
-    def _lasting(self, candidates: np.ndarray) -> np.ndarray:
+    def _find_lasting(self, candidates: np.ndarray) -> np.ndarray:
         """Which candidates (n, d) do not grow beyond bounds at any step, as circuits with a
         negative reactance may.
         """
@@ -361,7 +373,11 @@ class Problem:
         )
         chosen, error = self.model.substeps(self.drive, probes, fine, share, self._until)
         # Stiff circuits of the box may diverge, and are refused.
-        if self.domain.stiff and np.isinf(error).any() and (lasting := self._lasting(probes)).any():
+        if (
+            self.domain.stiff
+            and np.isinf(error).any()
+            and (lasting := self._find_lasting(probes)).any()
+        ):
             chosen, error = self.model.substeps(
                 self.drive, probes[lasting], fine, share, self._until
             )

@@ -31,7 +31,7 @@ def select_promising_starts(
     """
     if len(units) <= most:
         return units
-    grounds = np.array([context.coordinates.without(unit, names) for unit in units])
+    grounds = np.array([context.coordinates.remove_effects(unit, names) for unit in units])
     expected = np.empty(len(units))
     for ground in np.unique(grounds, axis=0):
         mine = (grounds == ground).all(axis=1)

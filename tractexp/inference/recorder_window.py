@@ -52,7 +52,11 @@ class RecorderWindow(Measurement):
 
     def weights(self, step: float) -> np.ndarray:
         """What each sample, `step` [s] apart, counts around the middle one, (odd,)."""
-        return mean_weights(self.window / step) if self.shape is None else self.shape.on(step)
+        return (
+            mean_weights(self.window / step)
+            if self.shape is None
+            else self.shape.compute_weights(step)
+        )
 
     def observe(self, power: np.ndarray, drive: Drive, values: dict[str, np.ndarray]) -> np.ndarray:
         shown = np.empty_like(power)
@@ -62,7 +66,7 @@ class RecorderWindow(Measurement):
             shown[:, :, part] = averaged_power(power[:, :, part], u, weights)
         return shown
 
-    def sharpened(self, event: Event) -> Event:
+    def sharpen_event(self, event: Event) -> Event:
         """The event with the voltage that the load saw."""
         return sharpen_voltage(event, self.weights(event.record.step), self.window)
 

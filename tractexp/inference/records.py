@@ -26,11 +26,13 @@ class Records:
     window: RecorderWindow | None = None
 
     @classmethod
-    def of(cls, events: Sequence[Event], window: RecorderWindow | None = None) -> "Records":
+    def from_events(
+        cls, events: Sequence[Event], window: RecorderWindow | None = None
+    ) -> "Records":
         """The events, by a recorder of this window."""
-        driving = tuple(domain_of(e).smoothed(e) for e in events)
+        driving = tuple(domain_of(e).smooth_event(e) for e in events)
         if window is not None:
-            driving = tuple(replace(s, event=window.sharpened(s.event)) for s in driving)
+            driving = tuple(replace(s, event=window.sharpen_event(s.event)) for s in driving)
         return cls(tuple(events), driving, window)
 
     @functools.cached_property

@@ -55,7 +55,7 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     all were free, beyond the bounds, too.
     """
     problem, whole = likelihood.problem, likelihood.of_records.with_initial_power
-    rows, J = whole.jacobian(whole.placed(unit[None])[0])
+    rows, J = whole.jacobian(whole.place_parameters(unit[None])[0])
     free, drive = likelihood.free, problem.drive
     blocks = blocks_of(problem.events, drive, free)
     held_by = _prior_jacobian(likelihood, unit)
@@ -64,7 +64,7 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     def influences(columns: np.ndarray) -> np.ndarray:
         return _influences(J, rows, columns, blocks, power, held_by, likelihood.prior)
 
-    shared = np.concatenate([J.shared, held_by])
+    shared = np.concatenate([J.shared_columns, held_by])
     every = np.arange(free)
     inside = every[off_walls(unit[:free])]
     root, ratio = np.zeros((free, free)), np.ones(free)
@@ -72,7 +72,9 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     root[np.ix_(every[: len(own)], inside)] = own
     if len(inside) < free:
         held = np.setdiff1d(every, inside)
-        rows = rows - (J.shared @ np.linalg.lstsq(J.shared, rows.ravel())[0]).reshape(rows.shape)
+        rows = rows - (
+            J.shared_columns @ np.linalg.lstsq(J.shared_columns, rows.ravel())[0]
+        ).reshape(rows.shape)
         full, wider, _ = robust_root(shared, influences(every))
         ratio[held] = wider[held]
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(full.T @ full))[held], 0.0))
@@ -117,7 +119,7 @@ def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> list[tuple[int
             steady.stop - steady.start,
         )
         if 0 < z - a < n:
-            off = np.nanmean(drive.measured[:, a:z], axis=1) - drive.before[e]
+            off = np.nanmean(drive.measurements[:, a:z], axis=1) - drive.before[e]
             change = -np.nan_to_num(off) * (z - a) / (n - (z - a))
         changes.append((e, change / width[e]))
     return changes
@@ -137,7 +139,7 @@ def _influences(
     `held_by` (k, d) are derivatives of the rows of a prior, of this weight. They are never left
     out; each moves the estimate by what one standard deviation of it does.
     """
-    flat, prior = J.shared[:, columns], held_by[:, columns]
+    flat, prior = J.shared_columns[:, columns], held_by[:, columns]
     cross = [flat[mine].T @ J.own(e) for e, mine in enumerate(J.rows)]
     total = flat.T @ flat + prior.T @ prior
     shifts = [cross[e] @ change for e, change in power]

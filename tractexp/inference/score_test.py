@@ -62,7 +62,7 @@ class ScoreTest:
     split: np.ndarray  # (e, R) what each parameter changes in one event alone
     perturbed: np.ndarray  # (c, R)
 
-    def of(self, white: np.ndarray) -> "ScoreTest":
+    def replace_residuals(self, white: np.ndarray) -> "ScoreTest":
         """The same columns with other whitened residuals (b, C N) in place of the fit's own, off no
         prior mean.
         """
@@ -86,7 +86,7 @@ class ScoreTest:
         return np.array(drops).reshape(shape), np.array(ps).reshape(shape)
 
     @functools.cached_property
-    def ranked(self) -> dict[str, list[Score]]:
+    def ranked_scores(self) -> dict[str, list[Score]]:
         """Each candidate at all its settings, the best first, for the fit's own residual."""
         by_name: dict[str, list[Score]] = {}
         drops, ps = (row[:, 0].tolist() for row in self.drops)
@@ -106,7 +106,9 @@ class ScoreTest:
 
     def scores(self) -> list[Score]:
         """The candidates by p, each at its best setting, for the fit's own residual."""
-        return sorted((scores[0] for scores in self.ranked.values()), key=lambda s: (s.p, -s.drop))
+        return sorted(
+            (scores[0] for scores in self.ranked_scores.values()), key=lambda s: (s.p, -s.drop)
+        )
 
     def fault_p(self) -> dict[str, np.ndarray]:
         """p of each fault of the measurement, (b,): its estimate over its standard deviation, prior
@@ -143,7 +145,7 @@ class ScoreTest:
     def channels(self, problem: Problem) -> np.ndarray:
         """The residuals (b, C, N), without the rows of the prior."""
         drive = problem.drive
-        return self.r[:, : drive.measured.size].reshape(len(self.r), drive.channels, -1)
+        return self.r[:, : drive.measurements.size].reshape(len(self.r), drive.channels, -1)
 
     def statistics(self, problem: Problem) -> dict[str, np.ndarray]:
         """What no candidate accounts for, by what each test looks for: a sum (b,), or the largest

@@ -33,7 +33,7 @@ class SeparableColumns:
         """P0 and Q0 of each event, coordinates from `first` on in the order of the events; None
         where they are held.
         """
-        index = np.arange(drive.measured.size).reshape(drive.measured.shape)
+        index = np.arange(drive.measurements.size).reshape(drive.measurements.shape)
         rows = tuple(index[:, drive.part(e)].ravel() for e in range(drive.events))
         count = 0 if first is None else 2
         return cls(
@@ -45,7 +45,7 @@ class SeparableColumns:
         """m, coordinates of each event."""
         return self.coordinates.shape[1]
 
-    def shared(self, size: int) -> np.ndarray:
+    def find_shared_columns(self, size: int) -> np.ndarray:
         """Which of so many coordinates act on all rows, (k,)."""
         shared = np.ones(size, dtype=bool)
         shared[self.coordinates] = False
@@ -55,7 +55,7 @@ class SeparableColumns:
         """Which of so many coordinates move in each simulation, (k + m, size): first those that act
         on all rows.
         """
-        shared = self.shared(size)
+        shared = self.find_shared_columns(size)
         moves = np.zeros((len(shared) + self.count, size))
         moves[np.arange(len(shared)), shared] = 1
         for j, group in enumerate(self.coordinates.T, len(shared)):
@@ -79,7 +79,7 @@ class Sensitivities:
     rows: tuple[np.ndarray, ...]
 
     @property
-    def shared(self) -> np.ndarray:
+    def shared_columns(self) -> np.ndarray:
         """(R, k)."""
         return self.columns[: self.k].T
 
@@ -150,7 +150,7 @@ class SeparableBasis:
             left[:, mine] = part - (part @ basis.T) @ basis
         return left
 
-    def without(self, rows: np.ndarray) -> np.ndarray:
+    def project_out(self, rows: np.ndarray) -> np.ndarray:
         """Rows (b, R) less their part in the span."""
         left = self.without_own(rows)
         left -= (left @ self.shared.T) @ self.shared

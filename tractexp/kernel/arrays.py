@@ -53,7 +53,9 @@ class Arrays:
     def multiply(self, a: np.ndarray, b: np.ndarray, flags: str = "") -> np.ndarray:
         return a * b
 
-    def fused(self, a: np.ndarray, b: np.ndarray, c: np.ndarray, flags: str = "") -> np.ndarray:
+    def multiply_add(
+        self, a: np.ndarray, b: np.ndarray, c: np.ndarray, flags: str = ""
+    ) -> np.ndarray:
         return a * b + c
 
     def polynomial(
@@ -91,4 +93,4 @@ def values_of(phase: Any, scope: dict[Any, np.ndarray], points: int) -> list[np.
     from tractexp.kernel.expressions import Expressions
 
     with np.errstate(all="ignore"):
-        return Expressions(Arrays(points), scope).of(phase)
+        return Expressions(Arrays(points), scope).evaluate_phase(phase)

@@ -111,17 +111,18 @@ class _Emitter:
         lowered, phase = self.lowered, self.lowered.rest
         assert phase is not None
         scope = {
-            _real(s): lanes.everywhere(scalars.load(f.at("%event", k))) for k, s in enumerate(EVENT)
+            _real(s): lanes.everywhere(scalars.load(f.offset_address("%event", k)))
+            for k, s in enumerate(EVENT)
         }
         memories = lowered.starts[len(lowered.states) :]
         scope |= {
-            s: lanes.load(f.at("%given", k * self.width))
+            s: lanes.load(f.offset_address("%given", k * self.width))
             for k, s in enumerate((*self.given, *memories))
         }
         states = enumerate(lowered.starts[: len(lowered.states)])
-        scope |= {s: lanes.load(f.at("%x", k * self.width)) for k, s in states}
-        for k, balance in enumerate(Expressions(lanes, scope).of(phase)):
-            lanes.store(balance, f.at("%balances", k * self.width))
+        scope |= {s: lanes.load(f.offset_address("%x", k * self.width)) for k, s in states}
+        for k, balance in enumerate(Expressions(lanes, scope).evaluate_phase(phase)):
+            lanes.store(balance, f.offset_address("%balances", k * self.width))
         return f.text(
             "define internal void @rest(ptr %event, ptr %given, ptr %x, ptr noalias %balances)"
             " nounwind"
@@ -139,9 +140,10 @@ class _Emitter:
             f"[{(steady.room(states) + len(self.lowered.starts) + 1) * self.width} x double]"
         )
         with f.loop(0, "%events") as e:
-            self.event_at = f.at("%event", f.integer("mul", e, len(EVENT)))
+            self.event_at = f.offset_address("%event", f.integer("mul", e, len(EVENT)))
             self.event = {
-                _real(s): scalars.part(f.at(self.event_at, k), "") for k, s in enumerate(EVENT)
+                _real(s): scalars.part(f.offset_address(self.event_at, k), "")
+                for k, s in enumerate(EVENT)
             }
             self.begin, self.end = f.count("%first", e), f.count("%first", f.integer("add", e, 1))
             self.substeps = f.count("%substeps", e)
@@ -174,10 +176,10 @@ class _Emitter:
 
     def _group(self, g: str) -> str:
         """Where a group's rows begin."""
-        return self.f.at("%work", self.f.integer("mul", g, len(self.rows) * self.width))
+        return self.f.offset_address("%work", self.f.integer("mul", g, len(self.rows) * self.width))
 
     def _row(self, group: str, name: object) -> str:
-        return self.f.at(group, self.rows[str(name)] * self.width)
+        return self.f.offset_address(group, self.rows[str(name)] * self.width)
 
     def _read(self, group: str, names: Iterable[Symbol]) -> dict[Symbol, str]:
         return {s: self.lanes.load(self._row(group, s)) for s in names}
@@ -188,7 +190,9 @@ class _Emitter:
         """The inputs from sample i on, of those in the record."""
         remaining = self.f.integer("sub", "%samples", self.f.integer("add", i, ahead))
         first = self.f.integer("add", i, ahead) if ahead else i
-        return lambda name: self.lanes.part(self.f.at(self._input(name), first), remaining)
+        return lambda name: self.lanes.part(
+            self.f.offset_address(self._input(name), first), remaining
+        )
 
     def _point_pass(self) -> None:
         """Inputs and signals of the derivative at both ends and in the middle of each step."""
@@ -238,9 +242,10 @@ class _Emitter:
         f = self.f
         for k in range(self.width):
             row = f.integer("add", place, f.integer("mul", apart, k)) if k else place
-            address = f.at(array, f.integer("mul", row, count))
+            address = f.offset_address(array, f.integer("mul", row, count))
             for j, value in enumerate(values):
-                f.do(f"store double {self.lanes.lane(value, k)}, ptr {f.at(address, j)}, align 8")
+                lane, there = self.lanes.lane(value, k), f.offset_address(address, j)
+                f.do(f"store double {lane}, ptr {there}, align 8")
 
     def _between(self, name: str, here: Samples, there: Samples, x: str, step: str) -> str:
         """An input by x from one sample to the next: on the cubic of its slopes, or on a straight
@@ -250,7 +255,7 @@ class _Emitter:
         rates = {rate: smooth for smooth, rate in SMOOTH.items()}
         smooth = rates.get(name, name)
         if smooth not in SMOOTH:
-            return n.fused(n.subtract(there(name), here(name)), x, here(name))
+            return n.multiply_add(n.subtract(there(name), here(name)), x, here(name))
         a, b = here(smooth), there(smooth)
         da, db = (n.multiply(step, end(SMOOTH[smooth])) for end in (here, there))
         rise = n.subtract(b, a)
@@ -259,9 +264,11 @@ class _Emitter:
         )
         cube = n.subtract(n.add(da, db), n.multiply(n.constant(2.0), rise))
         if name == smooth:
-            return n.fused(x, n.fused(x, n.fused(x, cube, square), da), a)
-        bend = n.fused(n.multiply(n.constant(3.0), x), cube, n.multiply(n.constant(2.0), square))
-        return n.divide(n.fused(x, bend, da), step)
+            return n.multiply_add(x, n.multiply_add(x, n.multiply_add(x, cube, square), da), a)
+        bend = n.multiply_add(
+            n.multiply(n.constant(3.0), x), cube, n.multiply(n.constant(2.0), square)
+        )
+        return n.divide(n.multiply_add(x, bend, da), step)
 
     # Before an event
 
@@ -272,15 +279,20 @@ class _Emitter:
         f, n, lowered = self.f, self.lanes, self.lowered
         self._copy_candidates(e, first)
         scope = {s: n.everywhere(value) for s, value in self.event.items()}
-        scope |= {s: n.load(f.at(self.copied, k * self.width)) for k, s in enumerate(self.given)}
-        values = Expressions(n, scope).of(lowered.start)
-        starts, miss = values[: len(lowered.starts)], self._missed(values[len(lowered.starts) :])
+        scope |= {
+            s: n.load(f.offset_address(self.copied, k * self.width))
+            for k, s in enumerate(self.given)
+        }
+        values = Expressions(n, scope).evaluate_phase(lowered.start)
+        starts, miss = values[: len(lowered.starts)], self._emit_miss(values[len(lowered.starts) :])
         if self.solves:
-            starts, miss = self._settled(starts, miss)
+            starts, miss = self._emit_steady_state(starts, miss)
         with f.when(f.value("icmp ne i64 %started, 0")):
             self._store_starts(e, first, starts)
         scope |= zip(lowered.starts, starts, strict=True)
-        scope |= zip(lowered.constants, Expressions(n, scope).of(lowered.constant), strict=True)
+        scope |= zip(
+            lowered.constants, Expressions(n, scope).evaluate_phase(lowered.constant), strict=True
+        )
         zero = n.constant(0.0)
         begin: dict[object, str] = dict(
             zip((*lowered.states, *lowered.memories), starts, strict=True)
@@ -299,17 +311,19 @@ class _Emitter:
     def _copy_candidates(self, e: str, first: str) -> None:
         f, count = self.f, len(self.given)
         last = f.integer("sub", "%n", 1)
-        source = f.at("%candidates", f.integer("mul", f.integer("mul", e, count), "%n"))
+        source = f.offset_address("%candidates", f.integer("mul", f.integer("mul", e, count), "%n"))
         with f.loop(0, self.width, always=True) as lane:
             candidate, target = (
-                f.at(source, f.smaller(f.integer("add", first, lane), last)),
-                f.at(self.copied, lane),
+                f.offset_address(source, f.smaller(f.integer("add", first, lane), last)),
+                f.offset_address(self.copied, lane),
             )
             for k in range(count):
-                value = self._double(f.at(candidate, f.integer("mul", "%n", k)))
-                f.do(f"store double {value}, ptr {f.at(target, k * self.width)}, align 8")
+                value = self._double(f.offset_address(candidate, f.integer("mul", "%n", k)))
+                f.do(
+                    f"store double {value}, ptr {f.offset_address(target, k * self.width)}, align 8"
+                )
 
-    def _missed(self, slacks: Sequence[str]) -> str:
+    def _emit_miss(self, slacks: Sequence[str]) -> str:
         """By how much the requirements are missed in all; 0 where a steady state exists."""
         n = self.lanes
         zero, most = n.constant(0.0), n.constant(steady.LARGEST_MISS)
@@ -320,21 +334,21 @@ class _Emitter:
         miss = n.smaller(miss, most)
         return n.select(n.compare("oge", miss, zero), miss, most)
 
-    def _settled(self, starts: Sequence[str], miss: str) -> tuple[list[str], str]:
+    def _emit_steady_state(self, starts: Sequence[str], miss: str) -> tuple[list[str], str]:
         """The states solved for, and by how much more the steady state is missed."""
         f, n, states = self.f, self.lanes, len(self.lowered.states)
         for k, memory in enumerate(starts[states:], len(self.given)):
-            n.store(memory, f.at(self.copied, k * self.width))
-        x, left = self.solved, f.at(self.solved, states * self.width)
-        work = f.at(self.solved, (states + 1) * self.width)
+            n.store(memory, f.offset_address(self.copied, k * self.width))
+        x, left = self.solved, f.offset_address(self.solved, states * self.width)
+        work = f.offset_address(self.solved, (states + 1) * self.width)
         for k, value in enumerate(starts[:states]):
-            n.store(value, f.at(x, k * self.width))
+            n.store(value, f.offset_address(x, k * self.width))
         f.do(
             f"call void %steady(ptr @rest, ptr {self.event_at}, ptr {self.copied}, ptr {x}, ptr"
             f" {left}, ptr {work},"
             f" i64 {states})"
         )
-        solution = [n.load(f.at(x, k * self.width)) for k in range(states)]
+        solution = [n.load(f.offset_address(x, k * self.width)) for k in range(states)]
         return [*solution, *starts[states:]], n.smaller(
             n.add(miss, n.load(left)), n.constant(steady.LARGEST_MISS)
         )
@@ -347,7 +361,7 @@ class _Emitter:
         """
         f, states = self.f, bool(self.lowered.states)
         self.i, local = i, f.integer("sub", i, self.begin)
-        self.signal_at = f.at("%signals", f.integer("mul", local, len(self.signals)))
+        self.signal_at = f.offset_address("%signals", f.integer("mul", local, len(self.signals)))
         if not states:
             with f.loop(0, self.groups, always=True) as g, f.passage("outputs"):
                 self._outputs(self._group(g), {})
@@ -363,7 +377,7 @@ class _Emitter:
                 f.integer("add", f.integer("mul", local, self.substeps), j),
                 2 * len(self.moving),
             )
-            points = self._points(f.at("%points", row))
+            points = self._points(f.offset_address("%points", row))
             first = f.value(f"icmp eq i64 {j}, 0")
             ahead = {
                 share: self.lanes.everywhere(
@@ -378,7 +392,10 @@ class _Emitter:
         """What is the same in all lanes at the beginning, the middle and the end of a step."""
         count = len(self.moving)
         return [
-            {s: self._wide(self.f.at(address, k * count + j)) for j, s in enumerate(self.moving)}
+            {
+                s: self._wide(self.f.offset_address(address, k * count + j))
+                for j, s in enumerate(self.moving)
+            }
             for k in range(3)
         ]
 
@@ -401,11 +418,12 @@ class _Emitter:
         def slope(stage: str, states: Sequence[str], point: Values) -> list[str]:
             f.remark(stage)
             at = {**scope, **point, **dict(zip(lowered.states, states, strict=True))}
-            return Expressions(n, at).of(lowered.derivative)
+            return Expressions(n, at).evaluate_phase(lowered.derivative)
 
         def along(states: Sequence[str], share: float, slopes: Sequence[str]) -> list[str]:
             return [
-                n.fused(ahead[share], slope, s) for s, slope in zip(states, slopes, strict=True)
+                n.multiply_add(ahead[share], slope, s)
+                for s, slope in zip(states, slopes, strict=True)
             ]
 
         a, b, c = points
@@ -421,7 +439,7 @@ class _Emitter:
         k3 = slope("second slope in the middle", along(y, self.half_way, k2), b)
         k4 = slope("slope at the end", along(y, 1.0, k3), c)
         total = [
-            n.add(n.fused(n.constant(2.0), n.add(second, third), one), four)
+            n.add(n.multiply_add(n.constant(2.0), n.add(second, third), one), four)
             for one, second, third, four in zip(k1, k2, k3, k4, strict=True)
         ]
         for symbol, state in zip(lowered.states, along(y, 1 / 6, total), strict=True):
@@ -435,28 +453,37 @@ class _Emitter:
         scope = dict(scope) | self._read(group, (s for s in own if s in used and s not in scope))
         for s in lowered.inputs:
             if s in used:
-                scope[s] = self._wide(f.at(self._input(s.name), self.i))
+                scope[s] = self._wide(f.offset_address(self._input(s.name), self.i))
         scope |= {
-            s: self._wide(f.at(self.signal_at, j)) for j, s in enumerate(self.signals) if s in used
+            s: self._wide(f.offset_address(self.signal_at, j))
+            for j, s in enumerate(self.signals)
+            if s in used
         }
         if lowered.memories:
-            renewed = Expressions(n, scope).of(lowered.renewal)
+            renewed = Expressions(n, scope).evaluate_phase(lowered.renewal)
             scope |= zip(lowered.memories, renewed, strict=True)
             for symbol, value in zip(lowered.memories, renewed, strict=True):
                 n.store(value, self._row(group, symbol))
         for c, (name, value) in enumerate(
-            zip(lowered.outputs, Expressions(n, scope).of(lowered.output), strict=True)
+            zip(lowered.outputs, Expressions(n, scope).evaluate_phase(lowered.output), strict=True)
         ):
             n.store(value, self._row(group, f"_{name}"))
             place = f.integer("add", f.integer("mul", "%samples", c), self.i)
-            off = n.subtract(self._wide(f.at("%measured", place)), value)
+            off = n.subtract(self._wide(f.offset_address("%measured", place)), value)
             row = self._row(group, f"_sum_{name}")
             n.store(
-                n.fused(n.multiply(self._wide(f.at("%weights", place)), off), off, n.load(row)), row
+                n.multiply_add(
+                    n.multiply(self._wide(f.offset_address("%weights", place)), off),
+                    off,
+                    n.load(row),
+                ),
+                row,
             )
 
     def _input(self, name: str) -> str:
-        return self.f.at("%inputs", self.f.integer("mul", "%samples", INPUTS.index(name)))
+        return self.f.offset_address(
+            "%inputs", self.f.integer("mul", "%samples", INPUTS.index(name))
+        )
 
     # Results, lane by lane
 
@@ -464,7 +491,9 @@ class _Emitter:
         """Store what a row holds of a lane of this block."""
         f = self.f
         group = self._group(f.integer("sdiv", lane, self.width))
-        value = self._double(self._row(f.at(group, f.integer("srem", lane, self.width)), name))
+        value = self._double(
+            self._row(f.offset_address(group, f.integer("srem", lane, self.width)), name)
+        )
         f.do(f"store double {value}, ptr {target}, align 8")
 
     def _store_outputs(self, i: str, first: str, lane: str) -> None:
@@ -475,7 +504,9 @@ class _Emitter:
             self._copy(
                 lane,
                 f"_{name}",
-                f.at("%outputs", f.integer("add", f.integer("mul", row, "%samples"), i)),
+                f.offset_address(
+                    "%outputs", f.integer("add", f.integer("mul", row, "%samples"), i)
+                ),
             )
 
     def _store_sums(self, e: str, first: str, lane: str) -> None:
@@ -486,21 +517,25 @@ class _Emitter:
             self._copy(
                 lane,
                 f"_sum_{name}",
-                f.at("%sums", f.integer("add", f.integer("mul", row, "%n"), candidate)),
+                f.offset_address("%sums", f.integer("add", f.integer("mul", row, "%n"), candidate)),
             )
         self._copy(
-            lane, "_miss", f.at("%miss", f.integer("add", f.integer("mul", e, "%n"), candidate))
+            lane,
+            "_miss",
+            f.offset_address("%miss", f.integer("add", f.integer("mul", e, "%n"), candidate)),
         )
 
     def _store_starts(self, e: str, first: str, starts: Sequence[str]) -> None:
         """starts (E, K, n)."""
         f, count = self.f, len(starts)
         for k, value in enumerate(starts):
-            self.lanes.store(value, f.at(self.solved, k * self.width))
+            self.lanes.store(value, f.offset_address(self.solved, k * self.width))
         remaining = f.integer("sub", "%n", first)
         with f.loop(0, f.smaller(remaining, self.width), always=True) as lane:
             for k in range(count):
-                value = self._double(f.at(f.at(self.solved, lane), k * self.width))
+                value = self._double(
+                    f.offset_address(f.offset_address(self.solved, lane), k * self.width)
+                )
                 row = f.integer("mul", f.integer("add", f.integer("mul", e, count), k), "%n")
                 place = f.integer("add", row, f.integer("add", first, lane))
-                f.do(f"store double {value}, ptr {f.at('%starts', place)}, align 8")
+                f.do(f"store double {value}, ptr {f.offset_address('%starts', place)}, align 8")

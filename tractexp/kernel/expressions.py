@@ -39,7 +39,7 @@ class Expressions:
         self.numbers, self.scope = numbers, dict(scope)
         self._values: dict[sympy.Basic, Any] = {}
 
-    def of(self, phase: Phase) -> list[Any]:
+    def evaluate_phase(self, phase: Phase) -> list[Any]:
         """The values of a phase's expressions."""
         for symbol, expression in phase.steps:
             self.scope[symbol] = self(expression)
@@ -126,16 +126,16 @@ class Expressions:
                 below.append((factor.base, -factor.exp))
             elif factor is not sympy.S.One:
                 above.append(factor)
-        value = self._multiplied(map(self, above))
+        value = self._multiply_values(map(self, above))
         if value is not None and coefficient == -1:
             value = n.negative(value)
         elif value is None or coefficient != 1:
             size = n.constant(float(coefficient))
             value = size if value is None else n.multiply(size, value)
-        divisor = self._multiplied(self._power(*factor) for factor in below)
+        divisor = self._multiply_values(self._power(*factor) for factor in below)
         return value if divisor is None else n.divide(value, divisor)
 
-    def _multiplied(self, values: Iterable[Any]) -> Any:
+    def _multiply_values(self, values: Iterable[Any]) -> Any:
         """Their product; None of none."""
         product = None
         for value in values:
@@ -152,12 +152,12 @@ class Expressions:
             return n.divide(n.constant(1.0), self._power(base, -exponent))
         x, whole = self(base), math.floor(exponent)
         if exponent == whole:
-            return self._repeated(x, whole)
+            return self._multiply_power(x, whole)
         if exponent - whole == HALF:
-            return self._repeated(x, whole, n.root(x))
+            return self._multiply_power(x, whole, n.root(x))
         return lanes.power(n, x, float(exponent))
 
-    def _repeated(self, x: Any, times: int, by: Any = None) -> Any:
+    def _multiply_power(self, x: Any, times: int, by: Any = None) -> Any:
         """x multiplied by itself, and by another value."""
         n = self.numbers
         while times:

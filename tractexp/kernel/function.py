@@ -74,7 +74,7 @@ class Function:
     def smaller(self, a: object, b: object) -> str:
         return self.value(f"select i1 {self.integer('icmp slt', a, b)}, i64 {a}, i64 {b}")
 
-    def at(self, address: str, index: object) -> str:
+    def offset_address(self, address: str, index: object) -> str:
         """The address `index` doubles further."""
         return (
             address

@@ -38,7 +38,7 @@ class Room:
     signals: int  # at each sample
 
     @classmethod
-    def of(cls, text: str) -> "Room":
+    def from_text(cls, text: str) -> "Room":
         """As a kernel's text tells it."""
         line = text.split("\n", 2)[1]
         return cls(**json.loads(line.removeprefix(PREFIX)))
@@ -48,7 +48,7 @@ class Kernel:
     """The kernel of a text of `emit`. Safe in threads: each call has a work space of its own."""
 
     def __init__(self, text: str):
-        self.text, self.room = text, Room.of(text)
+        self.text, self.room = text, Room.from_text(text)
 
     @functools.cached_property
     def _function(self) -> tuple[Any, Any, int]:

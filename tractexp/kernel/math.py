@@ -40,7 +40,7 @@ def exp(n: Any, x: Any) -> Any:
     """e^x, error below 2e-13 for |x| < 700, whose value it keeps beyond; 1 at 0; nan stays nan."""
     c = n.constant
     x = n.smaller(c(700.0), n.larger(c(-700.0), x))
-    whole = n.fused(x, c(1 / math.log(2)), c(ROUNDING_ADDEND), ORDERED)
+    whole = n.multiply_add(x, c(1 / math.log(2)), c(ROUNDING_ADDEND), ORDERED)
     half = n.multiply(n.subtract(whole, c(ROUNDING_ADDEND), ORDERED), c(math.log(2)), ORDERED)
     power = n.polynomial(n.subtract(x, half, ORDERED), EXP, ORDERED)
     shift = n.integer("shl", n.as_bits(whole), n.whole(52))
@@ -62,7 +62,7 @@ def log(n: Any, x: Any) -> Any:
         n.of_bits(n.integer("add", two, n.whole(ROUNDING_ADDEND_BITS))), c(ROUNDING_ADDEND), ORDERED
     )
     spoilt = n.subtract(x, x, ORDERED)  # nan of nan and infinity, else 0
-    return n.add(n.fused(exponent, c(math.log(2)), odd), spoilt, ORDERED)
+    return n.add(n.multiply_add(exponent, c(math.log(2)), odd), spoilt, ORDERED)
 
 
 def power(n: Any, x: Any, exponent: float) -> Any:
@@ -84,15 +84,17 @@ def cos(n: Any, x: Any) -> Any:
 def _wave(n: Any, x: Any, ahead: int) -> Any:
     """sin(x + ahead pi/2)."""
     c = n.constant
-    shifted = n.fused(x, c(2 / math.pi), c(ROUNDING_ADDEND), ORDERED)
+    shifted = n.multiply_add(x, c(2 / math.pi), c(ROUNDING_ADDEND), ORDERED)
     whole = n.subtract(shifted, c(ROUNDING_ADDEND), ORDERED)
     r = x
     for part in QUARTER:
         r = n.subtract(r, n.multiply(whole, c(part), ORDERED), ORDERED)
     square = n.multiply(r, r, ORDERED)
-    sine = n.fused(n.multiply(r, square, ORDERED), n.polynomial(square, SINE, ORDERED), r, ORDERED)
-    bent = n.fused(n.polynomial(square, COSINE, ORDERED), square, c(-0.5), ORDERED)
-    cosine = n.fused(bent, square, c(1.0), ORDERED)
+    sine = n.multiply_add(
+        n.multiply(r, square, ORDERED), n.polynomial(square, SINE, ORDERED), r, ORDERED
+    )
+    bent = n.multiply_add(n.polynomial(square, COSINE, ORDERED), square, c(-0.5), ORDERED)
+    cosine = n.multiply_add(bent, square, c(1.0), ORDERED)
     quarter = n.integer("add", n.as_bits(shifted), n.whole(ahead))
     odd = n.differ(n.integer("and", quarter, n.whole(1)), n.whole(0))
     sign = n.integer("shl", n.integer("and", quarter, n.whole(2)), n.whole(62))
@@ -134,7 +136,7 @@ def atan(n: Any, x: Any) -> Any:
     begin = n.select(far, c(math.pi / 2), n.select(near, c(0.0), c(math.pi / 4)))
     square = n.multiply(y, y)
     above, below = (n.polynomial(square, each) for each in ARCTANGENT)
-    angle = n.add(begin, n.fused(n.multiply(y, square), n.divide(above, below), y))
+    angle = n.add(begin, n.multiply_add(n.multiply(y, square), n.divide(above, below), y))
     return n.select(n.compare("olt", x, c(0.0)), n.negative(angle), angle)
 
 

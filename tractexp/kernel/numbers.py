@@ -56,7 +56,7 @@ class Numbers:
     def negative(self, a: str) -> str:
         return self.f.value(f"fneg {FAST} {self.kind} {a}")
 
-    def fused(self, a: str, b: str, c: str, flags: str = FAST) -> str:
+    def multiply_add(self, a: str, b: str, c: str, flags: str = FAST) -> str:
         """a b + c, which LLVM makes one operation where the processor has it."""
         return self.add(self.multiply(a, b, flags), c, flags)
 
@@ -64,7 +64,7 @@ class Numbers:
         """Horner's scheme, highest power first."""
         first, *others = map(self.constant, coefficients)
         for coefficient in others:
-            first = self.fused(first, x, coefficient, flags)
+            first = self.multiply_add(first, x, coefficient, flags)
         return first
 
     def _two(self, name: str, a: str, b: str, flags: str) -> str:
@@ -184,7 +184,7 @@ class Numbers:
             return self.f.value(f"load double, ptr {address}, align 8")
         name = f"llvm.masked.load.{self._suffix}.p0"
         self.f.intrinsics[name] = f"declare {self.kind} @{name}(ptr, i32, {self.bits}, {self.kind})"
-        counted = self._counted(left)
+        counted = self._mask_lanes(left)
         return self.f.value(
             f"call {self.kind} @{name}(ptr {address}, i32 8, {self.bits} {counted}, {self.kind}"
             " zeroinitializer)"
@@ -196,10 +196,10 @@ class Numbers:
         self.f.intrinsics[name] = f"declare void @{name}({self.kind}, ptr, i32, {self.bits})"
         self.f.do(
             f"call void @{name}({self.kind} {a}, ptr {address}, i32 8, {self.bits}"
-            f" {self._counted(left)})"
+            f" {self._mask_lanes(left)})"
         )
 
-    def _counted(self, left: str) -> str:
+    def _mask_lanes(self, left: str) -> str:
         """The first `left` lanes."""
         return self.f.value(f"icmp slt {self.integers} {self._indices}, {self._splat(left)}")
 

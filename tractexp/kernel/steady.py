@@ -37,8 +37,8 @@ class _Newton:
         self.f = Function()
         self.n = Numbers(self.f, width)
         self.balance = "%work"
-        self.beside = self.at(self.balance, "%n")
-        self.jacobian = self.at(self.beside, "%n")
+        self.beside = self.offset_address(self.balance, "%n")
+        self.jacobian = self.offset_address(self.beside, "%n")
         self.moved, self.size = self.f.room(self.n.kind), self.f.room(self.n.kind)
         self.going = self.f.room("i64", 8)
 
@@ -57,11 +57,11 @@ class _Newton:
         body = f.text(f"define void @steady({ARGUMENTS}) nounwind")
         return "\n".join([*f.intrinsics.values(), body])
 
-    def at(self, address: str, k: str) -> str:
-        return self.f.at(address, self.f.integer("mul", k, self.n.width))
+    def offset_address(self, address: str, k: str) -> str:
+        return self.f.offset_address(address, self.f.integer("mul", k, self.n.width))
 
     def cell(self, row: str, column: str) -> str:
-        return self.at(
+        return self.offset_address(
             self.jacobian, self.f.integer("add", self.f.integer("mul", row, "%n"), column)
         )
 
@@ -72,14 +72,17 @@ class _Newton:
         """The Jacobian, a column a state."""
         f, n = self.f, self.n
         with f.loop(0, "%n", always=True) as k:
-            place = self.at("%x", k)
+            place = self.offset_address("%x", k)
             x = n.load(place)
             ahead = n.multiply(n.constant(STATE_DIFFERENCE), n.add(n.constant(1.0), n.size(x)))
             n.store(n.add(x, ahead), place)
             self.rest(self.beside)
             n.store(x, place)
             with f.loop(0, "%n", always=True) as r:
-                rise = n.subtract(n.load(self.at(self.beside, r)), n.load(self.at(self.balance, r)))
+                rise = n.subtract(
+                    n.load(self.offset_address(self.beside, r)),
+                    n.load(self.offset_address(self.balance, r)),
+                )
                 n.store(n.divide(rise, ahead), self.cell(r, k))
 
     def elimination(self) -> None:
@@ -93,12 +96,20 @@ class _Newton:
                 )
                 with f.loop(k, "%n", always=True) as c:
                     self.exchange(larger, self.cell(k, c), self.cell(r, c))
-                self.exchange(larger, self.at(self.balance, k), self.at(self.balance, r))
+                self.exchange(
+                    larger,
+                    self.offset_address(self.balance, k),
+                    self.offset_address(self.balance, r),
+                )
             with f.loop(below, "%n") as r:
                 factor = n.divide(n.load(self.cell(r, k)), n.load(self.cell(k, k)))
                 with f.loop(k, "%n", always=True) as c:
                     self.reduce(self.cell(r, c), factor, self.cell(k, c))
-                self.reduce(self.at(self.balance, r), factor, self.at(self.balance, k))
+                self.reduce(
+                    self.offset_address(self.balance, r),
+                    factor,
+                    self.offset_address(self.balance, k),
+                )
 
     def exchange(self, where: str, one: str, other: str) -> None:
         n = self.n
@@ -116,12 +127,14 @@ class _Newton:
         n.store(n.constant(0.0), self.size)
         with f.loop(0, "%n", always=True) as up:
             k = f.integer("sub", f.integer("sub", "%n", 1), up)
-            place = self.at(self.balance, k)
+            place = self.offset_address(self.balance, k)
             with f.loop(f.integer("add", k, 1), "%n") as c:
-                self.reduce(place, n.load(self.cell(k, c)), self.at(self.balance, c))
+                self.reduce(place, n.load(self.cell(k, c)), self.offset_address(self.balance, c))
             step = n.divide(n.load(place), n.load(self.cell(k, k)))
             n.store(step, place)
-            share = n.divide(n.size(step), n.add(n.constant(1.0), n.size(n.load(self.at("%x", k)))))
+            share = n.divide(
+                n.size(step), n.add(n.constant(1.0), n.size(n.load(self.offset_address("%x", k))))
+            )
             self.widen(share)
 
     def widen(self, by: str) -> None:
@@ -141,9 +154,9 @@ class _Newton:
             n.divide(n.constant(0.5), size),
         )
         with f.loop(0, "%n", always=True) as k:
-            place = self.at("%x", k)
+            place = self.offset_address("%x", k)
             x = n.load(place)
-            ahead = n.subtract(x, n.multiply(short, n.load(self.at(self.balance, k))))
+            ahead = n.subtract(x, n.multiply(short, n.load(self.offset_address(self.balance, k))))
             n.store(n.select(active, ahead, x), place)
         moved = n.select(active, size, before)
         n.store(moved, self.moved)
@@ -156,7 +169,7 @@ class _Newton:
         self.rest(self.balance)
         n.store(n.constant(0.0), self.size)
         with f.loop(0, "%n", always=True) as k:
-            self.widen(n.size(n.load(self.at(self.balance, k))))
+            self.widen(n.size(n.load(self.offset_address(self.balance, k))))
         left, moved = n.load(self.size), n.load(self.moved)
         still = n.compare("ole", moved, n.constant(SETTLED))
         settled = n.logic("and", still, n.compare("olt", left, n.constant(BALANCED)))

@@ -181,7 +181,7 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
         begin, end = f.count("%sizes", at), f.count("%sizes", f.integer("add", at, 1))
         samples = f.integer("sub", end, begin)
         for name in stencil.shared:
-            _emit_copy(lanes, f.at(place[name], begin), room[name], samples, beyond)
+            _emit_copy(lanes, f.offset_address(place[name], begin), room[name], samples, beyond)
         with f.loop(0, channels) as c, f.loop(0, count) as i:
             row = f.integer(
                 "add",
@@ -193,13 +193,13 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
                 further = f.integer(
                     "add", f.integer("mul", c, channel), f.integer("mul", i, candidate)
                 )
-                where[name] = f.at(place[name], f.integer("add", begin, further))
+                where[name] = f.offset_address(place[name], f.integer("add", begin, further))
             for name in stencil.rows:
                 _emit_copy(lanes, where[name], room[name], samples, beyond, stencil.onward)
             for name, summed in stencil.sums.items():
                 _emit_running_sum(lanes, room[summed], room[name], samples, beyond)
             scope: dict[Any, str] = {
-                symbol: lanes.everywhere(scalars.part(f.at(place[name], row), ""))
+                symbol: lanes.everywhere(scalars.part(f.offset_address(place[name], row), ""))
                 for name, symbol in single.items()
             }
             shifted = {}
@@ -209,9 +209,11 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
             with f.loop(0, samples, lanes.width) as t:
                 for symbol, (name, k, shift) in elements.items():
                     at = f.integer("add", f.integer("add", t, k), shifted[shift])
-                    scope[symbol] = lanes.load(f.at(room[name], at), alignment=8)
+                    scope[symbol] = lanes.load(f.offset_address(room[name], at), alignment=8)
                 value = Expressions(lanes, scope)(expression)
-                lanes.store_part(value, f.at(where["out"], t), f.integer("sub", samples, t))
+                lanes.store_part(
+                    value, f.offset_address(where["out"], t), f.integer("sub", samples, t)
+                )
     body = f.text("define void @run(ptr %places, ptr %shifts, ptr %sizes) nounwind")
     text = "\n".join([*f.intrinsics.values(), body])
     offsets = [k for _, k, _ in elements.values()]
@@ -228,21 +230,23 @@ def _emit_copy(
 
     def edge(at: str, inside: str) -> str:
         end, next_to_it = (
-            lanes.everywhere(f.fresh(f"load double, ptr {f.at(row, k)}, align 8"))
+            lanes.everywhere(f.fresh(f"load double, ptr {f.offset_address(row, k)}, align 8"))
             for k in (at, inside)
         )
         return lanes.add(end, lanes.subtract(end, next_to_it)) if onward else end
 
     edges = edge("0", f.smaller(1, last)), edge(last, f.integer("sub", last, f.smaller(1, last)))
-    body = f.at(room, beyond)
+    body = f.offset_address(room, beyond)
     with f.loop(0, beyond, lanes.width) as i:
-        lanes.store(edges[0], f.at(room, i), alignment=8)
+        lanes.store(edges[0], f.offset_address(room, i), alignment=8)
     with f.loop(0, samples, lanes.width) as i:
         lanes.store(
-            lanes.part(f.at(row, i), f.integer("sub", samples, i)), f.at(body, i), alignment=8
+            lanes.part(f.offset_address(row, i), f.integer("sub", samples, i)),
+            f.offset_address(body, i),
+            alignment=8,
         )
     with f.loop(0, beyond, lanes.width) as i:
-        lanes.store(edges[1], f.at(body, f.integer("add", samples, i)), alignment=8)
+        lanes.store(edges[1], f.offset_address(body, f.integer("add", samples, i)), alignment=8)
 
 
 def _emit_running_sum(lanes: Numbers, row: str, room: str, samples: str, beyond: str) -> None:
@@ -252,20 +256,27 @@ def _emit_running_sum(lanes: Numbers, row: str, room: str, samples: str, beyond:
     need.
     """
     f = lanes.f
-    body, before = f.at(row, beyond), f.integer("sub", beyond, 1)
-    total, end = f.at(room, beyond), f.integer("sub", samples, 1)
+    body, before = f.offset_address(row, beyond), f.integer("sub", beyond, 1)
+    total, end = f.offset_address(room, beyond), f.integer("sub", samples, 1)
     first, last = (
-        lanes.everywhere(f.fresh(f"load double, ptr {f.at(body, k)}, align 8")) for k in ("0", end)
+        lanes.everywhere(f.fresh(f"load double, ptr {f.offset_address(body, k)}, align 8"))
+        for k in ("0", end)
     )
     with f.loop(0, beyond, lanes.width) as i:
         line = lanes.multiply(first, lanes.ramp(f.integer("sub", i, before)))
-        lanes.store(line, f.at(room, i), alignment=8)
-    f.do(f"store double 0.0, ptr {f.at(total, '-1')}, align 8")
+        lanes.store(line, f.offset_address(room, i), alignment=8)
+    f.do(f"store double 0.0, ptr {f.offset_address(total, '-1')}, align 8")
     with f.loop(0, samples, lanes.width) as i:
-        so_far = f.fresh(f"load double, ptr {f.at(total, f.integer('sub', i, 1))}, align 8")
-        sums = lanes.prefix_sums(lanes.load(f.at(body, i), alignment=8))
-        lanes.store(lanes.add(lanes.everywhere(so_far), sums, ORDERED), f.at(total, i), alignment=8)
-    whole = lanes.everywhere(f.fresh(f"load double, ptr {f.at(total, end)}, align 8"))
+        so_far = f.fresh(
+            f"load double, ptr {f.offset_address(total, f.integer('sub', i, 1))}, align 8"
+        )
+        sums = lanes.prefix_sums(lanes.load(f.offset_address(body, i), alignment=8))
+        lanes.store(
+            lanes.add(lanes.everywhere(so_far), sums, ORDERED),
+            f.offset_address(total, i),
+            alignment=8,
+        )
+    whole = lanes.everywhere(f.fresh(f"load double, ptr {f.offset_address(total, end)}, align 8"))
     with f.loop(0, beyond, lanes.width) as i:
-        line = lanes.fused(last, lanes.ramp(f.integer("add", i, 1)), whole)
-        lanes.store(line, f.at(total, f.integer("add", samples, i)), alignment=8)
+        line = lanes.multiply_add(last, lanes.ramp(f.integer("add", i, 1)), whole)
+        lanes.store(line, f.offset_address(total, f.integer("add", samples, i)), alignment=8)

@@ -28,12 +28,12 @@ class Apart:
         return getattr(self._eq, name)
 
     def __contains__(self, what: Site | str) -> bool:
-        return self._named(what) in self._eq
+        return self._add_suffix(what) in self._eq
 
     def __getitem__(self, what: Site | str) -> Symbol:
-        return self._eq[self._named(what) if what in self else what]
+        return self._eq[self._add_suffix(what) if what in self else what]
 
-    def _named(self, what: Site | str) -> str:
+    def _add_suffix(self, what: Site | str) -> str:
         return (what.name if isinstance(what, Site) else what) + self._suffix
 
     def _latex(self, latex: str) -> str:

@@ -111,7 +111,7 @@ def _static(eq: Equations, static: Static) -> None:
         eq.define(f.name, (eq.omega_n + eq.omega_s) / (eq.omega_n + eq.omega_s0), "f")
     P, Q = law
     powers = eq.place(sites.P_static, eq.P_s0 * P), eq.place(sites.Q_static, eq.Q_s0 * Q)
-    eq.consume(*powers, static.damping(**select_arguments(static.damping, own)))
+    eq.consume(*powers, static.compute_damping(**select_arguments(static.compute_damping, own)))
 
 
 def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -> None:

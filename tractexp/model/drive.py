@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 from tractexp.kernel.layout import EVENT, INPUTS
 
 PHASORS, WAVES = DOMAINS = ("phasors", "waves")
-OUTPUTS = {PHASORS: ("P", "Q"), WAVES: ("i_alpha", "i_beta", "i_zero")}  # rows of `Drive.measured`
+OUTPUTS = {
+    PHASORS: ("P", "Q"),
+    WAVES: ("i_alpha", "i_beta", "i_zero"),
+}  # rows of `Drive.measurements`
 # as pages say
 IN_WORDS = {"i_alpha": "current alpha", "i_beta": "current beta", "i_zero": "zero-sequence current"}
 
@@ -58,7 +61,7 @@ class Excitation:
         )
 
     @property
-    def measured(self) -> np.ndarray:
+    def measurements(self) -> np.ndarray:
         """What a simulation is compared with (2, N): P and Q."""
         return np.stack([self.P, self.Q])
 
@@ -112,7 +115,7 @@ class WaveformDrive:
         return np.stack([*rows, *smooth, *bends, self.turn.real, self.turn.imag])
 
     @property
-    def measured(self) -> np.ndarray:
+    def measurements(self) -> np.ndarray:
         """What a simulation is compared with (3, N): the currents."""
         return self.currents
 
@@ -158,7 +161,7 @@ class Drive:
 
     # (5, N) or (13, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
     inputs: np.ndarray
-    measured: np.ndarray  # (C, N): P and Q, or three currents; gaps filled with 0
+    measurements: np.ndarray  # (C, N): P and Q, or three currents; gaps filled with 0
     weights: np.ndarray  # (C, N): 0 in a gap
     first: np.ndarray  # (E + 1,)
     event: np.ndarray  # (E, 5), columns as in EVENT
@@ -166,17 +169,17 @@ class Drive:
     windows: tuple[np.ndarray | None, ...] = ()  # of each event, where any has one
 
     @classmethod
-    def of(cls, events: Sequence[Excitation | WaveformDrive]) -> "Drive":
+    def from_events(cls, events: Sequence[Excitation | WaveformDrive]) -> "Drive":
         """Lay events end to end, all phasors or all waves."""
-        measured = np.concatenate([e.measured for e in events], axis=1)
-        lengths = [e.measured.shape[1] for e in events]
+        measured = np.concatenate([e.measurements for e in events], axis=1)
+        lengths = [e.measurements.shape[1] for e in events]
         weights = np.repeat(np.array([e.weights for e in events]).T, lengths, axis=1)
         gaps = np.isnan(measured)
         return cls(
             inputs=np.ascontiguousarray(
                 np.concatenate([e.inputs for e in events], axis=1), dtype=float
             ),
-            measured=np.where(gaps, 0.0, measured),
+            measurements=np.where(gaps, 0.0, measured),
             weights=np.where(gaps, 0.0, weights),
             first=np.concatenate([[0], np.cumsum(lengths)]),
             event=np.array([[getattr(e, name) for name in EVENT] for e in events]),
@@ -189,10 +192,10 @@ class Drive:
     @property
     def names(self) -> tuple[str, ...]:
         """What the compared quantities are called."""
-        return next(names for names in OUTPUTS.values() if len(names) == len(self.measured))
+        return next(names for names in OUTPUTS.values() if len(names) == len(self.measurements))
 
     @property
-    def spoken(self) -> tuple[str, ...]:
+    def labels(self) -> tuple[str, ...]:
         """The same as a page says it: P and Q, or which current."""
         return tuple(IN_WORDS.get(name, name) for name in self.names)
 
@@ -204,7 +207,7 @@ class Drive:
     @property
     def channels(self) -> int:
         """How many quantities are compared."""
-        return len(self.measured)
+        return len(self.measurements)
 
     @property
     def events(self) -> int:

@@ -334,7 +334,7 @@ class Equations:
         symbol = _real(name)
         self.steps[symbol] = sympy.sympify(expression)
         if before is not None:
-            self.values_before[symbol] = self.real(self.before(before))
+            self.values_before[symbol] = self.real(self.evaluate_before(before))
         self.latex_names[symbol] = name
         return symbol
 
@@ -353,7 +353,7 @@ class Equations:
         site = sites.find_site(site)
         before = self.expression(site)
         if site is sites.current:
-            before = self._named("current", before)
+            before = self._name_vector("current", before)
         expression = sympy.sympify(change(before))
         self._check_kind(site, expression)
         self._real_form.forget()
@@ -388,7 +388,7 @@ class Equations:
         """
         return self._state(_complex(name), latex, "lag")
 
-    def apart(self, suffix: str) -> Apart:
+    def view_with_suffix(self, suffix: str) -> Apart:
         """These equations as a further machine writes into them: whatever it names ends in this
         suffix.
         """
@@ -471,13 +471,13 @@ class Equations:
     def draw(self, current: sympy.Expr, zero: sympy.Expr = NOTHING) -> None:
         """Add a current drawn at the bus [pu] and, of waves, one of zero sequence."""
         if self.waves:
-            self._drawn[sites.current] += self._named("drawn", current)
+            self._drawn[sites.current] += self._name_vector("drawn", current)
             self._drawn[sites.zero_current] += zero
             return
         drawn = self.v * conjugate(current)
         self.consume(re(drawn), im(drawn))
 
-    def _named(self, name: str, expression: sympy.Expr) -> sympy.Expr:
+    def _name_vector(self, name: str, expression: sympy.Expr) -> sympy.Expr:
         """A space vector by a name of its own, so that what is made of it does not repeat it."""
         expression = sympy.sympify(expression)
         if expression.is_Atom:
@@ -594,9 +594,9 @@ class Equations:
             powers = (
                 replace_symbols(self.expand(power), without_static) for power in (self.P, self.Q)
             )
-            others = [self.real(self.before(power)) for power in powers]
-        lost = [self.real(self.before(power)) for power in self._lost]
-        size = sum(part**2 for part in self.parts(self.before(self.v)))
+            others = [self.real(self.evaluate_before(power)) for power in powers]
+        lost = [self.real(self.evaluate_before(power)) for power in self._lost]
+        size = sum(part**2 for part in self.parts(self.evaluate_before(self.v)))
         # what admittances that stand for a power at U_0 draw of it before the event, where the bus
         # has less
         share = sympy.Integer(1) if not self.waves or size == self.U0**2 else size / self.U0**2
@@ -624,7 +624,7 @@ class Equations:
                     )
         for state in self.states.values():
             if state.derived:
-                state.initial = replace_symbols(self.before(state.initial), values)
+                state.initial = replace_symbols(self.evaluate_before(state.initial), values)
 
     def _check_still(self, what: str, expression: sympy.Expr) -> None:
         """Raise `UserError` where a value before the event is written in what moves after it."""
@@ -632,13 +632,17 @@ class Equations:
         moving = {*map(_real, INPUTS), *self.states, *self.memories}
         if stray := sorted(symbols_of(self.expand(expression)) & moving, key=str):
             use = "".join(f"{inputs[s]} or " for s in stray if s in inputs)
-            raise UserError(f"{what} contains {stray[0]}, which moves; use {use}eq.before(...)")
+            raise UserError(
+                f"{what} contains {stray[0]}, which moves; use {use}eq.evaluate_before(...)"
+            )
 
-    def before(self, expression: sympy.Expr) -> sympy.Expr:
-        """An expression's value before the event, of constants: `eq.before(eq.omega)` is the speed
-        there.
+    def evaluate_before(self, expression: sympy.Expr) -> sympy.Expr:
+        """An expression's value before the event, of constants: `eq.evaluate_before(eq.omega)` is
+        the speed there.
         """
         return replace_symbols(self.expand(expression), self._starts())
+
+    before, apart = evaluate_before, view_with_suffix  # their names in version 0.2
 
     def _starts(self) -> dict[Symbol, sympy.Expr]:
         """What stands before the event for all that moves, states and their parts by what they

@@ -84,10 +84,10 @@ class _Hoister:
         if isinstance(e, sympy.Pow) and not e.exp.is_number:
             return self(sympy.exp(e.exp * sympy.log(e.base)))
         if isinstance(e, sympy.Add | sympy.Mul):
-            return self._grouped(e)
+            return self._group_arguments(e)
         return e.func(*map(self, arguments(e)))
 
-    def _grouped(self, e: sympy.Expr) -> sympy.Expr:
+    def _group_arguments(self, e: sympy.Expr) -> sympy.Expr:
         constant = [a for a in arguments(e) if self.is_constant(a)]
         signal = [a for a in arguments(e) if a not in constant and self.is_signal(a)]
         rest = [self(a) for a in arguments(e) if a not in constant and a not in signal]

@@ -67,7 +67,7 @@ class Errors:
     miss: np.ndarray  # (n,)
 
     @property
-    def refused(self) -> np.ndarray:
+    def is_refused(self) -> np.ndarray:
         return (self.miss > 0) | ~np.isfinite(self.sums).all(axis=(0, 1))
 
 
@@ -119,7 +119,7 @@ class Model:
         """Whether it draws sampled currents, not phasors' power."""
         return self.domain == WAVES
 
-    def behind(self, recorder: Measurement | None) -> "Model":
+    def place_behind_recorder(self, recorder: Measurement | None) -> "Model":
         """The same load as a known recorder shows it: without parameters, before the faults of the
         measurement.
         """
@@ -165,10 +165,12 @@ class Model:
         """
         parts = (self.motor, self.static, *self.effects, effect)
         return Acceptance(
-            **json.loads(text_of(parts, lambda: self._tried(effect), self._in_cache("acceptance")))
+            **json.loads(
+                text_of(parts, lambda: self._try_effect(effect), self._in_cache("acceptance"))
+            )
         )
 
-    def _tried(self, effect: Effect) -> str:
+    def _try_effect(self, effect: Effect) -> str:
         from tractexp.model.declaration import Refused
 
         try:
@@ -208,12 +210,14 @@ class Model:
         """Have the kernel in the cache."""
         objects.object_code(self.source)
 
-    def listing(self) -> str:
+    def format_listing(self) -> str:
         """The kernel for people to read: the equations as they were lowered, and the IR."""
         from tractexp.kernel.listing import equations
         from tractexp.model.lowering import lower
 
         return "\n".join([*equations(lower(self.equations)), "", self.source])
+
+    listing = format_listing  # its name in version 0.2
 
     def simulate(
         self,
@@ -257,7 +261,7 @@ class Model:
             sums, miss = self._run(drive, self._candidates(drive, values), substeps)
             return Errors(sums, miss.sum(axis=0))
         values = np.atleast_2d(values)
-        together = max(1, MOST_STORED // drive.measured.size)
+        together = max(1, MOST_STORED // drive.measurements.size)
         groups = np.split(values, range(together, values.shape[-2], together), axis=-2)
         parts = [self._errors_of_responses(drive, group, substeps) for group in groups]
         return Errors(
@@ -269,7 +273,7 @@ class Model:
     ) -> Errors:
         response = self.simulate(drive, values, substeps)
         with np.errstate(over="ignore", invalid="ignore"):  # of what diverges
-            square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
+            square = (response.outputs - drive.measurements[:, None]) ** 2 * drive.weights[:, None]
         sums = np.add.reduceat(square, drive.first[:-1], axis=2)
         return Errors(np.moveaxis(sums, 2, 0), response.miss.sum(axis=0))
 
@@ -416,7 +420,7 @@ class Model:
             drive.event,
             drive.first,
             drive.inputs,
-            drive.measured,
+            drive.measurements,
             drive.weights,
             steps,
             sums,

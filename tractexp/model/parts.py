@@ -108,7 +108,7 @@ class Static(Part):
         A law that names an argument `f` gets the frequency over that before the event.
         """
 
-    def damping(self, *_: Any, **parameters: Any) -> Any:
+    def compute_damping(self, *_: Any, **parameters: Any) -> Any:
         """Resistance over reactance of the branch that draws Q_s in waveforms; in phasors there is
         none.
         """
@@ -135,7 +135,7 @@ class Static(Part):
                 " ('f',)"
             )
         check_signature(cls, "require", None, where, offered=("P0", "Q0", "U0"), all_taken=False)
-        check_signature(cls, "damping", None, where, all_taken=False)
+        check_signature(cls, "compute_damping", None, where, all_taken=False)
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ class Effect(Part):
         Asking `eq` for what a model lacks refuses the effect for that model.
         """
 
-    def shown(self, event: Any) -> str:
+    def describe_sign(self, event: Any) -> str:
         """How a recorded event shows this effect before anything is fitted, in words; "" where it
         does not.
 

@@ -65,7 +65,7 @@ def list_stated_quantities(eq: "Equations") -> dict[str, str]:
     """
     printer, texts = _Printer({"strict": True}), dict[str, str]()
     for symbol in eq.definitions:
-        value, imaginary = eq.parts(eq.before(symbol))
+        value, imaginary = eq.parts(eq.evaluate_before(symbol))
         if imaginary == 0:
             texts[symbol.name] = str(printer.doprint(value))
     return texts

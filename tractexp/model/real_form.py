@@ -77,7 +77,7 @@ class RealForm:
             both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
         else:
             both = map(_shorter, as_real_imag(lowered))
-        real, imaginary = (replace_symbols(e, self._named(e)) for e in both)
+        real, imaginary = (replace_symbols(e, self._map_real_names(e)) for e in both)
         return real, imaginary
 
     def _name_by_name(self, expression: sympy.Expr) -> Halves:
@@ -94,11 +94,11 @@ class RealForm:
         for s, pair in pairs.items():
             values |= zip(pair, self.parts(self.definitions[s]), strict=True)
         real, imaginary = (
-            replace_symbols(_shorter(e), values | self._named(e)) for e in halves(lowered)
+            replace_symbols(_shorter(e), values | self._map_real_names(e)) for e in halves(lowered)
         )
         return real, imaginary
 
-    def _named(self, expression: sympy.Expr) -> dict[Symbol, sympy.Expr]:
+    def _map_real_names(self, expression: sympy.Expr) -> dict[Symbol, sympy.Expr]:
         """What the real names in an expression stand for."""
         return {s: self.real(s) for s in symbols_of(expression) & self.definitions.keys()}
 

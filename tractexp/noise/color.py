@@ -42,7 +42,7 @@ class Autoregression:
     def white(self) -> bool:
         return self.order == 0
 
-    def scaled(self, factor: float) -> "Autoregression":
+    def scale_noise(self, factor: float) -> "Autoregression":
         """The same color, `factor` times as loud."""
         return Autoregression(self.coefficients, self.deviation * factor)
 
@@ -76,18 +76,18 @@ class Autoregression:
             build_filter_stencil(p)(out[None], parts, np.array(0), y=rows[None], **taps)
         for part in parts if p else ():  # of the first few fewer are known
             first = rows[:, part][:, :p]
-            known = self._beginning[: first.shape[1], : first.shape[1]]
+            known = self._first_rows[: first.shape[1], : first.shape[1]]
             out[:, part][:, :p] = np.einsum("nj,kj->nk", first, known)
 
     @functools.cached_property
-    def _beginning(self) -> np.ndarray:
+    def _first_rows(self) -> np.ndarray:
         """What makes prediction errors (p,) of the first p samples."""
         matrix = np.eye(self.order, dtype=self.coefficients.dtype)
         for k in range(1, self.order):
             matrix[k, :k] = -self.coefficients[k, k - 1 :: -1]
         return matrix / self.deviation[: self.order, None]
 
-    def recurring(self, shocks: np.ndarray) -> np.ndarray:
+    def color_shocks(self, shocks: np.ndarray) -> np.ndarray:
         """What the recurrence of full order makes of shocks (n, N) from rest: the banded system
         that whitens.
         """

@@ -57,7 +57,7 @@ class Noise:
         """The autoregressions of the channels in one event."""
         return self.pairs[event if len(self.pairs) > 1 else 0]
 
-    def of(self, event: int) -> "Noise":
+    def select_event(self, event: int) -> "Noise":
         """The noise of one event by itself, without its shapes."""
         return Noise((self.pair(event),), self.mix, vector=self.vector)
 
@@ -69,15 +69,15 @@ class Noise:
         return (
             0.0
             if self.input_modes is None
-            else float((self._mixed(self.input_modes) ** 2).sum(axis=0).max())
+            else float((self._mix_channels(self.input_modes) ** 2).sum(axis=0).max())
         )
 
-    def scaled(self, factor: float) -> "Noise":
+    def scale_noise(self, factor: float) -> "Noise":
         """The same noise, `factor` times as loud."""
         random_walk = self.random_walk and replace(
             self.random_walk, intensity=self.random_walk.intensity * factor**2
         )
-        pairs = tuple(tuple(channel.scaled(factor) for channel in pair) for pair in self.pairs)
+        pairs = tuple(tuple(channel.scale_noise(factor) for channel in pair) for pair in self.pairs)
         louder = replace(
             self,
             pairs=pairs,
@@ -87,7 +87,7 @@ class Noise:
         louder._shrunk.update(self._shrunk)  # shapes and noise keep their ratio
         return louder
 
-    def on(self, load: Load, input_modes: np.ndarray | None = None) -> "Noise":
+    def apply_to_events(self, load: Load, input_modes: np.ndarray | None = None) -> "Noise":
         """The same noise on other events: their power, and what errors of their voltage do."""
         random_walk = None if self.random_walk is None else replace(self.random_walk, load=load)
         return replace(self, random_walk=random_walk, input_modes=input_modes)
@@ -96,11 +96,11 @@ class Noise:
         """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `valid` (C,
         N) are 0.
         """
-        valid = self._together(valid, drive)
+        valid = self._select_common_samples(valid, drive)
         rows = np.empty(residuals.shape)
         # what diverges has a deviance that is not finite
         with np.errstate(over="ignore", invalid="ignore"):
-            mixed = self._mixed(residuals)
+            mixed = self._mix_channels(residuals)
             for e in range(drive.events):
                 part = drive.part(e)
                 self._fast(mixed[:, :, part], valid[:, part], e, rows[:, :, part])
@@ -111,11 +111,11 @@ class Noise:
         """Make ready what `whiten` keeps of the shapes, once, where several processes are about to
         be forked.
         """
-        valid = self._together(valid, drive)
+        valid = self._select_common_samples(valid, drive)
         for e in range(drive.events):
             self._shrinkage(valid[:, drive.part(e)], drive.part(e), e)
 
-    def _together(self, valid: np.ndarray, drive: Drive) -> np.ndarray:
+    def _select_common_samples(self, valid: np.ndarray, drive: Drive) -> np.ndarray:
         """Samples (C, N) that count where channels are mixed: those at which all count that are
         measured.
 
@@ -134,7 +134,7 @@ class Noise:
         ends = np.cumsum([0, *lengths]).tolist()
         drawn = np.empty((count, self.channels, ends[-1]))
         for e, (a, b) in enumerate(itertools.pairwise(ends)):
-            own = self._drawn(rng, count, slice(a, b), e)
+            own = self._draw_mixed_channels(rng, count, slice(a, b), e)
             drawn[:, :, a:b] = own if self.mix is None else np.linalg.solve(self.mix, own)
         return drawn
 
@@ -149,7 +149,7 @@ class Noise:
             rng.standard_normal(size) if seen is None else rng.choice(seen, size)
             for seen in self._shocks
         ]
-        rows = np.stack(shocks, axis=1) * self._together(valid, drive)
+        rows = np.stack(shocks, axis=1) * self._select_common_samples(valid, drive)
         return rows.reshape(count, math.prod(rows.shape[1:]))  # of no rows, too
 
     def worth(self, samples: int) -> float:
@@ -193,10 +193,10 @@ class Noise:
         """Standard deviation of every sample of each channel, (C, N) [pu], with what its shapes
         add.
         """
-        variance = np.empty(drive.measured.shape)
+        variance = np.empty(drive.measurements.shape)
         for e in range(drive.events):
             part = drive.part(e)
-            shapes = np.einsum("ij,kjt->kit", self._unmixing, self._shapes(part, e))
+            shapes = np.einsum("ij,kjt->kit", self._unmixing_matrix, self._shapes(part, e))
             variance[:, part] = self._fast_variance(e)[:, None] + (shapes**2).sum(axis=0)
         return np.sqrt(variance)
 
@@ -209,19 +209,21 @@ class Noise:
         return [None, None, *seen[2:]] if self.vector else seen
 
     @property
-    def _unmixing(self) -> np.ndarray:
+    def _unmixing_matrix(self) -> np.ndarray:
         return np.eye(self.channels) if self.mix is None else np.linalg.inv(self.mix)
 
     def covariance(self, event: int) -> np.ndarray:
         """Covariance (C, C) of the fast noise of the channels in one event [pu²]."""
-        back = self._unmixing
+        back = self._unmixing_matrix
         return back @ np.diag([channel.deviation[0] ** 2 for channel in self.pair(event)]) @ back.T
 
     def _fast_variance(self, event: int) -> np.ndarray:
         """Variance (C,) of the fast noise of the channels [pu²]."""
-        return self._unmixing**2 @ [channel.deviation[0] ** 2 for channel in self.pair(event)]
+        return self._unmixing_matrix**2 @ [
+            channel.deviation[0] ** 2 for channel in self.pair(event)
+        ]
 
-    def _mixed(self, rows: np.ndarray) -> np.ndarray:
+    def _mix_channels(self, rows: np.ndarray) -> np.ndarray:
         """Channels (n, C, N) mixed so that their noise is independent."""
         return rows if self.mix is None else self.mix @ rows
 
@@ -273,22 +275,24 @@ class Noise:
                 )
             )
         if self.input_modes is not None:
-            shapes.append(self._mixed(self.input_modes[:, :, part]))
+            shapes.append(self._mix_channels(self.input_modes[:, :, part]))
         return np.concatenate(shapes)
 
-    def _drawn(self, rng: np.random.Generator, count: int, part: slice, event: int) -> np.ndarray:
+    def _draw_mixed_channels(
+        self, rng: np.random.Generator, count: int, part: slice, event: int
+    ) -> np.ndarray:
         """Mixed channels (count, C, samples) of one event."""
         colored, pair = [], self.pair(event)
         size = (count, part.stop - part.start + BURN_IN)
         if self.vector:
             shocks = rng.standard_normal((2, *size)) * pair[0].deviation[-1]
-            turning = pair[0].recurring(shocks[0] + 1j * shocks[1])[:, BURN_IN:]
+            turning = pair[0].color_shocks(shocks[0] + 1j * shocks[1])[:, BURN_IN:]
             colored = [np.real(turning), np.imag(turning)]
         for c, channel in list(enumerate(pair))[len(colored) :]:
             seen = self._shocks[c]
             shocks = rng.standard_normal(size) if seen is None else rng.choice(seen, size)
             shocks *= channel.deviation[-1]
-            colored.append(channel.recurring(shocks)[:, BURN_IN:])
+            colored.append(channel.color_shocks(shocks)[:, BURN_IN:])
         shapes = self._shapes(part, event)
         return np.stack(colored, axis=1) + np.tensordot(
             rng.standard_normal((count, len(shapes))), shapes, axes=1

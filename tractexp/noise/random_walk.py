@@ -43,7 +43,7 @@ class Walk:
     along: np.ndarray  # (k,) the stretch in this basis
 
     @classmethod
-    def of(cls, stretch: np.ndarray, fixed: np.ndarray, modes: np.ndarray) -> "Walk":
+    def from_stretch(cls, stretch: np.ndarray, fixed: np.ndarray, modes: np.ndarray) -> "Walk":
         """A stretch (n,) with orthonormal rows `fixed` of any amplitude, and modes of unit
         intensity (k, n).
         """
@@ -74,7 +74,7 @@ class Load:
     before: np.ndarray  # (E, 2)
 
     @classmethod
-    def of(cls, measured: np.ndarray, before: np.ndarray, first: np.ndarray) -> "Load":
+    def from_powers(cls, measured: np.ndarray, before: np.ndarray, first: np.ndarray) -> "Load":
         """Of P and Q (2, N) with means `before` (E, 2); events begin at `first` (E + 1,)."""
         level = np.maximum(np.linalg.norm(before, axis=1), 1e-9)
         return cls(
@@ -181,7 +181,8 @@ def walk_of_load(
     """
     parts = [drive.part(e) for e in range(drive.events)]
     before = [
-        drive.measured[:, part][:, event.steady] for part, event in zip(parts, events, strict=True)
+        drive.measurements[:, part][:, event.steady]
+        for part, event in zip(parts, events, strict=True)
     ]
     rests = []
     if left is not None and columns is not None and valid.all():
@@ -260,6 +261,6 @@ def _compute_log_likelihood(
     n, k = len(stretch), len(columns)
     modes = _random_walk(n, step, min(MODES, n // 8)) * profile
     rows = fast.whiten(np.vstack([columns, stretch, modes]), np.ones(n, dtype=bool))
-    return Walk.of(
+    return Walk.from_stretch(
         rows[k], compute_basis(rows[:k], LEAST_DIRECTION_SHARE), rows[k + 1 :]
     ).likelihood(GRID)

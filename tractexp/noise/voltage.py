@@ -129,7 +129,9 @@ def _curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
     n = len(U)
     fixed = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, n), DEGREE))[0].T
     count = min(COSINES, n // 8)
-    walk = Walk.of(U / deviation, fixed, cosines(n, count) / np.arange(1, count + 1)[:, None] ** 2)
+    walk = Walk.from_stretch(
+        U / deviation, fixed, cosines(n, count) / np.arange(1, count + 1)[:, None] ** 2
+    )
     share = walk.share(walk.likeliest)
     curve = (U @ fixed.T) @ fixed + deviation * ((walk.along * share) @ walk.basis)
     seen = share > LEAST_NOISE_SHARE

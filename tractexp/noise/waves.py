@@ -69,7 +69,7 @@ def _fit_wave_noise(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoreg
         passed = np.real(passed)
     shares = SHARES if passed[0].real > (1e-3 * level) ** 2 else (0.0,)
 
-    def of(share: float, floor: float) -> tuple[float, float, float, Autoregression]:
+    def fit_color(share: float, floor: float) -> tuple[float, float, float, Autoregression]:
         whole = share**2 * passed
         whole[0] += (floor * level) ** 2
         color = solve_levinson(whole)
@@ -78,10 +78,12 @@ def _fit_wave_noise(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoreg
         )
         return price, share, floor, color
 
-    tried = [of(share, floor) for share in shares for floor in (FLOORS if share else (1.0,))]
+    tried = [fit_color(share, floor) for share in shares for floor in (FLOORS if share else (1.0,))]
     best = min(tried, key=lambda t: t[:3])
     if best[1]:
-        best = min((best, *(of(best[1], best[2] * step) for step in FINER)), key=lambda t: t[:3])
+        best = min(
+            (best, *(fit_color(best[1], best[2] * step) for step in FINER)), key=lambda t: t[:3]
+        )
     return best[3]
 
 

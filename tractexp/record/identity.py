@@ -32,7 +32,7 @@ class Identity:
     sha256: str = field(default="", compare=False)
 
     @classmethod
-    def at(cls, record: Record) -> "Identity":
+    def from_record(cls, record: Record) -> "Identity":
         """That of a record."""
         in_mva = record.file_base.in_mva
         given = None if record.original_base is None else _sizes(record.original_base, in_mva)
@@ -40,7 +40,7 @@ class Identity:
         return cls(source, _sizes(record.base, in_mva), given, digest(record))
 
     @classmethod
-    def of(cls, content: Mapping[str, Any]) -> "Identity":
+    def from_content(cls, content: Mapping[str, Any]) -> "Identity":
         """That of an entry of `records` in `result.json`; of an early one, without
         what it lacks.
         """
@@ -143,7 +143,7 @@ def title(identities: Iterable[Identity], names: Iterable[str]) -> str:
 def title_of(records: Iterable[Record]) -> str:
     """The same of records at hand."""
     records = list(records)
-    return title(map(Identity.at, records), (record.name for record in records))
+    return title(map(Identity.from_record, records), (record.name for record in records))
 
 
 def _sizes(base: Base, in_mva: bool) -> dict[str, Any]:

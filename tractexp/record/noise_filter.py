@@ -28,7 +28,7 @@ class NoiseFilter:
     near: int
 
     @classmethod
-    def at(cls, rate: float, frequency: float) -> "NoiseFilter":
+    def from_rate(cls, rate: float, frequency: float) -> "NoiseFilter":
         """The filter for a sampling rate and a frequency [Hz] in its pass band; at too low a rate
         all passes.
         """

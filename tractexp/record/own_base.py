@@ -38,17 +38,17 @@ class OwnBase:
     origin: str = DECLARATION  # of the file's base
 
     @classmethod
-    def at(cls, record: Record) -> "OwnBase":
+    def from_record(cls, record: Record) -> "OwnBase":
         """The base of a record."""
         file = record.file_base
         return cls(record.base.power, file.power, file.in_mva, file.origin)
 
     @classmethod
-    def of(cls, event: Event) -> "OwnBase":
+    def from_event(cls, event: Event) -> "OwnBase":
         """The base for a first fitted event: its power before the dip, or its present base if that
         is its own.
         """
-        at, S = cls.at(event.record), float(np.hypot(event.P0, event.Q0))
+        at, S = cls.from_record(event.record), float(np.hypot(event.P0, event.Q0))
         own = event.record.base.origin == LOAD or (S >= LEAST_S and abs(event.P0) <= MOST_P)
         return at if own or not S > SMALLEST_BASE else replace(at, power=S * at.power)
 
@@ -57,7 +57,7 @@ class OwnBase:
         """How many per units of the file one of this base is."""
         return self.power / self.file_power
 
-    def over(self, record: Record) -> float:
+    def compute_ratio(self, record: Record) -> float:
         """How many per units of a record one of this base is.
 
         A record of which nobody said how many MVA its per unit is, is taken to be in the unit of
@@ -71,9 +71,9 @@ class OwnBase:
             return self.ratio / (record.base.power / file.power)
         return self.power / record.base.power
 
-    def put(self, event: Event) -> Event:
+    def convert_event(self, event: Event) -> Event:
         """The event on this base; itself where it is on it."""
-        ratio = self.over(event.record)
+        ratio = self.compute_ratio(event.record)
         return event if ratio == 1 else convert_base(event, ratio, self)
 
     @property
@@ -100,7 +100,7 @@ def on_own_base(events: Sequence[Event]) -> list[Event]:
     """
     if not events:
         return []
-    first, own = events[0].record, OwnBase.of(events[0])
+    first, own = events[0].record, OwnBase.from_event(events[0])
     for event in events:
         record = event.record
         if own.power != first.base.power and record.file_base.in_mva != own.in_mva:
@@ -112,7 +112,7 @@ def on_own_base(events: Sequence[Event]) -> list[Event]:
                 " both"
                 f" ({DATA.base_power} in MVA, with {DATA.units}={{P: pu, Q: pu}}), or of none"
             )
-    return [own.put(event) for event in events]
+    return [own.convert_event(event) for event in events]
 
 
 def convert_base(event: Event, ratio: float, own: OwnBase) -> Event:

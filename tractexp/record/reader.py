@@ -36,7 +36,7 @@ class Reader(Plugin):
     folders: ClassVar[bool] = False
 
     @staticmethod
-    def of(path: str) -> dict[str, Any]:
+    def build_settings(path: str) -> dict[str, Any]:
         """The settings that make it read all of one file; for a reader with `endings`."""
         return {"path": path}
 

@@ -71,7 +71,7 @@ class WaveEvent(Event):
     @property
     def channels(self) -> tuple[str, ...]:
         """With I0 where the currents' zero sequence is compared."""
-        return (*super().channels, *(("I0",) if self.compared[2] else ()))
+        return (*super().channels, *(("I0",) if self.compared_channels[2] else ()))
 
     @property
     def levels(self) -> tuple[float, ...]:
@@ -85,9 +85,11 @@ class WaveEvent(Event):
         return self.unexplained
 
     @property
-    def compared(self) -> tuple[bool, ...]:
+    def compared_channels(self) -> tuple[bool, ...]:
         """Which of the three currents are compared."""
         return tuple(bool(np.isfinite(row).any()) for row in self.currents)
+
+    compared = compared_channels  # its name in version 0.2
 
     @property
     def peaks(self) -> tuple[float, float]:
@@ -134,7 +136,9 @@ class Periodic:
     rest: np.ndarray  # (channels,) standard deviation of what is not periodic
 
     @classmethod
-    def of(cls, t: np.ndarray, x: np.ndarray, frequency: float, rate: float) -> "Periodic":
+    def from_samples(
+        cls, t: np.ndarray, x: np.ndarray, frequency: float, rate: float
+    ) -> "Periodic":
         """Fitted to channels x (channels, n) at times t (n,) [s]."""
         highest = max(
             1, min(HIGHEST_HARMONIC, int(0.45 * rate / frequency), (len(t) // 3 - 1) // 2)
@@ -157,7 +161,7 @@ class Periodic:
         waves = np.stack([np.cos(angle), np.sin(angle)], axis=2).reshape(len(t), -1)
         return np.concatenate([np.ones((len(t), 1)), waves], axis=1)
 
-    def at(self, t: np.ndarray) -> np.ndarray:
+    def evaluate_at(self, t: np.ndarray) -> np.ndarray:
         """The channels (channels, n), without their offsets."""
         return (self.basis(t)[:, 1:] @ self.coefficients[1:]).T
 
@@ -195,11 +199,11 @@ def in_waves(event: Event) -> WaveEvent:
         )
     x = _per_unit(waves, record)
     frequency = _frequency(t[before], x[:K, before], waves.rate, event.f0)
-    periodic = Periodic.of(t[before], x[:, before], frequency, waves.rate)
+    periodic = Periodic.from_samples(t[before], x[:, before], frequency, waves.rate)
     x = x - periodic.offsets[:, None]
     lead = round(LEAD * waves.rate / frequency)
     time = np.concatenate([t[0] - np.arange(lead, 0, -1) / waves.rate, t])
-    x = np.concatenate([periodic.at(time[:lead]), x], axis=1)
+    x = np.concatenate([periodic.evaluate_at(time[:lead]), x], axis=1)
 
     V, I = (_positive(part) for part in np.split(periodic.fundamentals, 2))
     turn = np.exp(1j * (2 * np.pi * frequency * (time - periodic.origin) + np.angle(V)))
@@ -208,8 +212,8 @@ def in_waves(event: Event) -> WaveEvent:
         periodic.rest[K:],
         np.sqrt(np.mean(periodic.rest[:K] ** 2) * (2 / 3 if K == 3 else 1)),
     )
-    noise_filter = NoiseFilter.at(waves.rate, frequency)
-    course, course_zero = stationary(periodic.at(time)[:K], waves.rate, frequency)
+    noise_filter = NoiseFilter.from_rate(waves.rate, frequency)
+    course, course_zero = stationary(periodic.evaluate_at(time)[:K], waves.rate, frequency)
     v = course + noise_filter(v - course, 2 * noise_U**2)
     v_zero = course_zero + noise_filter(v_zero - course_zero, noise_U**2 / 2)
     power = V * np.conj(I)
@@ -348,7 +352,7 @@ def _frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float
         whole = max(1, int((t[-1] - t[0]) * frequency / 2)) / frequency  # s: cycles of a half
         n = round(whole * rate)
         halves = (
-            Periodic.of(t[part], v[:, part], frequency, rate)
+            Periodic.from_samples(t[part], v[:, part], frequency, rate)
             for part in (slice(0, n), slice(-n, None))
         )
         first, last = halves
@@ -362,7 +366,7 @@ def _frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float
 
 def _onset(t: np.ndarray, v: np.ndarray, periodic: Periodic, K: int, before: np.ndarray) -> int:
     """The first sample at which a voltage (K, M) departs from its periodic course."""
-    off = np.abs(v - periodic.at(t)[:K]).max(axis=0)
+    off = np.abs(v - periodic.evaluate_at(t)[:K]).max(axis=0)
     limit = max(LARGEST_PERIODIC_DEPARTURE, NOISE_DEVIATIONS * float(periodic.rest[:K].max()))
     beyond = off > limit
     beyond &= np.r_[beyond[1:], False] | np.r_[beyond[2:], False, False]

@@ -53,7 +53,7 @@ class Waves:
         return {"samples": np.asarray(self.samples[:, :]), **fields}
 
     @classmethod
-    def of(cls, content: Mapping[str, Any]) -> "Waves":
+    def from_content(cls, content: Mapping[str, Any]) -> "Waves":
         """From the content of `to_dict`."""
         late = content["late"] if content["late"] is None else np.array(content["late"])
         samples = np.array(content["samples"], dtype=float)

@@ -40,7 +40,7 @@ class Window:
         """From its first to its last weight [s]."""
         return float(self.at[-1] - self.at[0]) * len(self.at) / (len(self.at) - 1)
 
-    def on(self, step: float) -> np.ndarray:
+    def compute_weights(self, step: float) -> np.ndarray:
         """Weights (odd,) of samples `step` [s] apart, for what is linear between them."""
         reach = int(np.ceil(np.abs(self.at).max() / step - 1e-9))
         weights = np.zeros(2 * reach + 2)
@@ -54,7 +54,7 @@ class Window:
         return {"name": self.name, "at": self.at.tolist(), "weights": self.weights.tolist()}
 
     @classmethod
-    def of(cls, content: Mapping[str, Any]) -> "Window":
+    def from_content(cls, content: Mapping[str, Any]) -> "Window":
         """What `to_dict` told; of anything else a `ValueError`, `TypeError`, `KeyError` or
         `OverflowError`.
         """

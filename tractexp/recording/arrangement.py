@@ -212,8 +212,12 @@ def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
     if windows is None or not any(windows.pure(i) for i in feeder.voltages):
         return None  # noise has no order
     connection = chosen("connection", feeder.connection)
-    V = connection.voltage() @ windows.of(feeder.voltages)
-    I = connection.current() @ windows.of(feeder.currents) * (-1 if feeder.reverse_current else 1)
+    V = connection.voltage() @ windows.select_channels(feeder.voltages)
+    I = (
+        connection.current()
+        @ windows.select_channels(feeder.currents)
+        * (-1 if feeder.reverse_current else 1)
+    )
     valid = np.isfinite(V).all(axis=0) & np.isfinite(I).all(axis=0)
     V, I = V[:, valid], I[:, valid]
     size, load = (np.linalg.norm(x, axis=0) for x in (V, I))
@@ -295,7 +299,7 @@ def _level(recording: Recording, numbers: Sequence[int]) -> float:
     windows = snapshots(recording, numbers)
     if windows is None:
         return 0.0
-    size = np.nan_to_num(np.abs(sequences(windows.of(numbers))[0]))
+    size = np.nan_to_num(np.abs(sequences(windows.select_channels(numbers))[0]))
     return float(np.median(size[size >= LEAST_LIVE_SEQUENCE * size.max()]))
 
 
@@ -304,7 +308,7 @@ def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> 
     windows = snapshots(recording, [*ours, *theirs])
     if windows is None:
         return False
-    x, y = (sequences(windows.of(numbers))[0] for numbers in (ours, theirs))
+    x, y = (sequences(windows.select_channels(numbers))[0] for numbers in (ours, theirs))
     large = np.nan_to_num(np.abs(y)) > LEAST_LIVE_SEQUENCE * np.nanmax(np.abs(y), initial=0)
     if not large.any():
         return False

@@ -35,7 +35,7 @@ def _bridge_channel(channel: Channel, segments: Sequence[Segment]) -> Channel:
         return channel
     numbers, estimates = [], []
     for segment in segments:
-        x = channel.recorded(segment.first, segment.stop)
+        x = channel.read_values(segment.first, segment.stop)
         at = find_single_gaps(np.isnan(x))
         numbers.append(segment.first + at)
         estimates.append(estimate_wave_values(x, at))

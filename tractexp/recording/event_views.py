@@ -32,7 +32,7 @@ def settings_of(path: str, *join: str) -> dict[str, Any]:
     if files.is_called_archive(path):
         files.check_there(Path(path))
     cls = reader_of(path, *join)
-    return {"name": cls.name, **cls.of(path)} | ({"join": list(join)} if join else {})
+    return {"name": cls.name, **cls.build_settings(path)} | ({"join": list(join)} if join else {})
 
 
 def _settings_of_archive(archive: Path) -> dict[str, Any]:
@@ -82,7 +82,7 @@ def _show_load(*paths: str) -> bool:
         node = settings_of(*paths)
         reader = build("data", node)
         if isinstance(reader, WaveformReader):
-            return any(feeder.currents for feeder in propose(reader.opened()))
+            return any(feeder.currents for feeder in propose(reader.open_recording()))
         return shows_load(view_of(paths[0], node))
     except UserError:
         return False

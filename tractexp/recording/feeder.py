@@ -156,7 +156,9 @@ def _bus_alone(recording: Recording, phasors: Snapshots, group: Group) -> Feeder
         [f"voltages {_names(recording, group.numbers)}: {group.evidence}", ALONE],
     )
     if len(numbers) == 3:
-        first, second = (float(np.nanmedian(np.abs(x))) for x in sequences(phasors.of(numbers)))
+        first, second = (
+            float(np.nanmedian(np.abs(x))) for x in sequences(phasors.select_channels(numbers))
+        )
         if second > first:
             numbers = (numbers[0], numbers[2], numbers[1])
             said.append("they turn in the order a, c, b")
@@ -282,7 +284,7 @@ def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
     """The three channels in the order a, b, c where their phasors are equal and 120 degrees apart;
     else ().
     """
-    X = phasors.of(numbers)
+    X = phasors.select_channels(numbers)
     level = np.abs(X).mean(axis=0)
     if not np.isfinite(level).any() or np.nanmax(level) == 0:
         return ()
@@ -355,8 +357,8 @@ def _size_of(recording: Recording, phasors: Snapshots, feeder: Feeder) -> str:
     if any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
         return "units in doubt"
     connection = chosen("connection", feeder.connection)
-    V = connection.voltage() @ phasors.of(feeder.voltages)
-    I = connection.current() @ phasors.of(feeder.currents)
+    V = connection.voltage() @ phasors.select_channels(feeder.voltages)
+    I = connection.current() @ phasors.select_channels(feeder.currents)
     size = np.nan_to_num(np.linalg.norm(V, axis=0))
     alive = size >= np.percentile(size, 50)
     S = complex(np.nanmedian((V * I.conj()).sum(axis=0)[alive]))
@@ -477,13 +479,16 @@ def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
 
 def _measure_difference(phasors: Snapshots, a: Group, b: Group) -> float:
     """How far two groups of voltages differ at worst, as a share of the larger."""
-    x, y = (_positive(phasors.of(g.numbers), g.pairs) for g in (a, b))
+    x, y = (_positive(phasors.select_channels(g.numbers), g.pairs) for g in (a, b))
     return float(np.nanmax(np.abs(x - y)) / max(np.nanmax(np.abs(x)), 1e-12))
 
 
 def _stray(phasors: Snapshots, bus: Group, load: Group) -> float:
     """Norm of the currents' residual about a constant admittance at these voltages."""
-    v, i = _positive(phasors.of(bus.numbers), bus.pairs), _positive(phasors.of(load.numbers), False)
+    v, i = (
+        _positive(phasors.select_channels(bus.numbers), bus.pairs),
+        _positive(phasors.select_channels(load.numbers), False),
+    )
     valid = np.isfinite(v) & np.isfinite(i)
     v, i = v[valid], i[valid]
     y = np.vdot(v, i) / max(float(np.vdot(v, v).real), 1e-12)
@@ -604,7 +609,7 @@ def _dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:
 def _never_turn(phasors: Snapshots, numbers: Sequence[int]) -> bool:
     if len(numbers) < 3:
         return not any(phasors.pure(i) for i in numbers)
-    X = np.nan_to_num(phasors.of(numbers))
+    X = np.nan_to_num(phasors.select_channels(numbers))
     rest = np.nan_to_num(phasors.rest[[phasors.numbers.index(i) for i in numbers]])
     size = np.sqrt((np.abs(X) ** 2 + rest**2).mean(axis=0))
     return not (np.abs(sequences(X)).max(axis=0) > LEAST_SEQUENCE_SHARE * size).any()

@@ -103,7 +103,7 @@ def _move(channel: Channel, first: int, count: int, late: float) -> Channel:
     """A channel at other instants: as it was stored, where these are those of samples."""
     if abs(late) <= SAME_INSTANT:
         return replace(channel, raw=channel.raw[first : first + count])
-    values = move_samples(channel.recorded(), first, count, late)
+    values = move_samples(channel.read_values(), first, count, late)
     return replace(channel, raw=values, gain=1.0, offset=0.0, missing=None, limits=None)
 
 

@@ -44,7 +44,7 @@ def _find_closed_sum(
     """
     if len(loaded) < 3:
         return None
-    X = np.array([phasors.of(feeders[k].currents) for k in loaded])  # (F, 3, M)
+    X = np.array([phasors.select_channels(feeders[k].currents) for k in loaded])  # (F, 3, M)
     X = X[:, :, np.isfinite(X).all(axis=(0, 1))]
     if not X.size:
         return None

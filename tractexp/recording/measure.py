@@ -30,7 +30,9 @@ class FeederWaves:
     sums: np.ndarray  # (2 K, channels) the weights with which the feeder's channels make up each
 
     @classmethod
-    def of(cls, recording: Recording, feeder: Feeder, segment: Segment) -> "FeederWaves":
+    def from_recording(
+        cls, recording: Recording, feeder: Feeder, segment: Segment
+    ) -> "FeederWaves":
         connection = chosen("connection", feeder.connection)
         V, I = (
             connection.voltage(),
@@ -64,7 +66,7 @@ class FeederWaves:
         return waves
 
     @property
-    def bridged(self) -> tuple[float, ...]:
+    def bridged_times(self) -> tuple[float, ...]:
         """Times [s] of single samples that were missing in some channel."""
         at = find_bridged(self.recording, self.numbers, self.segment)
         return tuple((self.segment.start + at / self.segment.rate).tolist())
@@ -112,7 +114,7 @@ def phasors_of(
             raise UserError(
                 f"{DATA.harmonics}={[*harmonics]}: at {segment.rate:g} Hz they can be 2 to {most}"
             )
-    waves = FeederWaves.of(recording, feeder, segment)
+    waves = FeederWaves.from_recording(recording, feeder, segment)
     try:
         phasors = measure(
             waves,
@@ -124,7 +126,7 @@ def phasors_of(
             harmonics=harmonics,
             tracked=tracked,
         )
-        return replace(phasors, bridged=waves.bridged)
+        return replace(phasors, bridged=waves.bridged_times)
     except UserError as error:
         raise UserError(
             f"{recording.source}: segment from {segment.start:.3f} s: {error}"

@@ -90,7 +90,7 @@ class Sight:
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def loaded(self) -> bool:
+    def is_loaded(self) -> bool:
         """Whether it draws more than noise; a record does."""
         return self.feeder is None or self.feeder.loaded
 
@@ -240,7 +240,7 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
             return View(source, node, [sight_of(*table)])
         read = reader.read()
         return View(source, node, [sight_of(record) for record in (*read.train, *read.validate)])
-    recording = reader.opened()
+    recording = reader.open_recording()
     if reader.voltages or reader.currents:
         return View(source, node, [sight(reader, recording, reader.feeder(recording))], recording)
     return View(source, node, overview(reader, recording), recording)
@@ -316,7 +316,7 @@ def sight(
                 continue
             parts.append(measured)
             if events:
-                waves = FeederWaves.of(recording, feeder, segment)
+                waves = FeederWaves.from_recording(recording, feeder, segment)
                 trace = of_waves(waves, segment.rate, segment.start, recording.frequency, measured)
                 traces.append(trace if feeder.currents else trace.without_currents())
         phasors += [join_phasors(parts)] if parts else []

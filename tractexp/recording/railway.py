@@ -50,7 +50,7 @@ def opposite_pair(phasors: Snapshots, volts: Sequence[int]) -> tuple[int, int] |
 
 def is_opposite(phasors: Snapshots, first: int, second: int, most: float = OPPOSITE) -> bool:
     """Whether two channels add up to next to nothing."""
-    x, y = np.nan_to_num(phasors.of((first, second)))
+    x, y = np.nan_to_num(phasors.select_channels((first, second)))
     large = np.abs(x) + np.abs(y)
     alive = large > 0.5 * large.max(initial=0.0)
     return bool(alive.any() and np.median(np.abs(x + y)[alive] / large[alive]) < most / 2)
@@ -84,7 +84,7 @@ def _carry_one_load(phasors: Snapshots, volts: Sequence[int], pair: tuple[int, i
 
 
 def _opposite_angles(phasors: Snapshots, pair: tuple[int, int]) -> bool:
-    x, y = np.nan_to_num(phasors.of(pair))
+    x, y = np.nan_to_num(phasors.select_channels(pair))
     both = (np.abs(x) > 0.3 * np.abs(x).max(initial=0.0)) & (
         np.abs(y) > 0.3 * np.abs(y).max(initial=0.0)
     )
@@ -136,7 +136,7 @@ def direct_voltage(recording: Recording) -> str:
     segment, said = max(recording.segments, key=lambda s: s.stop - s.first), ""
     for channel in volts:
         x = channel.values(segment.first, min(segment.stop, segment.first + LONGEST))
-        seen = DirectVoltage.of(x, segment.rate)
+        seen = DirectVoltage.from_values(x, segment.rate)
         if seen is not None and seen.alternates:
             return ""
         if seen is not None and seen.is_direct:
@@ -156,7 +156,7 @@ class DirectVoltage:
     seconds: float
 
     @classmethod
-    def of(cls, x: np.ndarray, rate: float) -> "DirectVoltage | None":
+    def from_values(cls, x: np.ndarray, rate: float) -> "DirectVoltage | None":
         """Values (N,) [kV]; None where there are too few."""
         n = max(3, round(RIPPLE_SECONDS * rate)) | 1
         x = x[np.isfinite(x)]

@@ -70,10 +70,10 @@ class WaveformReader(Reader):
     reverse_current: bool = False
     skew: bool = False  # true: correct the time skew of each channel that the file states
 
-    def opened(self) -> Recording:
+    def open_recording(self) -> Recording:
         """The files, their units and the nominal frequency that their voltages really have."""
         path, *join = event_paths(self.path, self.join, self.endings)
-        recording = bridge_recording(replace(self, path=path, join=join).joined())
+        recording = bridge_recording(replace(self, path=path, join=join).join_files())
         keys = {"U": "voltages", "I": "currents"}
         numbers = {
             x: [recording.number(i, f"data.{key}") for i in getattr(self, key)]
@@ -87,7 +87,9 @@ class WaveformReader(Reader):
         ]
         return tune_frequency(recording, chosen or every)
 
-    def joined(self) -> Recording:
+    opened = open_recording  # its name in version 0.2
+
+    def join_files(self) -> Recording:
         """The files of one event as one recording. Raises `UserError` as `recording`, and where
         their times do not overlap.
         """
@@ -112,7 +114,7 @@ class WaveformReader(Reader):
         check_range("data.post", self.post, 0.1)
 
     def read(self) -> Events:
-        recording = self.opened()
+        recording = self.open_recording()
         feeder = self.feeder(recording)
         dips = self.dips(
             feeder, self._streams(recording, feeder), recording.frequency, recording.trigger
@@ -291,10 +293,17 @@ class WaveformReader(Reader):
                 except UserError as error:
                     short.append(error)
                     continue
-                waves = FeederWaves.of(recording, feeder, segment)
+                waves = FeederWaves.from_recording(recording, feeder, segment)
                 late = waves.late if self.skew else None
                 several.append(
-                    Waves(waves, segment.start, segment.rate, self.estimator, late, waves.bridged)
+                    Waves(
+                        waves,
+                        segment.start,
+                        segment.rate,
+                        self.estimator,
+                        late,
+                        waves.bridged_times,
+                    )
                 )
             if parts:
                 streams.append((join_phasors(parts), several))

@@ -124,11 +124,11 @@ class Channel:
         """Primary values (M,) in kV, kA, MW, Mvar, Hz or rad (another quantity in its own unit);
         nan where missing.
         """
-        primary = self.recorded(first, stop)
+        primary = self.read_values(first, stop)
         primary *= self.ratio * self.factor
         return primary
 
-    def recorded(self, first: int = 0, stop: int | None = None) -> np.ndarray:
+    def read_values(self, first: int = 0, stop: int | None = None) -> np.ndarray:
         """Values (M,) in `unit`, on the side that was recorded; nan where missing."""
         raw = self.raw[first:stop]
         with np.errstate(invalid="ignore"):  # a damaged float may be a signalling nan
@@ -143,6 +143,8 @@ class Channel:
             inside = (begin <= at) & (at < end)
             values[at[inside] - begin] = estimates[inside]
         return values
+
+    recorded = read_values  # its name in version 0.2
 
     @property
     def factor(self) -> float:

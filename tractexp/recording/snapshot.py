@@ -45,7 +45,7 @@ class Snapshots:
     # answers that each load asks for again
     remembered: dict[Any, Any] = field(default_factory=dict)
 
-    def of(self, numbers: Sequence[int]) -> np.ndarray:
+    def select_channels(self, numbers: Sequence[int]) -> np.ndarray:
         """The phasors (K, M) of some of the channels."""
         return self.X[[self.numbers.index(n) for n in numbers]]
 
@@ -79,7 +79,7 @@ class Snapshots:
         return self.remembered[key]
 
     def _size(self, numbers: Sequence[int]) -> float:
-        size = np.nan_to_num(np.abs(self.of(numbers))).mean(axis=0)
+        size = np.nan_to_num(np.abs(self.select_channels(numbers))).mean(axis=0)
         if not len(size):
             return 0.0
         spans = np.lib.stride_tricks.sliding_window_view(

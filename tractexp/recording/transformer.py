@@ -103,7 +103,7 @@ def _compare_currents(
     """(share of the current of feeder b that is no multiple of that of a, angle of the multiple
     [degrees]), (F, F) each; of a feeder and itself all of it.
     """
-    X = np.array([sequences(phasors.of(f.currents))[0] for f in feeders])  # (F, M)
+    X = np.array([sequences(phasors.select_channels(f.currents))[0] for f in feeders])  # (F, M)
     X = X[:, np.isfinite(X).all(axis=0)]
     products = X.conj() @ X.T
     energy = np.maximum(np.real(np.diag(products)), 1e-300)
@@ -152,7 +152,7 @@ def _has_high_voltage(
 
 def _measure_voltage(phasors: Snapshots, feeder: "Feeder") -> float:
     """Line voltage [kV] of three voltages, to ground unless they are between phases."""
-    V1, V2 = (np.abs(np.nan_to_num(v)) for v in sequences(phasors.of(feeder.voltages)))
+    V1, V2 = (np.abs(np.nan_to_num(v)) for v in sequences(phasors.select_channels(feeder.voltages)))
     size = float(np.median(np.maximum(V1, V2)))
     lines = str(feeder.connection).startswith("line")
     return size if lines else float(np.sqrt(3)) * size

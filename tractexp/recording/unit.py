@@ -169,7 +169,7 @@ def _plain(letter: str, size: float, stated: set[str], voltage: str) -> bool:
 
 def _size(channel: Channel) -> float:
     """RMS about the mean, as recorded, on the primary side."""
-    x = channel.recorded()
+    x = channel.read_values()
     x = x[np.isfinite(x)]
     return abs(channel.ratio) * float(x.std()) if len(x) else 0.0
 

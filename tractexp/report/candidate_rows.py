@@ -35,7 +35,7 @@ class CandidateRow:
     why: str
 
     @property
-    def standing(self) -> int:
+    def rank(self) -> int:
         """0 for what was added, 1 for what is tied with it, 2 for the rest."""
         return {CHOSEN: 0, TIED: 1}.get(self.status, 2)
 
@@ -47,9 +47,7 @@ def list_candidates(findings: Findings) -> list[CandidateRow]:
     sets = [_tell_set(findings, row) for row in findings.evidence.rows if row.names]
     tested = {row.names for row in sets}  # of the chosen size
     rows = [*sets, *(row for row in _singles(findings) if row.names not in tested)]
-    return sorted(
-        rows, key=lambda row: (row.standing, -np.nan_to_num(row.drop, nan=-1.0), row.names)
-    )
+    return sorted(rows, key=lambda row: (row.rank, -np.nan_to_num(row.drop, nan=-1.0), row.names))
 
 
 def chance_level(findings: Findings) -> float:
@@ -58,7 +56,9 @@ def chance_level(findings: Findings) -> float:
     """
     from scipy.special import chdtri
 
-    return float(chdtri(1, findings.first.chance.critical_p(findings.context.criteria.naming)))
+    return float(
+        chdtri(1, findings.first.chance.critical_p(findings.context.criteria.naming_false_alarms))
+    )
 
 
 def why_not_the_most_helpful(findings: Findings) -> str:
@@ -82,7 +82,7 @@ def why_not_the_most_helpful(findings: Findings) -> str:
             f"{promise}, but that does not make it an explanation:"
             f" {_verdict_on(findings, best.name)}."
         )
-    chosen = next(r for r in list_candidates(findings) if r.standing == 0)
+    chosen = next(r for r in list_candidates(findings) if r.rank == 0)
     return (
         f"{promise}, yet the verdict is {join_words(findings.names)}, which lowers the deviance by"
         f" {chosen.drop:.0f}:"
@@ -116,9 +116,9 @@ def _verdict_on(findings: Findings, name: str) -> str:
 def _tell_set(findings: Findings, row: SetEvidence) -> CandidateRow:
     """A refitted set of the chosen size; the faults of the measurement where they alone explain."""
     names = row.fit.names or findings.evidence.faults
-    drop = row.lowered if row.fit.names else findings.bare.deviance - row.told.deviance
+    drop = row.lowered if row.fit.names else findings.bare.deviance - row.reported_fit.deviance
     status, why = _tell_fate(findings, row)
-    sizes = effect_sizes(findings.context, row.told, names, row.tests)
+    sizes = effect_sizes(findings.context, row.reported_fit, names, row.tests)
     return CandidateRow(names, max(drop, 0.0), FITTED, status, tuple(sizes), why)
 
 

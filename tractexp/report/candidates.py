@@ -96,7 +96,7 @@ def _bars(
 def _describe_bar(row: CandidateRow) -> str:
     """What the pointer over a bar shows."""
     drop = f"{row.drop:.{0 if row.drop >= 100 else 1}f}"
-    return f"{drop}, {row.status}" if row.standing < 2 else drop
+    return f"{drop}, {row.status}" if row.rank < 2 else drop
 
 
 def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
@@ -105,7 +105,7 @@ def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
         colors.append("green: added")
     if any(r.status == TIED for r in rows):
         colors.append("orange: tied with it")
-    if any(r.how == FITTED and r.standing == 2 for r in rows):
+    if any(r.how == FITTED and r.rank == 2 for r in rows):
         colors.append("blue: refitted")
     if any(r.how == ONE_STEP for r in rows):
         colors.append("gray: estimated in one linear step")
@@ -113,7 +113,7 @@ def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
     return (
         f"By how much each alone lowers the deviance of the base model ({', '.join(colors)})."
         f" Dashed: {chance}"
-        f" {findings.context.criteria.naming:.0%} of cases."
+        f" {findings.context.criteria.naming_false_alarms:.0%} of cases."
     )
 
 
@@ -128,7 +128,7 @@ def _sets(page: Report, findings: Findings) -> None:
         ]
         for r in findings.evidence.rows[:MOST_SETS]
     ]
-    with page.folded("How the refitted sets compare"):
+    with page.fold_blocks("How the refitted sets compare"):
         page.table(
             ["set", "deviance", "behind", "verdict", "chance leaves as much"],
             rows,
@@ -154,7 +154,7 @@ def _further(page: Report, findings: Findings) -> None:
             [j.name, j.status, "" if j.score is None else f"{j.score.drop:.1f}", size, j.why]
         )
     names = join_words(findings.last.fit.names)
-    with page.folded(f"What each effect would add to a model that has {names}"):
+    with page.fold_blocks(f"What each effect would add to a model that has {names}"):
         page.table(
             ["effect", "status", "deviance lowered by", "one-step size", "why"],
             rows,

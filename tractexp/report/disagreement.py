@@ -18,7 +18,7 @@ def places(page: Report, findings: Findings) -> None:
         "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
     )
     if first.scores:
-        best, alpha = first.scores[0], findings.context.criteria.naming
+        best, alpha = first.scores[0], findings.context.criteria.naming_false_alarms
         text += (
             f" The effect that promises most in one linear step, {best.name}, would lower the"
             " deviance by"

@@ -51,7 +51,9 @@ def summary(findings: "Outcome") -> Report:
     names = alternatives(content["name_sets"])
     report = Report().text(f"verdict: {findings.verdict.upper()} {names}".rstrip())
     grade, which = content["adequacy"], "extended" if findings.names else "base"
-    report.items([findings.reason, *findings.sizes, *([left] if left else []), *findings.proposed])
+    report.items(
+        [findings.reason, *findings.sizes, *([left] if left else []), *findings.proposal_sentences]
+    )
     report.items(
         [f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"]
     )
@@ -137,7 +139,7 @@ def report(
         lead,
     )
     spoken = [
-        [findings.catalogue.spoken(name) for name in names] for names in findings.verdict.sets
+        [findings.catalogue.label_effect(name) for name in names] for names in findings.verdict.sets
     ]
     head = f"{findings.verdict.word.upper()} {alternatives(spoken)}".strip()
     left = [as_sentence(findings.headline)] if findings.headline else []
@@ -310,11 +312,11 @@ def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
         for name in near.names
         for p in findings.catalogue[name].effect.parameters
     ]
-    rows = [[join_words(near.names), *map(_share, near.closed)]]
+    rows = [[join_words(near.names), *map(_share, near.closed_shares)]]
     rows += [[join_words(names), _share(share), ""] for names, share in near.others]
     page.text("The candidates that come nearest, none of which is accepted:")
     page.table(["nearest candidates", "gap closed, fitted", "held out"], rows, words=(0,))
-    with page.folded(f"How large {join_words(near.names)} would be"):
+    with page.fold_blocks(f"How large {join_words(near.names)} would be"):
         page.table(
             ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],
             [[p.name, p.about, p.unit, value(e), interval(*e.interval), e.verdict] for e, p in own],

@@ -85,7 +85,7 @@ def parameters(page: Report, findings: Findings) -> None:
         f"± one standard error, from {how} in the fit of the graded model.",
         words=(1, 2, len(columns) - 1),
     )
-    if retained := findings.held:
+    if retained := findings.undetermined_values:
         page.text(
             f"These events cannot tell {join_words(list(retained))}: the extended model holds what"
             " was found."
@@ -95,7 +95,7 @@ def parameters(page: Report, findings: Findings) -> None:
         for e in parameter_estimates
         if brief(e.verdict) != e.verdict
     ]:
-        with page.folded("Why some are known badly, and what of them is known"):
+        with page.fold_blocks("Why some are known badly, and what of them is known"):
             page.items(why)
 
 
@@ -124,7 +124,7 @@ def equations(page: Report, findings: Findings) -> None:
         if was is not None:
             page.text("before").equation(was).text("after")
         page.equation(line)
-    with page.folded("All equations of the extended model"):
+    with page.fold_blocks("All equations of the extended model"):
         for line in extended.latex():
             page.equation(line)
 

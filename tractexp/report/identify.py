@@ -219,7 +219,7 @@ def all_curves(page: Report, fits: Sequence[Any], noises: Sequence[np.ndarray] =
     """
     for fit, noise, k in itertools.zip_longest(fits, noises, range(len(fits))):
         with (
-            page.folded(f"{fit.event.record.name}, {ROLES[fit.role]}")
+            page.fold_blocks(f"{fit.event.record.name}, {ROLES[fit.role]}")
             if k >= MOST_OPEN_EVENTS
             else nullcontext()
         ):
@@ -285,13 +285,13 @@ def parameters(fit: "Identification") -> Table:
         fit.model.model.title,
         caption,
         words=(1, 3, 7),
-        detail=(1, 5) if fit.astray else (1, 5, 6),
+        detail=(1, 5) if fit.outside_interval else (1, 5, 6),
     )
 
 
 def tabulate_search_end(fit: "Identification") -> Table:
     """Where the search ended beside the estimate, and a word where they differ."""
-    search, result, away = fit.result.search, fit.result, fit.astray
+    search, result, away = fit.result.search, fit.result, fit.outside_interval
     keys = [("objective", "pu²"), ("epsilon_p", "1"), ("epsilon_q", "1")] if search else []
     rows = [[key, search[key], getattr(result, key), unit, ""] for key, unit in keys]
     rows += [
@@ -449,7 +449,7 @@ def _starts(page: Report, estimated: EstimationResult, uncertainty: Uncertainty)
         " the lowest are the"
         " estimate's valley. A difference of 3.8 is what a 95 % interval spans.",
     )
-    with page.folded("where each start ended"):
+    with page.fold_blocks("where each start ended"):
         page.table(
             ["from", "above the best", *uncertainty.names],
             [[s.origin, f"{s.above:.3g}", *map(digits, s.values)] for s in starts],
@@ -460,7 +460,7 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
     """Whitened residuals, their autocorrelation, and what the tests of them say."""
     likelihood, tests = uncertainty.of_noise, uncertainty.tests
     drive, events = likelihood.problem.drive, likelihood.problem.events
-    white = uncertainty.whitened.reshape(drive.channels, -1)
+    white = uncertainty.whitened_residual.reshape(drive.channels, -1)
     colored = [t for t in tests if t["p"] < REJECTED]
     page.text(_conclusion(colored, len(tests)))
     for e, event in enumerate(events[:MOST_OPEN_EVENTS]):
@@ -483,7 +483,7 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
         page.chart(
             lags, "Autocorrelation of the whitened residual; between the dashed lines is chance."
         )
-    with page.folded("tests of the residuals, and the noise"):
+    with page.fold_blocks("tests of the residuals, and the noise"):
         page.table(
             ["event", "channel", "test", "statistic", "p", "says"],
             [
@@ -578,7 +578,7 @@ def _origin(result: Any, command: str) -> list[list[str]]:
     rows += [
         [
             f"record {r['name']} ({r['role']})",
-            "; ".join(filter(None, [str(Identity.of(r)), f"SHA-256 {r['sha256']}"])),
+            "; ".join(filter(None, [str(Identity.from_content(r)), f"SHA-256 {r['sha256']}"])),
         ]
         for r in result.records
     ]

@@ -195,7 +195,7 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
         page.add(events(entry))
     else:
         page.text(as_sentence(quiet(entry)))
-    with page.folded(f"Charts of {entry['name']}") if folded else nullcontext():
+    with page.fold_blocks(f"Charts of {entry['name']}") if folded else nullcontext():
         charts(page, view, shown)
 
 

@@ -55,7 +55,7 @@ def charts(page: Report, view: View, shown: Sight) -> None:
     elif shown.phasors and view.recording is not None:
         every, coarse = _every(view)
         page.chart(_of_waves(view, shown, every, coarse), CAPTION + _further(view))
-        with page.folded("Spectrum before anything happened"):
+        with page.fold_blocks("Spectrum before anything happened"):
             page.chart(
                 _spectrum(view.recording, shown),
                 f"{SPECTRUM_CYCLES} cycles, Hann window, of phase a.",
@@ -94,7 +94,7 @@ def add_unassigned_channels(page: Report, view: View) -> None:
                     PALETTE[k % len(PALETTE)],
                     panel,
                 )
-    with page.folded(f"The {count_noun(count, 'channel')} of no load"):
+    with page.fold_blocks(f"The {count_noun(count, 'channel')} of no load"):
         page.chart(
             chart.cursor(recording.segments[0].start), "Primary values, where the unit is known."
         )
@@ -220,7 +220,7 @@ def _waves(
     span: tuple[float, float] | None,
 ) -> None:
     assert shown.feeder is not None
-    waves = FeederWaves.of(
+    waves = FeederWaves.from_recording(
         recording, shown.feeder, segment if span is None else segment.between(*span)
     )
     rate, start = segment.rate, waves.segment.start
@@ -325,7 +325,7 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
     """Of the first voltage and the first current, before the first event."""
     assert shown.feeder is not None
     segment = recording.waveforms()[0]
-    whole = FeederWaves.of(recording, shown.feeder, segment)
+    whole = FeederWaves.from_recording(recording, shown.feeder, segment)
     length = min(round(SPECTRUM_CYCLES * segment.rate / recording.frequency), whole.shape[1])
     first = shown.events[0].what.start - segment.start if shown.events else np.inf
     quiet = int(np.clip(first * segment.rate, length, whole.shape[1]))
@@ -346,7 +346,7 @@ def _details(page: Report, view: View, shown: Sight) -> None:
     for event in shown.events[:DETAILED]:
         what = event.what
         span = (what.start - AROUND[0], min(what.end, what.start + LONGEST_SHOWN_EVENT) + AROUND[1])
-        with page.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
+        with page.fold_blocks(f"Every sample of the {what.kind} at {what.start:.3f} s"):
             page.chart(_of_waves(view, shown, span=span), "As above, not thinned.")
     if len(shown.events) > DETAILED:
         page.text(

@@ -30,7 +30,7 @@ def overlaid(page: Report, overlays: Sequence[Overlay]) -> Report:
         for overlay in group[:MOST_OPEN_OVERLAYS]:
             _add_overlay(page, overlay, role)
         if more := group[MOST_OPEN_OVERLAYS:]:
-            with page.folded(f"{len(more)} more events, {role}"):
+            with page.fold_blocks(f"{len(more)} more events, {role}"):
                 for overlay in more:
                     _add_overlay(page, overlay, role)
     return page
@@ -43,7 +43,7 @@ def _add_overlay(page: Report, overlay: Overlay, role: str) -> None:
         page.chart(chart(overlay), f"{describe(event)}.")
         return
     page.chart(currents(event, overlay), f"{describe(event.phasors)}.")
-    with page.folded("The same in phasors: P and Q"):
+    with page.fold_blocks("The same in phasors: P and Q"):
         page.chart(in_phasors(event, overlay), IN_PHASORS)
 
 

@@ -103,7 +103,7 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
         " or the record cannot tell it."
     )
     page.charts(others)
-    with page.folded("The same in numbers"):
+    with page.fold_blocks("The same in numbers"):
         page.add(*(scan(content, label) for label in planned.scans))
     _events(page, planned)
     page.heading("What it rests on").items(

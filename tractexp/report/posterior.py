@@ -44,7 +44,7 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
     page.verdict(
         *sentences,
         _describe_chain_length(drawn),
-        kind="good" if uncertainty.exact and drawn.converged else "plain",
+        kind="good" if uncertainty.exact and drawn.has_converged else "plain",
     )
     page.charts([_chart(uncertainty, drawn, j) for j in range(len(drawn.names))])
     page.text(CAPTION)
@@ -91,7 +91,9 @@ def _agreement(uncertainty: Uncertainty, drawn: PosteriorSample) -> str:
 def _describe_chain_length(drawn: PosteriorSample) -> str:
     """Whether the chain is long enough, in a sentence."""
     lasts = f"The chain lasts {drawn.steps / drawn.autocorrelation:.0f} autocorrelation times"
-    return f"{lasts}." if drawn.converged else f"{lasts}; {ENOUGH:.0f} are asked for: raise steps."
+    return (
+        f"{lasts}." if drawn.has_converged else f"{lasts}; {ENOUGH:.0f} are asked for: raise steps."
+    )
 
 
 def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:

@@ -26,8 +26,8 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
     """
     criteria, evidence = findings.context.criteria, findings.evidence
     best = [evidence.term] if evidence.term else []
-    every = sorted((*evidence.every, *best), key=lambda row: row.predicted.left)
-    every = [row for row in every if np.isfinite(row.predicted.error)]
+    every = sorted((*evidence.every, *best), key=lambda row: row.held_out_prediction.excess)
+    every = [row for row in every if np.isfinite(row.held_out_prediction.error)]
     always = (evidence.base, *findings.verdict.kept, *best)
     rows = [row for k, row in enumerate(every) if k < MOST_SHOWN_SETS or row in always]
     page.heading("Candidates by what they predict")
@@ -49,8 +49,12 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
         [
             [
                 _label(findings, row),
-                in_percent(row.predicted.error),
-                _number(np.sqrt(evidence.base.predicted.left / row.predicted.left)),
+                in_percent(row.held_out_prediction.error),
+                _number(
+                    np.sqrt(
+                        evidence.base.held_out_prediction.excess / row.held_out_prediction.excess
+                    )
+                ),
                 _status(findings, row),
                 "; ".join(map(str, _sizes(findings, row))),
             ]
@@ -75,8 +79,8 @@ def _describe_stalls(findings: Findings) -> list[str]:
     """In which sets the motor stalls on held-out events: they are behind all others."""
     labels: dict[tuple[str, ...], list[str]] = {}
     for row in findings.evidence.every:
-        if row.predicted.stalls:
-            labels.setdefault(row.predicted.stalls, []).append(_label(findings, row))
+        if row.held_out_prediction.stalls:
+            labels.setdefault(row.held_out_prediction.stalls, []).append(_label(findings, row))
     return [
         f"On {join_words(events)} the motor stalls in this model with {join_words(names)}: behind"
         " all sets that survive."
@@ -91,7 +95,7 @@ def _label(findings: Findings, row: SetEvidence) -> str:
 
 
 def _bars(findings: Findings, rows: Sequence[SetEvidence]) -> Chart:
-    errors = [100 * row.predicted.error for row in rows]
+    errors = [100 * row.held_out_prediction.error for row in rows]
     chart = Chart("model error, held out [%]", [""], pixels=130 + BAR * len(rows))
     labels, colors = (
         [_label(findings, row) for row in rows],

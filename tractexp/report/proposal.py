@@ -53,7 +53,7 @@ def add_proposal_section(page: Report, findings: Findings) -> None:
         f"python -m tractexp {findings.context.domain.setting}'model.effects=[proposed_effect]' ..."
     )
     page.code(f"cp {PLUGIN} <your package>/effects/ && {command}")
-    with page.folded("The plugin file"):
+    with page.fold_blocks("The plugin file"):
         page.code(proposal.source)
     _add_tried_terms(page, findings.proposed.tried)
 
@@ -93,7 +93,11 @@ def _numbers(page: Report, proposal: Proposal) -> None:
 
 def _add_explanation(page: Report, proposal: Proposal) -> None:
     rows = [
-        [role, *(tell_error(vars(c.error)) for c in (g.before, g.after)), percent(g.explained)]
+        [
+            role,
+            *(tell_error(vars(c.error)) for c in (g.before, g.after)),
+            percent(g.explained_share),
+        ]
         for role, g in (("fitted", proposal.train), ("held out", proposal.validate))
     ]
     page.table(
@@ -125,7 +129,7 @@ def _plot_missed_part(judged: GapTest, e: int) -> Chart:
     event = bench.events[e]
     part = bench.drive.part(e)
     base = judged.before.calculated[:, part]
-    missed = np.where(bench.valid[:, part], bench.drive.measured[:, part] - base, np.nan)
+    missed = np.where(bench.valid[:, part], bench.drive.measurements[:, part] - base, np.nan)
     more = judged.after.calculated[:, part] - base
     t = event.record.t[event.record.samples - base.shape[1] :]
     # a delta winding has no zero sequence
@@ -159,7 +163,7 @@ def _add_tried_terms(page: Report, tried: Sequence[tuple[Term, TermAssessment]])
     """The best of the library as held-out events judged them."""
     if not tried:
         return
-    with page.folded("The best terms of the library, judged"):
+    with page.fold_blocks("The best terms of the library, judged"):
         page.table(
             [
                 "term",
@@ -172,7 +176,7 @@ def _add_tried_terms(page: Report, tried: Sequence[tuple[Term, TermAssessment]])
             [
                 [
                     t.words,
-                    *(percent(g.explained) for g in gaps),
+                    *(percent(g.explained_share) for g in gaps),
                     *(f"{g.after.chi2_per_sample:.2f}" for g in gaps),
                     in_words(w.p),
                 ]

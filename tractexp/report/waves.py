@@ -118,7 +118,7 @@ def _noise_bands(chart: Chart, event: WaveEvent, deviation: np.ndarray, around: 
     about zero.
     """
     t = event.record.t[event.lead :]
-    compared = np.array(event.compared)[:, None]
+    compared = np.array(event.compared_channels)[:, None]
     half = (
         BAND_DEVIATIONS
         * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * compared) ** 2)[:, event.lead :]
@@ -170,7 +170,7 @@ def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]
     Unweighted, the squares of all of it add up to the residual's energy, a decay at its beginning
     included.
     """
-    compared = np.array(event.compared)[:, None]
+    compared = np.array(event.compared_channels)[:, None]
     residual = event.of_phases((np.nan_to_num(event.currents) - currents) * compared)
     cycle = event.rate / event.f0
     after = min(AFTER * event.rate, residual.shape[1] - event.start)
@@ -241,7 +241,7 @@ def _describe_event_preparation(fit: Fit) -> str:
     zero = (
         ""
         if event.phases == 1
-        else " Zero sequence is " + ("" if event.compared[2] else "not ") + "compared."
+        else " Zero sequence is " + ("" if event.compared_channels[2] else "not ") + "compared."
     )
     return (
         f"{event.record.name}: {event.f0:.3f} Hz, {cycles:.1f} cycles before the dip; offsets of up"

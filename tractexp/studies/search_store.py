@@ -49,7 +49,7 @@ class SearchStore:
             )
         return None
 
-    def put(self, settings: Mapping[str, Any], seed: int, result: SearchResult) -> None:
+    def store_result(self, settings: Mapping[str, Any], seed: int, result: SearchResult) -> None:
         ending = {k: v for k, v in vars(result).items() if k not in ("values", "history")}
         arrays = {name: getattr(result.history, name) for name in ARRAYS}
         key = self._key(settings, seed)

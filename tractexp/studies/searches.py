@@ -108,7 +108,7 @@ def attempt(
         ):
             results[chunk.label][seed] = one
             if isinstance(one, SearchResult):
-                stored.put(variants[chunk.label], seed, one)
+                stored.store_result(variants[chunk.label], seed, one)
         done += len(chunk.seeds)
         tell(done, total)
     return {label: [several[seed] for seed in seeds] for label, several in results.items()}

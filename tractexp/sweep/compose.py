@@ -54,7 +54,7 @@ class Composer:
         """The job whole, where its folder's name or somebody's callback may ask for
         any part of it.
         """
-        whole = self._composed(overrides)
+        whole = self._compose_config(overrides)
         _number(whole, number)
         subdir = "" if self._subdir == BY_NUMBER else str(whole.hydra.sweep.subdir)
         hydra = whole if self._reads_hydra else None
@@ -69,10 +69,10 @@ class Composer:
         return not (added or self._is_group(override.key_or_group) or override.is_hydra_override())
 
     def _composed_base(self, overrides: tuple[str, ...]) -> tuple[DictConfig, DictConfig]:
-        whole = self._composed(overrides)
+        whole = self._compose_config(overrides)
         return whole, _without_hydra(whole)
 
-    def _composed(self, overrides: Iterable[str]) -> DictConfig:
+    def _compose_config(self, overrides: Iterable[str]) -> DictConfig:
         return self.loader.load_sweep_config(self.master, list(overrides))
 
 

@@ -60,7 +60,9 @@ class SweepJob:
     events: Any = None  # its records (`Events`), for a worker that cannot read them
 
     @classmethod
-    def of(cls, composed: Composed, overrides: Sequence[str], folder: Path = Path()) -> "SweepJob":
+    def from_composed(
+        cls, composed: Composed, overrides: Sequence[str], folder: Path = Path()
+    ) -> "SweepJob":
         """A job as it was composed; Hydra's own choices are left out. Raises `UserError` for
         passwords.
         """
@@ -112,7 +114,7 @@ class SweepJob:
         """The metrics that it gives back."""
         return self.config.get("sweep", {}).get("returns")
 
-    def returned(self, end: Status) -> float | list[float] | None:
+    def select_returned(self, end: Status) -> float | list[float] | None:
         """What it gives back, having ended so."""
         return (
             select_returned_metrics(end.metrics, self.returns) if end.status == FINISHED else None
@@ -196,7 +198,7 @@ def run_job(config: Any) -> float | list[float] | None:
     plain: Any = OmegaConf.to_container(config, resolve=True)
     overrides: Any = OmegaConf.to_container(hydra.overrides.task)
     composed = Composed(plain, dict(hydra.runtime.choices), str(hydra.sweep.subdir))
-    job = SweepJob.of(composed, overrides, Path(hydra.runtime.output_dir))
+    job = SweepJob.from_composed(composed, overrides, Path(hydra.runtime.output_dir))
     there = status.read(job.folder)
     if there is not None and there.configuration != job.configuration:
         raise UserError(
@@ -205,7 +207,7 @@ def run_job(config: Any) -> float | list[float] | None:
     end = work(job, logs=True)
     if end.status == FAILED and not str(hydra.sweeper.get("_target_")).startswith(NAMESPACE):
         raise UserError(f"job {job.name}: {end.message}")
-    return job.returned(end)
+    return job.select_returned(end)
 
 
 def _run(job: SweepJob, place: RunFolder, measured: dict[str, float], logs: bool) -> str:

@@ -83,7 +83,9 @@ class Cores(Launcher):
         compose = Composer(self.hydra_context.config_loader, self.config)
         folder = Path(self.config.hydra.sweep.dir).absolute()
         numbered = enumerate(job_overrides, start=initial_job_idx)
-        jobs = place([SweepJob.of(compose(texts, k), texts) for k, texts in numbered], folder)
+        jobs = place(
+            [SweepJob.from_composed(compose(texts, k), texts) for k, texts in numbered], folder
+        )
         self.launched |= {job.folder: job for job in jobs}
         asked: Any = OmegaConf.to_container(self.config.hydra.overrides.task)
         of_batch = {job.folder: job for job in jobs}.values()
@@ -124,7 +126,7 @@ class Cores(Launcher):
         try:
             with progress(jobs) as note, contextlib.closing(results):
                 for job, end in results:
-                    ends[job.folder] = end or self._killed(job)
+                    ends[job.folder] = end or self._record_kill(job)
                     note(job, ends[job.folder])
                     recorder.log(job.folder)
                     waiting.discard(job.folder)
@@ -150,7 +152,7 @@ class Cores(Launcher):
             for job, delivery in results:
                 yield job, delivery and unpack_job(job, delivery)
 
-    def _killed(self, job: SweepJob) -> Status:
+    def _record_kill(self, job: SweepJob) -> Status:
         """The end of a job that killed its worker each time."""
         message = (
             f"its worker was killed each of the {self.tries} times it was run; is there enough"
@@ -211,7 +213,9 @@ class Ended(JobReturn):
 def _build_job_return(job: SweepJob, end: Status | None) -> JobReturn:
     """How a job ended, in Hydra's terms."""
     if end is not None and end.status != FAILED:
-        return Ended(job.overrides, status=JobStatus.COMPLETED, _return_value=job.returned(end))
+        return Ended(
+            job.overrides, status=JobStatus.COMPLETED, _return_value=job.select_returned(end)
+        )
     why = end.message if end else "its worker was killed or never started"
     return Ended(
         job.overrides, status=JobStatus.FAILED, _return_value=UserError(f"job {job.name}: {why}")

@@ -95,7 +95,7 @@ class LivePage:
         )
         failed = f", {len(failures)} failed" if failures else ""
         page.verdict(
-            f"{len(self.ends)} of {len(self.jobs)} jobs{failed}; {ended or self.pace.left}",
+            f"{len(self.ends)} of {len(self.jobs)} jobs{failed}; {ended or self.pace.time_left}",
             kind="bad" if failures else "plain",
         )
         if (self.folder / LEADS_TO).is_file():

@@ -84,7 +84,7 @@ def _close_parent_run(folder: Path, run: Any, run_id: str | None, uri: str) -> N
         entry = save(folder, run, uri, sweep=True)
         if run_id is not None:
             tracking.finish_parent(run_id, uri, run.status, run.metrics)
-            entry.logged(run_id)
+            entry.mark_logged(run_id)
     except UserError as error:
         say(f"not logged: {error}")
 

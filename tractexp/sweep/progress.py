@@ -35,11 +35,11 @@ class Tally:
         if value is not None:
             self.best[variant] = min(value, self.best.get(variant, value))
 
-    def ranked(self) -> list[tuple[str, float]]:
+    def rank_variants(self) -> list[tuple[str, float]]:
         return sorted(self.best.items(), key=lambda item: item[1])
 
     @property
-    def left(self) -> str:
+    def time_left(self) -> str:
         """The time left, by the pace since the first end: before it, the workers were starting."""
         if self.done < 2:
             return "time left not known yet"
@@ -53,9 +53,9 @@ class Tally:
         if self.best:
             parts.append(
                 "best objectives "
-                + ", ".join(f"{n} {f:.4g}" for n, f in self.ranked()[:MOST_NAMED_VARIANTS])
+                + ", ".join(f"{n} {f:.4g}" for n, f in self.rank_variants()[:MOST_NAMED_VARIANTS])
             )
-        return f"  {', '.join(parts)}; {self.left}"
+        return f"  {', '.join(parts)}; {self.time_left}"
 
 
 @contextmanager
@@ -94,16 +94,16 @@ def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
     bar = Progress(*columns, console=console())
     line = bar.add_task("", total=tally.total, note="")
 
-    def shown() -> Any:
+    def render_progress() -> Any:
         return Group(bar, _table(tally))
 
-    with Live(shown(), console=console(), transient=True, refresh_per_second=4) as live:
+    with Live(render_progress(), console=console(), transient=True, refresh_per_second=4) as live:
 
         def note(job: SweepJob, end: Status) -> None:
             tally.add(job, end)
             failed = f"{tally.failed} failed, " if tally.failed else ""
-            bar.update(line, completed=tally.done, note=f"{failed}{tally.left};")
-            live.update(shown())
+            bar.update(line, completed=tally.done, note=f"{failed}{tally.time_left};")
+            live.update(render_progress())
 
         yield note
 
@@ -114,6 +114,6 @@ def _table(tally: Tally) -> Any:
     from rich.text import Text
 
     grid = Table.grid(padding=(0, 2))
-    for name, value in tally.ranked():
+    for name, value in tally.rank_variants():
         grid.add_row(Text(f"  {name}"), f"best {value:.4e}", f"{tally.jobs[name]} jobs")
     return grid

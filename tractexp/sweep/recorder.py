@@ -36,7 +36,7 @@ class Recorder:
         try:
             entry = runfile.read(folder)
             if entry is not None and not entry.run_id:
-                entry.logged(log(replace(entry.run, parent=parent), entry.uri))
+                entry.mark_logged(log(replace(entry.run, parent=parent), entry.uri))
         except UserError as error:
             self.refused = True
             say(f"not logged yet: {error}")

@@ -54,7 +54,7 @@ def _as_hydra_returns(job: "SweepJob", config: Any, end: Status) -> Any:
 
     failed = end.status == FAILED
     status = JobStatus.FAILED if failed else JobStatus.COMPLETED
-    value: Any = RuntimeError(end.message) if failed else job.returned(end)
+    value: Any = RuntimeError(end.message) if failed else job.select_returned(end)
     outcome = JobReturn(
         list(job.overrides), config, config, os.getcwd(), config.hydra.job.name, status
     )

@@ -82,7 +82,7 @@ class Grid(Sweeper):
         arguments = [*(f"{key}={values}" for key, values in self.params.items()), *arguments]
         folder = Path(self.config.hydra.sweep.dir).absolute()
         comparison = self._comparison(folder)  # refused before the jobs, not after
-        composed = self._composed(arguments)
+        composed = self._compose_jobs(arguments)
         with hold(folder):  # of two processes with one command, the second ends
             jobs = place(composed, folder)
             self._perform(jobs, folder, arguments)
@@ -108,7 +108,7 @@ class Grid(Sweeper):
             ):
                 self._run(remaining, recorder)
 
-    def _composed(self, arguments: list[str]) -> list[SweepJob]:
+    def _compose_jobs(self, arguments: list[str]) -> list[SweepJob]:
         """The jobs of the sweep, composed and without duplicates, not yet placed."""
         compose = Composer(self.loader, self.config)
         parsed = OverridesParser.create(self.loader).parse_overrides(arguments)
@@ -116,7 +116,7 @@ class Grid(Sweeper):
         jobs: dict[str, SweepJob] = {}
         for number, combination in enumerate(itertools.product(*choices.values())):
             overrides = [f"{key}={value}" for key, value in zip(choices, combination, strict=True)]
-            job = SweepJob.of(compose(overrides, number), overrides)
+            job = SweepJob.from_composed(compose(overrides, number), overrides)
             refuse_unread(get("task", job.config["task"]["name"]), job.given)
             jobs.setdefault(job.configuration, job)
         return [replace(job, alone=len(jobs) == 1) for job in jobs.values()]
@@ -133,18 +133,18 @@ class Grid(Sweeper):
             summary(jobs)
             for page in sorted(jobs[0].folder.glob("*.html")) if jobs[0].alone else ():
                 say(f"  {page}")
-                self._opened(page)
+                self._open_page(page)
         else:
             folder = jobs[0].sweep
             say()
             comparison.run(Job(jobs[0].config, jobs[0].choices, folder))
             if self.page is not None:
                 self.page.write("ended")  # and leads to the comparison
-            self._opened(folder / "comparison.html")
+            self._open_page(folder / "comparison.html")
         if failed := failures(jobs):
             raise UserError(failed)
 
-    def _opened(self, page: Path) -> None:
+    def _open_page(self, page: Path) -> None:
         """Show a page where that is wanted."""
         if self.open:
             show(page)

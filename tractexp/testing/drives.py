@@ -51,7 +51,9 @@ def drive(*depths: float, domain: str = "", power: float = 1.0) -> Drive:
     before each.
     """
     shape = wave_dip if domain == WAVES else dip
-    return Drive.of([replace(one, P0=power * P0, Q0=power * Q0) for one in map(shape, depths)])
+    return Drive.from_events(
+        [replace(one, P0=power * P0, Q0=power * Q0) for one in map(shape, depths)]
+    )
 
 
 def _waves(v: np.ndarray, v_zero: np.ndarray, theta: np.ndarray, rate: float) -> WaveformDrive:

@@ -192,7 +192,7 @@ def rests(cls: type[Part]) -> None:
     near = np.random.default_rng(1).uniform(0.95, 1.05, (10, len(chosen))) * chosen
     low, high = np.array([p.bounds for p in of.parameters], dtype=float).reshape(-1, 2).T
     flat = drives.wave_flat() if of.waves else drives.flat()
-    power = play(of, Drive.of([flat]), np.clip(near, low, high))
+    power = play(of, Drive.from_events([flat]), np.clip(near, low, high))
     assert np.isfinite(power).all(), f"{of.title} diverges under a steady voltage"
     off = np.abs(power - power[:, :, :1]).max()
     assert off < LARGEST_STEADY_DRIFT, f"{of.title} moves by {off:.2g} pu under a steady voltage"
@@ -260,7 +260,7 @@ def converges_in_order_four(cls: type[Part]) -> None:
     if eq.memories or not eq.states or any(e.has(sympy.Max, sympy.Min) for e in written):
         return  # a corner costs the order
     smooth = drives.wave_dip(0.3, edge=0.01) if of.waves else drives.dip(0.3, step=10e-3, edge=0.04)
-    drive, chosen = Drive.of([smooth]), values(of, choose_active_size)
+    drive, chosen = Drive.from_events([smooth]), values(of, choose_active_size)
     fine = play(of, drive, chosen, 4 * COUNTS[-1])
     errors = np.array([np.abs(play(of, drive, chosen, n) - fine).max() for n in COUNTS])
     used = (errors > ASYMPTOTIC[0]) & (errors < ASYMPTOTIC[1])

@@ -34,7 +34,11 @@ def writes_a_record_that_is_read_again(cls: type[Writer]) -> None:
         reader = reader_of(str(files[0]))
         if issubclass(reader, WaveformReader):
             return  # a format of waveforms, which holds U, P, Q as channels
-        (again,) = build("data", {"name": reader.name, **reader.of(str(files[0]))}).read().train
+        (again,) = (
+            build("data", {"name": reader.name, **reader.build_settings(str(files[0]))})
+            .read()
+            .train
+        )
         # a format that does not keep the base is read on that of the power before the dip
         ratio = {"U": 1.0, "P": 1.0, "Q": 1.0}
         if again.base is not None and again.base != RECORD.base:
@@ -66,7 +70,9 @@ def writes_a_recording_that_is_read_again(cls: type[Writer]) -> None:
         assert issubclass(reader, WaveformReader), (
             f"'{cls.name}' writes a recording that '{reader.name}' takes for a table"
         )
-        again = build("data", {"name": reader.name, **reader.of(str(files[0]))}).recording()
+        again = build(
+            "data", {"name": reader.name, **reader.build_settings(str(files[0]))}
+        ).recording()
         for one, other in zip(whole.channels, again.channels, strict=True):
             assert one.name == other.name, (
                 f"'{cls.name}' writes channel {one.name}, which is read as {other.name}"

@@ -79,7 +79,7 @@ class RunFile:
         )
         return self
 
-    def logged(self, run_id: str, uri: str | None = None) -> "RunFile":
+    def mark_logged(self, run_id: str, uri: str | None = None) -> "RunFile":
         """Note that it is in the store."""
         return replace(self, run_id=run_id, uri=uri or self.uri).write()
 

@@ -151,7 +151,7 @@ def _sent(one: RunFile, uri: str) -> str:
     if run_there is not None and run_there.info.status == one.run.status:
         _below(client, uri, run_there, one.run.parent)
         return THERE
-    one.logged(log(one.run, uri, again=True), uri)
+    one.mark_logged(log(one.run, uri, again=True), uri)
     return BROUGHT
 
 
@@ -179,7 +179,7 @@ def _sweep(one: RunFile, run_there: Any, uri: str) -> str:
         if (path := one.folder / name).is_file() and files.inside(path, one.folder)
     ]
     finish_parent(run_id, uri, one.run.status, one.run.metrics, pages)
-    one.logged(run_id, uri)
+    one.mark_logged(run_id, uri)
     sweep_file = one.folder / FILE
     files.write_json(
         sweep_file,

@@ -86,7 +86,7 @@ class NextEvent:
         ]
         if sentences and len(self.rivals) == 2:
             return sentences[0]
-        return "; ".join([self._recommended(), *sentences])
+        return "; ".join([self._recommend_event(), *sentences])
 
     def to_dict(self) -> dict[str, Any]:
         """As `discrepancy.json` and `plan.json` have it."""
@@ -124,7 +124,7 @@ class NextEvent:
             "repeated": tried.repeated,
         }
 
-    def _recommended(self) -> str:
+    def _recommend_event(self) -> str:
         first, *others = self.rivals
         them = (
             f"{first} from {others[0]}" if len(others) == 1 else f"these {len(self.rivals)} apart"
@@ -178,7 +178,9 @@ def next_event(
             strict=True,
         ):
             events.append(event)
-            denied.append(np.stack([separation.denied(views, truth) for truth in truths]))
+            denied.append(
+                np.stack([separation.find_denied_rivals(views, truth) for truth in truths])
+            )
     most = np.max([d.mean(axis=2) for d in denied], axis=0)  # (a, a)
     apart = [
         (a, b, float(min(most[a, b], most[b, a])))
@@ -189,7 +191,9 @@ def next_event(
     if len(open_pairs) < len(apart):  # what can be told apart shall be
         for a, b, _ in open_pairs:
             ignored[a, b] = ignored[b, a] = True
-    tried = [EventTrial(e, Chances.of(d, ignored)) for e, d in zip(events, denied, strict=True)]
+    tried = [
+        EventTrial(e, Chances.from_draws(d, ignored)) for e, d in zip(events, denied, strict=True)
+    ]
     best = _choose_mildest_event(context, noise, sides, tried, ignored, seed, error)
     pairs = [(a, b, same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
@@ -261,14 +265,16 @@ def _compute_refitted_chances(
         views = [seen(context, noise, side, [event], error)[0] for side in there]
         places.append((Separation(there, context.criteria, seed=seed), views))
 
-    def again(times: int) -> EventTrial:
-        denied = np.stack([s.denied(views, a, times) for a, (s, views) in enumerate(places, 1)])
-        return EventTrial(event, Chances.of(denied, ignored), refitted=plain)
+    def repeat_event(times: int) -> EventTrial:
+        denied = np.stack(
+            [s.find_denied_rivals(views, a, times) for a, (s, views) in enumerate(places, 1)]
+        )
+        return EventTrial(event, Chances.from_draws(denied, ignored), refitted=plain)
 
-    once = again(1)
+    once = repeat_event(1)
     if once.chances.least >= DECIDED:
         return once
-    enough = (n for n in REPEATED if again(n).chances.least >= DECIDED)
+    enough = (n for n in REPEATED if repeat_event(n).chances.least >= DECIDED)
     return replace(once, repeated=next(enough, None))
 
 
@@ -279,12 +285,16 @@ def _fitted_to(
     at = context.coordinates
     middle = at.without_faults(truth.fit.unit, ())
     power = context.kernels.simulate(
-        truth.fit.names, middle[None], Drive.of([driven(context, event)])
+        truth.fit.names, middle[None], Drive.from_events([driven(context, event)])
     )[0]
-    whole = context.on(Records.of((*context.records.recorded, as_recorded(context, event, power))))
-    wide = [whole.coordinates.widened(side.fit.unit) for side in sides]
-    input_modes = None if noise.input_modes is None else QuietNoise.at(whole, wide[0]).input_modes
-    both = noise.on(whole.problem.power, input_modes)
+    whole = context.move_to_records(
+        Records.from_events((*context.records.recorded, as_recorded(context, event, power)))
+    )
+    wide = [whole.coordinates.widen_coordinates(side.fit.unit) for side in sides]
+    input_modes = (
+        None if noise.input_modes is None else QuietNoise.from_context(whole, wide[0]).input_modes
+    )
+    both = noise.apply_to_events(whole.problem.power, input_modes)
     fits_by_name = {
         f.names: f
         for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])

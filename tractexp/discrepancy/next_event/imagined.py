@@ -137,7 +137,7 @@ def noise_of(noise: Noise, drive: Drive, rate: int, step: float) -> Noise:
     """
     if rate == 1:
         steady = np.repeat(drive.before.T, np.diff(drive.first), axis=1)
-        return noise.on(Load.of(steady, drive.before, drive.first))
+        return noise.apply_to_events(Load.from_powers(steady, drive.before, drive.first))
     memory = noise.memory(step)
     a = float(np.exp(-step / rate / memory)) if memory > 0 else 0.0
     color, shock = np.array([[0.0], [a]]), float(np.sqrt(1 - a * a))

@@ -53,8 +53,8 @@ def event_for(
     missing = catalogue(model, events, named)
     _check(missing, named)
     with Effort(tell).audible() as effort:
-        context = Context.of(
-            model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps
+        context = Context.from_records(
+            model, missing, Records.from_events(events), bounds, fixed, criteria, effort, substeps
         )
         base = base_fit(context)
         effort.say(f"fitting {len(sets)} explanations")
@@ -101,7 +101,7 @@ def _starts(context: Context, unit: np.ndarray, names: Names) -> list[Start]:
         candidate = context.catalogue[name]
         for setting in candidate.settings:
             for sign in (1, -1):
-                point = at.placed(unit, setting)
+                point = at.place_values(unit, setting)
                 for p in context.catalogue.sizes(names):
                     step = candidate.relevant(p) * (candidate.sign(p) or sign)
                     point[at.column[p.name]] = np.clip(

@@ -57,7 +57,7 @@ def same(context: Context, one: Refit, other: Refit) -> Same | None:
         ImaginedDip(*shape)
         for shape in itertools.product(RICH, context.domain.dips.durations[::2], TURNED)
     ]
-    drive = Drive.of([driven(context, event) for event in events])
+    drive = Drive.from_events([driven(context, event) for event in events])
     pairs = []
     for truth, rival in ((one, other), (other, one)):
         for size in (1.0, 0.5):
@@ -92,7 +92,7 @@ def _follow_truth(
     columns = _of_load(context, rival.names)
     start = _shrunk(context, rival, 1.0)
 
-    def drawn(points: np.ndarray, whose: Sequence[str]) -> np.ndarray:
+    def simulate_points(points: np.ndarray, whose: Sequence[str]) -> np.ndarray:
         outputs = context.kernels.simulate(whose, points, drive)
         context.effort.spend(len(points))
         return np.nan_to_num(outputs[:, valid])
@@ -102,17 +102,17 @@ def _follow_truth(
         unit[columns] = x
         return unit
 
-    def moved(unit: np.ndarray, whose: Sequence[str], inside: Sequence[int]) -> np.ndarray:
+    def compute_slopes(unit: np.ndarray, whose: Sequence[str], inside: Sequence[int]) -> np.ndarray:
         points, width = two_sided(unit, inside)
-        return slopes(drawn(points, whose), width)
+        return slopes(simulate_points(points, whose), width)
 
     def nearest(x: np.ndarray, rows: np.ndarray):
         from scipy.optimize import least_squares
 
         return least_squares(
-            lambda x: (drawn(whole(x)[None], rival.names)[0] - truth)[rows],
+            lambda x: (simulate_points(whole(x)[None], rival.names)[0] - truth)[rows],
             np.clip(x, 1e-3, 1 - 1e-3),
-            lambda x: moved(whole(x), rival.names, columns)[:, rows].T,  # pyright: ignore[reportArgumentType]
+            lambda x: compute_slopes(whole(x), rival.names, columns)[:, rows].T,  # pyright: ignore[reportArgumentType]
             bounds=(0.0, 1.0),
             xtol=1e-14,
             ftol=DONE,
@@ -131,8 +131,8 @@ def _follow_truth(
         if off > LARGEST_FOLLOWED_DISTANCE:
             return None
     own = (
-        moved(point, names, _of_load(context, names)),
-        moved(whole(nearest_point), rival.names, columns),
+        compute_slopes(point, names, _of_load(context, names)),
+        compute_slopes(whole(nearest_point), rival.names, columns),
     )
     ranks = [_rank(rows) for rows in (*own, np.concatenate(own))]
     return (ranks[2], off) if len(set(ranks)) == 1 else None

@@ -80,7 +80,7 @@ class Chances:
     pairs: np.ndarray
 
     @classmethod
-    def of(cls, denied: np.ndarray, ignored: np.ndarray) -> "Chances":
+    def from_draws(cls, denied: np.ndarray, ignored: np.ndarray) -> "Chances":
         """Of draws (a, a, b) that deny rivals, by the truth; pairs that are `ignored` (a, a) need
         not be told apart.
         """
@@ -98,7 +98,7 @@ def linearize_side(context: Context, noise: Noise, fit: Refit) -> Side:
     own = [k for k in at.parameters(fit.names) if k not in faults]
     columns = [*at.base, *faults, *own, *at.before]
     _, rows = context.linearize(fit.unit, noise, columns, fit.names)
-    shared = context.drive.measured.size + len(faults)
+    shared = context.drive.measurements.size + len(faults)
     free = ~find_active_bounds(context, fit.unit, columns, rows[1:] @ rows[0])
     J = rows[1:, :shared] * free[:, None]
     box = np.where(np.isin(columns, faults), 0.0, BOX)
@@ -132,7 +132,7 @@ def seen(
         for channel in ("P0", "Q0")
         for sign in (1, -1)
     ]
-    one, k = Drive.of(drives[:1]), len(inside)
+    one, k = Drive.from_events(drives[:1]), len(inside)
     missed = [0.0] * len(events)
     if error:
         still = replace(events[0], depth=0.0, jump=0.0, unbalance=0.0)
@@ -156,7 +156,7 @@ def _simulate_drives(
     context: Context, names: Sequence[str], points: np.ndarray, drives: Sequence
 ) -> np.ndarray:
     """What is compared (E, n, C, N) of drives of equal length."""
-    power = context.kernels.simulate(names, points, Drive.of(drives))
+    power = context.kernels.simulate(names, points, Drive.from_events(drives))
     context.effort.spend(len(points))
     return np.moveaxis(power.reshape(len(points), power.shape[1], len(drives), -1), 2, 0)
 
@@ -179,7 +179,9 @@ class Separation:
         self.r, self.J = [x[0] for x in rows], [x[1:] for x in rows]
         self.precision = [x.precision for x in sides]
 
-    def denied(self, seen: Sequence[EventView], truth: int, times: int = 1) -> np.ndarray:
+    def find_denied_rivals(
+        self, seen: Sequence[EventView], truth: int, times: int = 1
+    ) -> np.ndarray:
         """Which rivals (a, b) each of b draws denies by one new event, or `times` its like, with
         `truth` the truth.
 

@@ -69,7 +69,7 @@ def context_of_terms(original: Context) -> Context:
         Candidate(kind, effect, (), ({},)) for kind, effect in ((k, Library(k)) for k in KINDS)
     )
     kernels = original.kernels
-    return Context.of(
+    return Context.from_records(
         original.load,
         Catalogue((*faults, *whole), {}),
         original.records,

@@ -22,7 +22,7 @@ def best_terms(context: Context, bare: Refit, noise: Noise) -> tuple[Context, Se
     """
     context.effort.say("looking for a term of the library that predicts better")
     under = context_of_terms(context).with_measured_power.held_to_usual
-    ground = Ground.at(under, carried_over(under, context, bare.unit), noise)
+    ground = Ground.from_coordinates(under, carried_over(under, context, bare.unit), noise)
     result = term_fits(screen(ground, terms(), seed=0, draws=0), [])
     there, at = result.context, result.context.coordinates
     chosen = [

@@ -46,10 +46,10 @@ class TermAssessment:
         gap = self.validate
         least = share_gone(criteria.ahead)
         little = (
-            f"it explains {gap.explained:.0%} of what exceeds the noise on the held-out events,"
-            f" less than {least:.0%}"
+            f"it explains {gap.explained_share:.0%} of what exceeds the noise on the held-out"
+            f" events, less than {least:.0%}"
         )
-        enough = gap.explained >= least
+        enough = gap.explained_share >= least
         rows = {
             (little if gap.gain > 0 else "it makes the held-out events worse"): not enough,
             "the held-out events are too mild to show it": enough and not gap.is_shown,
@@ -78,7 +78,7 @@ def term_assessments(
         fits,
         [fit.unit for fit in fits],
     )
-    there = original.on(Records.of(events, original.records.window))
+    there = original.move_to_records(Records.from_events(events, original.records.window))
     validate = _assess_models(there, other, noise, [*other.coordinates.before], bare, fits, held)
     return [TermAssessment(*each) for each in zip(fits, train, validate, p, strict=False)]
 
@@ -104,14 +104,14 @@ def _assess_models(
     ]
     terms = context.whiten(noise, np.array(apart))
 
-    def assessed(fit: Refit, unit: np.ndarray) -> GapTest:
+    def assess_fit(fit: Refit, unit: np.ndarray) -> GapTest:
         perturbations = compute_pushed_changes(
             original, carried_over(original, context, unit), (), noise
         )
         changes = np.nan_to_num(np.concatenate([terms, perturbations]))
         return gap(context, bare, unit, fit.names, noise, fitted, changes=changes)
 
-    return [assessed(fit, unit) for fit, unit in zip(fits, units, strict=True)]
+    return [assess_fit(fit, unit) for fit, unit in zip(fits, units, strict=True)]
 
 
 def list_tied_terms(

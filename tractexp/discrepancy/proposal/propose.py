@@ -92,7 +92,7 @@ def propose(
             why="a term is proposed only where a held-out event confirms it, and none was held out"
         )
     under = context_of_terms(context)
-    ground = Ground.at(under, carried_over(under, context, bare.unit), noise)
+    ground = Ground.from_coordinates(under, carried_over(under, context, bare.unit), noise)
     context.effort.say("screening a library of terms")
     screened = screen(ground, among or terms(), seed, LIBRARY_DRAWS)
     context.effort.say("refitting the most promising terms")
@@ -133,7 +133,8 @@ def _proposal(
         p=chosen.p,
         acting=tuple(_find_acting_places(result, chosen.fit)),
         ties=tuple(
-            (result.term(o.fit), o.train.explained, o.validate.explained) for o in alternatives
+            (result.term(o.fit), o.train.explained_share, o.validate.explained_share)
+            for o in alternatives
         ),
         alike=tuple(alike(result, chosen.fit, first)),
         source=generate.source(term, values, records),
@@ -152,7 +153,7 @@ def _next_event(result: TermFits, fits: Sequence[Refit]) -> NextEvent | None:
 
 def change(result: TermFits, fit: Refit) -> np.ndarray:
     """What a term adds to what is calculated (C, N) [pu], all else as it was fitted with it."""
-    without = result.context.coordinates.placed(
+    without = result.context.coordinates.place_values(
         fit.unit, {label: 0.0 for _, label in sizes_of(result.term(fit))}
     )
     with_it, alone = result.context.residuals(np.array([fit.unit, without]), fit.names)
@@ -218,7 +219,7 @@ def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | Non
                 "parameters": {k.parameter.name: k.plain() for k in proposal.estimates},
             }
         ],
-        "explained": {role: gap.explained for role, gap in judged},
+        "explained": {role: gap.explained_share for role, gap in judged},
         "left": {role: gap.after.chi2_per_sample for role, gap in judged},
         "p": proposal.p,
         "when": [vars(a) for a in proposal.acting],

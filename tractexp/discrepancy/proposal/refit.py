@@ -221,7 +221,7 @@ def _fit_without_term(
     return (
         chosen,
         values,
-        Ground.at(
+        Ground.from_coordinates(
             context, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise
         ),
     )

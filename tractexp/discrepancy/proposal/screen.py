@@ -41,7 +41,7 @@ class Ground:
     r: np.ndarray  # (R,) the fit's residual, projected
 
     @classmethod
-    def at(cls, context: Context, unit: np.ndarray, noise: Noise) -> "Ground":
+    def from_coordinates(cls, context: Context, unit: np.ndarray, noise: Noise) -> "Ground":
         """At coordinates (D,). The base model's parameters give way though they rest on their
         bounds.
         """
@@ -63,7 +63,7 @@ class Ground:
         raw /= spans[:, None, None]
         return self.context.whiten(self.noise, np.nan_to_num(raw, copy=False))
 
-    def drawn(self, seed: int, draws: int) -> np.ndarray:
+    def draw_noise(self, seed: int, draws: int) -> np.ndarray:
         """Noise (draws, R), whitened and projected as the fit's residual is."""
         context = self.context
         white = self.noise.draw_white(
@@ -105,7 +105,7 @@ class ScreenResult:
 
 def screen(ground: Ground, terms: Sequence[Term], seed: int, draws: int) -> ScreenResult:
     """Score terms on their grids."""
-    noise = ground.drawn(seed, draws)
+    noise = ground.draw_noise(seed, draws)
     best = np.zeros(draws)
     scored = []
     for score, drops in _scores(ground, [(t, s) for t in terms for s in t.signal.settings], noise):

@@ -167,7 +167,7 @@ def field(eq):
     """The square of the internal voltage over that before the event, less 1."""
     from sympy import conjugate, re
 
-    E, E_0 = eq["E"], eq.before(eq["E"])
+    E, E_0 = eq["E"], eq.evaluate_before(eq["E"])
     return re(E * conjugate(E)) / re(E_0 * conjugate(E_0)) - 1
 
 
@@ -177,19 +177,21 @@ def field_knee(eq, level):
     """
     from sympy import conjugate, re
 
-    E, E_0 = eq["E"], eq.before(eq["E"])
+    E, E_0 = eq["E"], eq.evaluate_before(eq["E"])
     square = re(E * conjugate(E)) / re(E_0 * conjugate(E_0))
     return round_corner(square - level, 0.01) - round_corner(1 - level, 0.01)
 
 
 def slip(eq):
     """The slip, less that before the event."""
-    return (eq.omega_s - eq.omega - eq.before(eq.omega_s - eq.omega)) / eq.omega_n
+    return (eq.omega_s - eq.omega - eq.evaluate_before(eq.omega_s - eq.omega)) / eq.omega_n
 
 
 def slip_squared(eq):
     """The square of the slip, less that before the event."""
-    return ((eq.omega_s - eq.omega) ** 2 - eq.before(eq.omega_s - eq.omega) ** 2) / eq.omega_n**2
+    return (
+        (eq.omega_s - eq.omega) ** 2 - eq.evaluate_before(eq.omega_s - eq.omega) ** 2
+    ) / eq.omega_n**2
 
 
 def current(eq):
@@ -198,7 +200,7 @@ def current(eq):
     from sympy import conjugate, re
 
     I_d = eq.expand(eq["stator_current"])
-    I_0 = eq.before(I_d)
+    I_0 = eq.evaluate_before(I_d)
     return sympy.sqrt(re(I_d * conjugate(I_d)) / re(I_0 * conjugate(I_0)) + 1e-12) - 1
 
 
@@ -207,7 +209,7 @@ def current_squared(eq):
     from sympy import conjugate, re
 
     I_d = eq.expand(eq["stator_current"])
-    I_0 = eq.before(I_d)
+    I_0 = eq.evaluate_before(I_d)
     return re(I_d * conjugate(I_d)) / re(I_0 * conjugate(I_0)) - 1
 
 

@@ -54,7 +54,7 @@ class BenchmarkResult(Written):
                 name,
                 d,
                 *(bbob.share(name, d, fs) for fs in (bbob.plan.functions, *bbob.groups().values())),
-                bbob.solved(name, d),
+                bbob.count_solved(name, d),
             ]
             for d in bbob.plan.dimensions
             for name in bbob.optimizers

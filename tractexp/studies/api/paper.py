@@ -163,7 +163,7 @@ def paper(
     """
     started = time.perf_counter()
     check(parts, seeds, workers)
-    setup = Setup.of(
+    setup = Setup.from_arguments(
         records,
         model,
         validate,
@@ -187,7 +187,7 @@ def paper(
 
         for kind, needing in HELD_OUT.items():
             if needing & set(chosen):
-                study.held(kind)
+                study.select_held_out(kind)
         study.prepare(chosen)
         return PaperResult(
             setup, settings, chosen, claims(study, chosen), study, time.perf_counter() - started

@@ -40,8 +40,8 @@ class Searches(Written):
             [
                 name,
                 run.seed,
-                *([run.objective, run.epsilon_p, run.epsilon_q] if run.finished else [None] * 3),
-                int(run.simulations[-1]) if run.finished else None,
+                *([run.objective, run.epsilon_p, run.epsilon_q] if run.is_finished else [None] * 3),
+                int(run.simulations[-1]) if run.is_finished else None,
                 run.failure,
             ]
             for name, run in zip(name_variants(self.runs), self.runs, strict=True)
@@ -98,7 +98,7 @@ def search(
     check_range("seeds", seeds, 1)
     check_range("cores", cores, 1)
     chosen = vary_switches(Choice.several("optimizer", optimizers), switches)
-    setup = Setup.of(
+    setup = Setup.from_arguments(
         records,
         model,
         (),

@@ -30,9 +30,8 @@ def sentences(benchmark: BbobRuns) -> list[str]:
         shares = {name: benchmark.share(name, d, plan.functions) for name in benchmark.optimizers}
         ranked = sorted(shares, key=lambda name: -shares[name])
         parts = [
-            f"{name} met {shares[name]:.0%} of the targets and solved {benchmark.solved(name, d)}"
-            " of"
-            f" {len(plan.functions)} functions"
+            f"{name} met {shares[name]:.0%} of the targets and solved"
+            f" {benchmark.count_solved(name, d)} of {len(plan.functions)} functions"
             for name in ranked
         ]
         sentences.append(
@@ -54,7 +53,7 @@ def shares(benchmark: BbobRuns, dimension: int) -> tuple[list[str], list[list[st
         parts = [
             benchmark.share(name, dimension, chosen) for chosen in (functions, *groups.values())
         ]
-        solved = f"{benchmark.solved(name, dimension)} of {len(functions)}"
+        solved = f"{benchmark.count_solved(name, dimension)} of {len(functions)}"
         rows.append([name, *(f"{part:.0%}" for part in parts), solved])
     return ["optimizer", "all", *groups, "solved"], rows
 
@@ -150,10 +149,10 @@ def _shares(page: Report, benchmark: BbobRuns, d: int) -> None:
     whole, each = drawn.pop("all")
     page.chart(whole, "Runtimes: the share of all targets met by all runs, by evaluations.")
     if each:
-        with page.folded("each optimizer in a chart of its own"):
+        with page.fold_blocks("each optimizer in a chart of its own"):
             page.charts(each, f"In gray: {benchmark.optimizers[0]}.")
     if drawn:
-        with page.folded("the same by group of functions"):
+        with page.fold_blocks("the same by group of functions"):
             for group, (chart, _) in drawn.items():
                 numbers = ", ".join(f"f{f}" for f in benchmark.groups()[group])
                 page.chart(chart, f"{group.capitalize()}: {numbers}.")
@@ -165,7 +164,7 @@ def _times(page: Report, benchmark: BbobRuns, d: int) -> None:
     columns = ["function", *benchmark.optimizers]
     page.heading(f"Expected running times in dimension {d}", 3)
     page.table(columns, running_times(benchmark, d, hardest), _caption(benchmark.plan, hardest))
-    with page.folded("to the other targets"):
+    with page.fold_blocks("to the other targets"):
         for target in range(hardest):
             page.table(
                 columns, running_times(benchmark, d, target), _caption(benchmark.plan, target)
@@ -222,7 +221,7 @@ def content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
                 group: benchmark.share(name, d, chosen)
                 for group, chosen in benchmark.groups().items()
             },
-            "solved": benchmark.solved(name, d),
+            "solved": benchmark.count_solved(name, d),
         }
         for name in benchmark.optimizers
         for d in plan.dimensions

@@ -75,7 +75,7 @@ class Bbob:
         )
 
     @property
-    def solved(self) -> bool:
+    def is_solved(self) -> bool:
         """Whether the last target is met."""
         return bool(np.isfinite(self.hits).all())
 
@@ -126,7 +126,7 @@ def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: BbobP
     function, dimension, instance = case
     problem = Bbob(function, dimension, instance, plan.targets)
     budget, searches = plan.multiplier * dimension, 0
-    while problem.evaluations < budget and not problem.solved:
+    while problem.evaluations < budget and not problem.is_solved:
         limits = Limits(simulations=budget - problem.evaluations, target=float(problem.goals.min()))
         result = search(problem, optimizer, seed_of(plan.seed, *case, searches), limits)
         searches += 1
@@ -159,7 +159,7 @@ def perform(
     }
     jobs = [(name, it, case, plan) for case in plan.cases for name, it in optimizers.items()]
     runs = {}
-    for _, r in Workers(cores or -1).completed(_run, jobs, len(jobs)):
+    for _, r in Workers(cores or -1).run_items(_run, jobs, len(jobs)):
         count()
         runs[r.optimizer, r.dimension, r.function, r.instance] = r
     ordered = [
@@ -181,7 +181,9 @@ class BbobRuns:
     titles: Mapping[int, str]  # of the functions
     runs: Sequence[BbobRun]
 
-    def of(self, optimizer: str, dimension: int, functions: Iterable[int]) -> list[BbobRun]:
+    def select_runs(
+        self, optimizer: str, dimension: int, functions: Iterable[int]
+    ) -> list[BbobRun]:
         """The runs of an optimizer in one dimension on some functions."""
         among = set(functions)
         return [
@@ -201,22 +203,24 @@ class BbobRuns:
         """Evaluations to every target in every run, (runs * targets,), sorted, inf where not met:
         an ECDF's steps.
         """
-        return np.sort([n for r in self.of(optimizer, dimension, functions) for n in r.hits])
+        return np.sort(
+            [n for r in self.select_runs(optimizer, dimension, functions) for n in r.hits]
+        )
 
     def share(self, optimizer: str, dimension: int, functions: Iterable[int]) -> float:
         """The share of all targets that was met."""
         return float(np.isfinite(self.hits(optimizer, dimension, functions)).mean())
 
-    def solved(self, optimizer: str, dimension: int) -> int:
+    def count_solved(self, optimizer: str, dimension: int) -> int:
         """The number of functions whose last target was met on every instance."""
-        runs = {f: self.of(optimizer, dimension, [f]) for f in self.plan.functions}
+        runs = {f: self.select_runs(optimizer, dimension, [f]) for f in self.plan.functions}
         return sum(all(np.isfinite(r.hits[-1]) for r in group) for group in runs.values())
 
     def ert(self, optimizer: str, dimension: int, function: int, target: int) -> tuple[float, int]:
         """Expected running time in evaluations to the target of that index, and the runs that met
         it.
         """
-        runs = self.of(optimizer, dimension, [function])
+        runs = self.select_runs(optimizer, dimension, [function])
         spent = np.array([r.hits[target] for r in runs])
         reached = np.isfinite(spent)
         whole = np.array([r.evaluations for r in runs], dtype=float)

@@ -39,7 +39,7 @@ class SwitchEffect:
     better: tuple[float, float, float] | None = None
 
     @property
-    def shown(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether the interval leaves out 1, which is no effect."""
         return not self.low <= 1.0 <= self.high
 
@@ -116,7 +116,7 @@ def ablate(variants: Sequence[Variant], plain: Mapping[str, str], least: float) 
     if chosen is None:
         return None
     members = [v for v in variants if v.name in chosen.members.values()]
-    seeds = sorted(set.intersection(*({run.seed for run in v.finished} for v in members)))
+    seeds = sorted(set.intersection(*({run.seed for run in v.finished_runs} for v in members)))
     if not seeds:
         return None
     return chosen.ablation(
@@ -135,7 +135,7 @@ def _families(variants: Sequence[Variant], optimizer: str, plain: str) -> list[d
     if without:
         switches |= flags - {k for v in without for k in v.settings}
 
-    def on(v: Variant) -> On:
+    def list_switches_on(v: Variant) -> On:
         return frozenset(k for k in switches if v.settings.get(k))
 
     def rest(v: Variant) -> set[tuple[str, str]]:
@@ -143,11 +143,11 @@ def _families(variants: Sequence[Variant], optimizer: str, plain: str) -> list[d
 
     groups: dict[frozenset[tuple[str, str]], dict[On, Variant]] = defaultdict(dict)
     for v in own:
-        groups[frozenset(rest(v))].setdefault(on(v), v)
+        groups[frozenset(rest(v))].setdefault(list_switches_on(v), v)
     for v in without:
         for settings, family in groups.items():
             if rest(v) <= settings:
-                family.setdefault(on(v), v)
+                family.setdefault(list_switches_on(v), v)
     return list(groups.values())
 
 
@@ -189,10 +189,10 @@ class _Contrasts:
         return replace(effect, better=(float(wins.mean()), *bootstrap(wins)))
 
     def _pairs(self, switch: str) -> list[tuple[On, ...]]:
-        return self._existing([(on | {switch}, on) for on in self.logs if switch not in on])
+        return self._select_existing([(on | {switch}, on) for on in self.logs if switch not in on])
 
     def _squares(self, a: str, b: str) -> list[tuple[On, ...]]:
-        return self._existing(
+        return self._select_existing(
             [(on | {a, b}, on | {a}, on | {b}, on) for on in self.logs if not {a, b} & on]
         )
 
@@ -203,5 +203,5 @@ class _Contrasts:
         pairs = sorted(self._pairs(switch), key=lambda pair: (len(pair[1]), sorted(pair[1])))
         return [(*pairs[-1], *pairs[0])] if pairs and len(pairs[-1][1]) > len(pairs[0][1]) else []
 
-    def _existing(self, rows: list[tuple[On, ...]]) -> list[tuple[On, ...]]:
+    def _select_existing(self, rows: list[tuple[On, ...]]) -> list[tuple[On, ...]]:
         return [row for row in rows if all(on in self.logs for on in row)]

@@ -33,7 +33,7 @@ def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, 
     The whole; and where there are more variants than colors, one for each with the first behind it
     in gray.
     """
-    variants = [variant for variant in variants if variant.finished]
+    variants = [variant for variant in variants if variant.finished_runs]
     names, bands = [v.name for v in variants], [band(v, by) for v in variants]
     low, high = min(floor.value, *(b.lower.min() for b in bands)), max(b.top for b in bands)
     counted = by == "simulations"
@@ -146,7 +146,7 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
     """Where every finished run ended, one row for each variant, with the median and the quartiles
     of each.
     """
-    variants = [variant for variant in variants if variant.finished]
+    variants = [variant for variant in variants if variant.finished_runs]
     chart = _rows("objective [pu²]", [v.name for v in variants], log=True)
     dots = [(run, row + shift) for row, v in enumerate(variants) for run, shift in _spread_runs(v)]
     labels = [
@@ -154,7 +154,7 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
     ]
     ends = np.array([run.objective for run, _ in dots])
     chart.points("every run", ends, [y for _, y in dots], style.FAINT, size=4, hover=labels)
-    ended = [[run.objective for run in v.finished] for v in variants]
+    ended = [[run.objective for run in v.finished_runs] for v in variants]
     lower, middle, upper = np.array([np.quantile(values, (0.25, 0.5, 0.75)) for values in ended]).T
     labels = [f"{v.name}: median {number(m, 4)} pu²" for v, m in zip(variants, middle, strict=True)]
     chart.points(
@@ -189,7 +189,7 @@ def _spread_runs(variant: Variant) -> list[tuple[SearchRun, float]]:
     """The finished runs with a share of a row by which each is moved, so that equal
     ones are seen.
     """
-    done = variant.finished
+    done = variant.finished_runs
     return list(zip(done, DOT_JITTER * np.cos(2.4 * np.arange(len(done))), strict=True))
 
 
@@ -227,7 +227,9 @@ def _about(values: Sequence[float]) -> tuple[float, float]:
 def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
     """The parameters at which every run ended, a panel for each, and where the floor's lie."""
     variants = [
-        variant for variant in variants if any(run in polished.reached for run in variant.finished)
+        variant
+        for variant in variants
+        if any(run in polished.reached for run in variant.finished_runs)
     ]
     names = list(polished.parameters)
     labels = [

@@ -138,7 +138,9 @@ def _list_names(names: list[str]) -> str:
 def of_pair(comparison: Comparison, pair: VariantPair) -> str:
     """One pair of variants, as it may be quoted."""
     one, two = (comparison.gathered[name] for name in (pair.first, pair.second))
-    spent = [Spread.of([run.simulations[-1] for run in v.finished]) for v in (one, two)]
+    spent = [
+        Spread.from_values([run.simulations[-1] for run in v.finished_runs]) for v in (one, two)
+    ]
     first, second = (
         f"{number(median)} pu²" if np.isfinite(median) else "no result" for median in pair.medians
     )
@@ -236,7 +238,7 @@ def of_effect(effect: SwitchEffect) -> str:
     (switch,) = effect.switches
     verdict = (
         "no effect is shown"
-        if not effect.shown
+        if not effect.is_significant
         else "it helps"
         if effect.factor < 1
         else "it harms"

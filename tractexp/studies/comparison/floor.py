@@ -67,14 +67,14 @@ def polish(
     have changed since.
     """
     space = problem.space
-    complete = [run for run in runs if run.finished and set(space.names) <= set(run.parameters)]
+    complete = [run for run in runs if run.is_finished and set(space.names) <= set(run.parameters)]
     ends = np.array([[run.parameters[name] for name in space.names] for run in complete]).reshape(
         -1, space.dimension
     )
     if not problem.per_event and not _same(problem, ends, complete):
         return None
     units = np.concatenate([space.to_unit(ends), _spread(problem)])
-    best = max(min(run.objective for run in runs if run.finished), TINY)
+    best = max(min(run.objective for run in runs if run.is_finished), TINY)
     groups = np.array_split(units, -(-len(units) // _count_parallel_descents(problem)))
     ended, values, count = [], [], counting(len(groups))
     for group in groups:
@@ -108,7 +108,7 @@ def floor_of(
     """
     if value is not None:
         return Floor(value, "as given by task.floor")
-    best = min((run for run in runs if run.finished), key=lambda run: run.objective)
+    best = min((run for run in runs if run.is_finished), key=lambda run: run.objective)
     if polished is not None:
         n = len(polished.reached)
         ends = f"where {count_noun(n, 'run')} ended and from " if n else ""

@@ -137,7 +137,7 @@ def _polish_described_problem(
     """
     runs = [run for variant in gathered.variants for run in variant.runs]
     try:
-        problem = problem or _problem(next(run for run in runs if run.finished))
+        problem = problem or _problem(next(run for run in runs if run.is_finished))
     except UserError as error:
         return None, f"the problem cannot be put again ({str(error).rstrip('.')})"
     except (KeyError, TypeError, ValueError) as error:
@@ -166,7 +166,7 @@ def _problem(run: SearchRun) -> Problem:
     with contextlib.chdir(home) if home.is_dir() else contextlib.nullcontext():
         records = build("data", config["data"]).read()
     train = [detect(record) for record in records.train]
-    return Setup.of(train, config["model"], objective=config.get("objective")).problem
+    return Setup.from_arguments(train, config["model"], objective=config.get("objective")).problem
 
 
 def plain() -> dict[str, str]:

@@ -57,7 +57,7 @@ def terms_of(runs: Sequence[SearchRun]) -> str:
     budgets = {run.config.get("budget") for run in runs}
     if len(budgets) == 1 and (budget := budgets.pop()) is not None:
         return f"{int(budget):,} simulations"
-    counts = {len(run.history) - 1 for run in runs if run.finished}
+    counts = {len(run.history) - 1 for run in runs if run.is_finished}
     return f"{int(*counts)} iterations" if len(counts) == 1 else ""
 
 
@@ -121,7 +121,7 @@ def on_functions(benchmark: "BbobRuns", chosen: VariantFamily | None) -> Overall
                 np.mean(
                     [
                         np.log10(max(run.distance, SOLVED))
-                        for run in benchmark.of(name, dimension, [f])
+                        for run in benchmark.select_runs(name, dimension, [f])
                     ]
                 )
                 for name in names
@@ -161,7 +161,7 @@ def _logs(comparison: Comparison, names: Sequence[str]) -> dict[int, list[float]
     least = (1 + comparison.ties) * comparison.floor.value
     variants = [comparison.gathered[name] for name in names]
     seeds = (
-        set.intersection(*({run.seed for run in v.finished} for v in variants))
+        set.intersection(*({run.seed for run in v.finished_runs} for v in variants))
         if variants
         else set()
     )
@@ -192,7 +192,7 @@ def _cost(chosen: VariantFamily | None, comparisons: Iterable[Comparison]) -> di
         for name, rates in each.items():
             rates += [
                 float((run.simulations[-1] - run.simulations[0]) / (len(run.history) - 1))
-                for run in comparison.gathered[name].finished
+                for run in comparison.gathered[name].finished_runs
                 if len(run.history) > 1
             ]
     return chosen.cost({name: float(np.mean(rates)) for name, rates in each.items()})

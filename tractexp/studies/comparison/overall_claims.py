@@ -50,7 +50,7 @@ def of_effect(effect: SwitchEffect) -> str:
     """ "levy helps (x 0.81, 0.76 to 0.87; in 64 % of the pairs)"."""
     verdict = (
         "has no effect that is shown"
-        if not effect.shown
+        if not effect.is_significant
         else "helps"
         if effect.factor < 1
         else "harms"
@@ -79,7 +79,7 @@ def of_agreement(several: Several) -> str:
     for ablation in ablations:
         for effect in ablation.effects:
             signs.setdefault(effect.switches[0], []).append(
-                int(np.sign(1 - effect.factor)) * effect.shown
+                int(np.sign(1 - effect.factor)) * effect.is_significant
             )
     always = [
         s

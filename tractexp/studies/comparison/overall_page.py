@@ -40,7 +40,7 @@ def report(several: Several, source: str) -> Report:
         _overall(page, overall)
     page.heading("Each problem by itself")
     for label, comparison in several.comparisons.items():
-        with page.folded(label):
+        with page.fold_blocks(label):
             one.quality(page, comparison)
             if comparison.ablation:
                 one.switches(page, comparison.ablation)
@@ -121,7 +121,7 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
         [
             *one.factor(effect),
             *(f"{x:.0%}" for x in effect.better or ()),
-            "yes" if effect.shown else "no",
+            "yes" if effect.is_significant else "no",
         ]
         + ([f"{cost[effect.switches[0]]:+.1f}"] if cost else [])
         for effect in ablation.effects
@@ -138,12 +138,15 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
     )
     if not (ablation.interactions or ablation.company):
         return
-    with page.folded("interactions of pairs of ingredients"):
+    with page.fold_blocks("interactions of pairs of ingredients"):
         for changes, caption in (
             (ablation.interactions, one.INTERACTIONS),
             (ablation.company, one.COMPANY),
         ):
-            rows = [[*one.factor(effect), "yes" if effect.shown else "no"] for effect in changes]
+            rows = [
+                [*one.factor(effect), "yes" if effect.is_significant else "no"]
+                for effect in changes
+            ]
             page.table(["switched on", "factor", "from", "to", "shown"], rows, caption)
 
 

@@ -89,7 +89,7 @@ def quality(page: Report, comparison: Comparison) -> None:
     )
     for name in ("epsilon_p", "epsilon_q"):
         rows = [[s.name, *_spread(getattr(s, name), 100.0)] for s in comparison.summaries]
-        with page.folded(f"{name} of Eq. (20)"):
+        with page.fold_blocks(f"{name} of Eq. (20)"):
             page.table(["variant", *columns[3:-1]], rows, f"{name} {AT_END}, in percent.")
 
 
@@ -124,7 +124,7 @@ def _parameters(page: Report, comparison: Comparison) -> None:
         ]
         for name, value in polished.parameters.items()
     ]
-    with page.folded("the values of the lowest objective"):
+    with page.fold_blocks("the values of the lowest objective"):
         page.table(["parameter", "unit", "value", "lower bound", "upper bound"], rows)
 
 
@@ -179,7 +179,7 @@ def _curves(
     )
     page.chart(whole, caption + many)
     if each:
-        with page.folded("each variant in a chart of its own"):
+        with page.fold_blocks("each variant in a chart of its own"):
             page.charts(each, f"In gray: {comparison.summaries[0].name}.")
 
 
@@ -198,12 +198,14 @@ def _differences(page: Report, comparison: Comparison) -> None:
     main, rest = claims.near_and_far(comparison)
     _pairs(page, main)
     if rest:
-        with page.folded(f"the other {len(rest)} pairs" if len(rest) > 1 else "the other pair"):
+        with page.fold_blocks(
+            f"the other {len(rest)} pairs" if len(rest) > 1 else "the other pair"
+        ):
             _pairs(page, rest)
     sentences = [claims.of_pair(comparison, pair) for pair in (*main, *rest)]
     page.heading("To quote", 3).items(sentences[:MOST_OPEN_SENTENCES])
     if sentences[MOST_OPEN_SENTENCES:]:
-        with page.folded(f"{len(sentences) - MOST_OPEN_SENTENCES} more sentences"):
+        with page.fold_blocks(f"{len(sentences) - MOST_OPEN_SENTENCES} more sentences"):
             page.items(sentences[MOST_OPEN_SENTENCES:])
 
 
@@ -256,7 +258,7 @@ def switches(page: Report, ablation: Ablation) -> None:
     )
     for effects, caption in groups:
         rows = [
-            [*factor(e), str(e.seeds), "yes" if e.shown else "no", str(len(e.contrasts))]
+            [*factor(e), str(e.seeds), "yes" if e.is_significant else "no", str(len(e.contrasts))]
             for e in effects
         ]
         if rows:
@@ -344,7 +346,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
             "runs": [
                 _of_run(variant, run, comparison)
                 for variant in comparison.variants
-                for run in variant.finished
+                for run in variant.finished_runs
             ],
             "pairs": [
                 asdict(pair) | {"significant": pair.significant} for pair in comparison.pairs

@@ -50,7 +50,7 @@ class SearchRun:
     folder: str = ""  # where it ran, from which relative paths count; "" where that is not known
 
     @property
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         return not (self.failure or self.interruption)
 
     def to_dict(self) -> dict[str, Any]:
@@ -86,8 +86,8 @@ class Variant:
     runs: tuple[SearchRun, ...]
 
     @property
-    def finished(self) -> list[SearchRun]:
-        return [run for run in self.runs if run.finished]
+    def finished_runs(self) -> list[SearchRun]:
+        return [run for run in self.runs if run.is_finished]
 
     @property
     def objectives(self) -> dict[int, float]:
@@ -175,7 +175,7 @@ def gather(runs: Sequence[SearchRun], source: str) -> Gathered:
 
 
 def _check_any_finished(runs: Sequence[SearchRun], source: str) -> None:
-    if any(run.finished for run in runs):
+    if any(run.is_finished for run in runs):
         return
     failures = [run.failure for run in runs if run.failure]
     why = (

@@ -26,7 +26,7 @@ class Spread:
     worst: float
 
     @classmethod
-    def of(cls, values: Sequence[float]) -> "Spread":
+    def from_values(cls, values: Sequence[float]) -> "Spread":
         if not len(values):
             return cls(*[float("nan")] * 5)
         return cls(*map(float, np.quantile(values, (0, 0.25, 0.5, 0.75, 1))))
@@ -53,9 +53,9 @@ def summarize(
     variant: Variant, floor: Floor, targets: Sequence[float], polished: Polished | None = None
 ) -> Summary:
     """`targets` are multiples of the floor."""
-    done = variant.finished
+    done = variant.finished_runs
     spreads = {
-        key: Spread.of([getattr(run, key) for run in done])
+        key: Spread.from_values([getattr(run, key) for run in done])
         for key in ("objective", "epsilon_p", "epsilon_q")
     }
     reached = [run.objective <= (1 + FLOOR_SHARE) * floor.value for run in variant.runs]
@@ -63,7 +63,7 @@ def summarize(
         cost: [running_time(variant, target * floor.value, cost) for target in targets]
         for cost in COSTS
     }
-    simulations = Spread.of([run.simulations[-1] for run in done])
+    simulations = Spread.from_values([run.simulations[-1] for run in done])
     failures = len(variant.runs) - len(done)
     inside = [there for run in done if polished and (there := polished.in_valley(run)) is not None]
     return Summary(
@@ -90,11 +90,11 @@ def _whole(variant: Variant, run: SearchRun, cost: str) -> float:
     """All that a run spent; a run that failed spent its budget, or what the others of its variant
     did.
     """
-    if run.finished:
+    if run.is_finished:
         return float(getattr(run, cost)[-1])
     if cost == "simulations" and variant.settings.get("budget"):
         return float(variant.settings["budget"])
-    return float(np.median([getattr(other, cost)[-1] for other in variant.finished] or [0.0]))
+    return float(np.median([getattr(other, cost)[-1] for other in variant.finished_runs] or [0.0]))
 
 
 def runtimes(variant: Variant, floor: Floor) -> np.ndarray:
@@ -131,7 +131,7 @@ def band(variant: Variant, by: str, points: int = 300) -> Band:
     A run that ended earlier keeps its last objective. By simulations, the band starts where every
     run has one.
     """
-    done = variant.finished
+    done = variant.finished_runs
     steps = [
         run.simulations if by == "simulations" else np.arange(len(run.history)) for run in done
     ]

@@ -133,11 +133,11 @@ def table1(study: Study) -> list[Claim]:
     said = "electromechanical {}, mechanical {}, voltage {}"
     ranked_P = P[0] * DIFFERENT < P[1] and P[1] * DIFFERENT < P[2]
     ranked_Q = Q[0] * DIFFERENT < Q[2] and Q[2] * DIFFERENT < Q[1]
-    identified = [f"{o.identified} of {o.free}" for o in (third, first, second)]
+    identified = [f"{o.identified_count} of {o.free}" for o in (third, first, second)]
     alone = (
-        third.identified == third.free
-        and first.identified < first.free
-        and second.identified < second.free
+        third.identified_count == third.free
+        and first.identified_count < first.free
+        and second.identified_count < second.free
     )
     steps, sizes = (
         [getattr(o, each).total for o in (third, first, second)] for each in ("step", "per_sample")
@@ -354,7 +354,7 @@ def claim_generalization(
             errors = [
                 getattr(fits[e], name)
                 for fits in study.fits(names["issa"])
-                for e in study.held(kind)
+                for e in study.select_held_out(kind)
                 for name in ("epsilon_p", "epsilon_q")
             ]
             good[how] = CONFIRMED if max(errors) < ACCEPTED else REFUTED

@@ -183,7 +183,7 @@ def valley(study: Study) -> list[str]:
     """What the second valley is, where it lies and why searches go there; as much of it as this
     model shows.
     """
-    groups, names = study.control.grouped(), study.problem.space.names
+    groups, names = study.control.group_valleys(), study.problem.space.names
     if len(groups) < 2:
         return [f"All random points descend to {number(groups[0][0])} pu²: there is one valley."]
     (lowest, _, right), (second, count, other) = groups[:2]
@@ -276,7 +276,7 @@ def _describe_trade(study: Study, along: np.ndarray, here: int, lowest: float) -
 def _bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
     shares = {
         bounds: np.mean(ends.objective <= FLOOR_FACTOR * lowest)
-        for bounds, ends in study.rebounded.items()
+        for bounds, ends in study.ends_by_bounds.items()
     }
     listed = ", ".join(f"{shares[b]:.0%} from {b[0]:g}" for b in (WIDE, own, NARROW))
     helps = shares[NARROW] > 1.5 * shares[own] and shares[WIDE] < 1.1 * shares[own]

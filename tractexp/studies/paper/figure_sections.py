@@ -121,7 +121,7 @@ def figure9(sheet: Report, study: Study) -> None:
         f" the searches that are laid out for {study.equal:,}.",
     )
     _reasons(sheet, study)
-    if study.traded:
+    if study.has_traded_parameter:
         _valleys(sheet, study)
 
 
@@ -143,7 +143,7 @@ def _variant(study: Study, name: str, by: str, seeds: int) -> Variant:
                 seconds=f.history.seconds,
                 history=f.history.objective,
             )
-            for seed, f in enumerate(study.searched(name, by)[:seeds])
+            for seed, f in enumerate(study.run_searches(name, by)[:seeds])
         ),
     )
 
@@ -214,7 +214,7 @@ def _valleys(sheet: Report, study: Study) -> None:
         shown["Q_s0 [pu]"] = static
     own = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
     bottoms = [
-        (float(v[index[TRADED]]), f / study.floor) for f, _, v in study.control.grouped()[:2]
+        (float(v[index[TRADED]]), f / study.floor) for f, _, v in study.control.group_valleys()[:2]
     ]
     sheet.chart(
         figures.along(TRADED, grid, shown, own, bottoms),
@@ -224,9 +224,9 @@ def _valleys(sheet: Report, study: Study) -> None:
         " load.",
     )
     names = study.problem.space.names
-    every = {name: study.ends[name].grouped() for name in COMPARED}
+    every = {name: study.ends[name].group_valleys() for name in COMPARED}
     rows = []
-    for f, n, values in study.control.grouped()[:4]:
+    for f, n, values in study.control.group_valleys()[:4]:
         ended = [sum(k for g, k, _ in groups if abs(g / f - 1) < 0.02) for groups in every.values()]
         rows.append([number(f), *(str(k) for k in ended), str(n), *map(number, values)])
     sheet.table(
@@ -237,9 +237,9 @@ def _valleys(sheet: Report, study: Study) -> None:
         " lowest four.",
     )
     rows = []
-    for (low, high), ends in study.rebounded.items():
+    for (low, high), ends in study.ends_by_bounds.items():
         right = ends.objective <= FLOOR_FACTOR * study.floor
-        second = ends.grouped()[1:2]
+        second = ends.group_valleys()[1:2]
         at = (
             f"{number(second[0][0])} at {TRADED} = {number(float(second[0][2][index[TRADED]]))}"
             if second
@@ -269,7 +269,7 @@ def held_out(figure: str, kind: str) -> Callable[..., None]:
     def section(sheet: Report, study: Study) -> None:
         sheet.heading(f"Figure {figure}: {kind}")
         fits = study.first("issa")
-        for e in study.held(kind):
+        for e in study.select_held_out(kind):
             _fit(sheet, fits[e], kind)
 
     return section

@@ -64,7 +64,7 @@ class Order:
         )
 
     @property
-    def identified(self) -> int:
+    def identified_count(self) -> int:
         return sum(verdict.word == IDENTIFIED for verdict in self.uncertainty.verdicts.values())
 
     @property

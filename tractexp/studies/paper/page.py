@@ -165,7 +165,7 @@ def readings_section(sheet: Report, study: Study) -> None:
 
 
 def _costs(study: Study, name: str) -> tuple[str, str]:
-    spent = np.median([search.simulations for search in study.searched(name)])
+    spent = np.median([search.simulations for search in study.run_searches(name)])
     return middle(study.objectives(name)), f"{spent:,.0f}"
 
 

@@ -117,7 +117,7 @@ class Study:
             )
             self._gather([name for name in wanted if (name, by) not in self.seen], by)
 
-    def searched(self, name: str, by: str = "iterations") -> list[SearchResult]:
+    def run_searches(self, name: str, by: str = "iterations") -> list[SearchResult]:
         """The searches of a reading, one for each seed: of 300 "iterations", or laid out for equal
         "simulations".
         """
@@ -168,12 +168,12 @@ class Study:
     @functools.cached_property
     def floor(self) -> float:
         """The lowest objective known of this problem [pu²]."""
-        compared = [f.objective for name in COMPARED for f in self.searched(name)]
+        compared = [f.objective for name in COMPARED for f in self.run_searches(name)]
         return min(self.reference.objective, *compared)
 
     def objectives(self, name: str, by: str = "iterations") -> np.ndarray:
         """(seeds,) where the searches end."""
-        return np.array([search.objective for search in self.searched(name, by)])
+        return np.array([search.objective for search in self.run_searches(name, by)])
 
     def pair(self, first: str, second: str, by: str) -> OptimizerPair:
         a, b = self.objectives(first, by), self.objectives(second, by)
@@ -184,7 +184,7 @@ class Study:
         got there.
         """
         spent, reached = [], []
-        for search in self.searched(name, by):
+        for search in self.run_searches(name, by):
             hit = search.history.objective <= target * self.floor
             at = int(hit.argmax()) if hit.any() else -1
             spent.append(
@@ -205,7 +205,7 @@ class Study:
         """
         self.tell("Figure 9: descending from where the searches ended, and from random points")
         names = (*LEVEL, "random_search")
-        starts = np.array([search.values for name in names for search in self.searched(name)])
+        starts = np.array([search.values for name in names for search in self.run_searches(name)])
         ends = self._descents(
             self.problem, starts, lambda: valleys.run_descents(self.problem, starts, self.floor)
         )
@@ -261,7 +261,7 @@ class Study:
         return Shares(RANDOM, there, 0, 0)
 
     @property
-    def traded(self) -> bool:
+    def has_traded_parameter(self) -> bool:
         """Whether the model has the parameter along which the paper's valleys lie, and leaves it
         free.
         """
@@ -272,13 +272,13 @@ class Study:
         """Values of C beyond its bounds, and the best fit at each."""
         wide = valleys.within(self.problem, TRADED, *WIDE)
         grid = np.linspace(*WIDE, 63)
-        low = np.array([values for _, _, values in self.control.grouped()[:2]])
+        low = np.array([values for _, _, values in self.control.group_valleys()[:2]])
         return grid, self._descents(
             wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor)
         )
 
     @functools.cached_property
-    def rebounded(self) -> dict[tuple[float, float], valleys.Ends]:
+    def ends_by_bounds(self) -> dict[tuple[float, float], valleys.Ends]:
         """{bounds of C: where random points descend within them}."""
         own = next(p.bounds for p in self.problem.parameters if p.name == TRADED)
         others = {
@@ -295,7 +295,7 @@ class Study:
         """For each seed of a reading the fits of the fitted events, then of those held out."""
         if name not in self._fits:
             literal = READINGS[name].literal
-            self._fits[name] = [self.respond(search, literal) for search in self.searched(name)]
+            self._fits[name] = [self.respond(search, literal) for search in self.run_searches(name)]
         return self._fits[name]
 
     def respond(self, search: SearchResult, literal: bool = False) -> list[Fit]:
@@ -308,7 +308,7 @@ class Study:
             respond(problem.model, whole, e, role) for e, role in zip(events, roles, strict=True)
         ]
 
-    def held(self, kind: str) -> list[int]:
+    def select_held_out(self, kind: str) -> list[int]:
         """Which of `fitted` are the held-out events of an "interpolation" or "extrapolation"."""
         kinds = by_depth(self.held_out, self.train)
         chosen = [len(self.train) + k for k, each in enumerate(kinds) if each == kind]
@@ -325,7 +325,7 @@ class Study:
         """Eq. (21) of P and Q, {reading: (seeds, 2)} [pu], a mean over the held-out events of one
         kind.
         """
-        events = self.held(kind)
+        events = self.select_held_out(kind)
 
         def residual(fits: list[Fit], channel: str) -> float:
             each = [

@@ -42,7 +42,7 @@ def table1(sheet: Report, study: Study) -> None:
                 held if study.held_out else "-",
                 f"{order.condition:.1e}",
                 f"{order.finite} of {order.free}",
-                f"{order.identified} of {order.free}",
+                f"{order.identified_count} of {order.free}",
             ]
         )
         micro = f"{order.nanoseconds * study.problem.drive.samples / 1000:.3g}"
@@ -109,7 +109,7 @@ def _rows_of_parameters(study: Study, columns: Sequence[tuple[str, str]]) -> lis
         row = [parameter, bounds[parameter] if parameter in index else "-"]
         for name, what in columns:
             values = (
-                [f.values[index[parameter]] for f in study.searched(name)]
+                [f.values[index[parameter]] for f in study.run_searches(name)]
                 if parameter in index
                 else []
             )
@@ -204,7 +204,7 @@ def table3(sheet: Report, study: Study) -> None:
 
 def _spent(study: Study, name: str) -> list[str]:
     """A row of what searches of a reading spend and where they end."""
-    searches, literal = study.searched(name), READINGS[name].literal
+    searches, literal = study.run_searches(name), READINGS[name].literal
     ends = study.objectives(name)
     each = np.median([f.simulations / max(f.iterations, 1) for f in searches])
     return [
@@ -223,7 +223,9 @@ def add_generalization_table(
 ) -> Callable[..., None]:
     def section(sheet: Report, study: Study) -> None:
         residuals = study.residuals(kind)
-        names = ", ".join((*study.train, *study.held_out)[e].record.name for e in study.held(kind))
+        names = ", ".join(
+            (*study.train, *study.held_out)[e].record.name for e in study.select_held_out(kind)
+        )
         sheet.heading(f"Table {number_}: {kind}")
         rows = []
         for name, ours in residuals.items():

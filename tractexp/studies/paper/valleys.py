@@ -22,7 +22,7 @@ class Ends:
     objective: np.ndarray
     values: np.ndarray
 
-    def grouped(self) -> list[tuple[float, int, np.ndarray]]:
+    def group_valleys(self) -> list[tuple[float, int, np.ndarray]]:
         """Objective, count and values of each valley, the lowest first."""
         rest, groups = np.argsort(self.objective), []
         while len(rest):
