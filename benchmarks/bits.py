@@ -42,7 +42,7 @@ SIMULATED = """if True:
         values = np.array([p.default for p in model.parameters]) * \
 rng.uniform(0.9, 1.1, (200, len(model.names)))
         U = 1 - 0.5 * (np.arange(500) // 100 == 1)
-        drive = Drive.of([Excitation(1e-3, U, np.ones(500), np.ones(500), 1.0, 1.0, 0.6)])
+        drive = Drive.from_events([Excitation(1e-3, U, np.ones(500), np.ones(500), 1.0, 1.0, 0.6)])
         response = model.simulate(drive, values, 2)
         made.append(np.stack([response.P, response.Q])[:, response.miss[0] == 0])
     np.savez(sys.argv[1], *made)

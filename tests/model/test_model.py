@@ -277,7 +277,7 @@ def test_a_kernel_just_compiled_gives_the_bits_of_the_same_kernel_loaded(tmp_pat
         values = np.array([p.default for p in model.parameters]) * \
 np.linspace(0.95, 1.05, 20)[:, None]
         U = 1 - 0.5 * (np.arange(100) // 30 == 1)
-        drive = Drive.of([Excitation(1e-3, U, np.ones(100), np.ones(100), 1.0, 1.0, 0.6)])
+        drive = Drive.from_events([Excitation(1e-3, U, np.ones(100), np.ones(100), 1.0, 1.0, 0.6)])
         response = model.simulate(drive, values)
         assert (response.miss == 0).all()
         print(response.P.tobytes().hex(), response.Q.tobytes().hex())
@@ -503,7 +503,8 @@ def test_whether_an_effect_fits_and_what_stands_before_an_event_are_remembered_w
         "m = compose(get('model/motor', 'voltage')(), get('model/static', 'exponential')());"
         "names = ('stator_resistance', 'speed_dependent_torque', 'time_skew');"
         "print([m.acceptance(get('effect', n)()).refusal for n in names]);"
-        "one = np.ones(2); drive = Drive.of([Excitation(1e-3, one, one, one, 1.0, 1.0, 0.5)]);"
+        "one = np.ones(2);"
+        "drive = Drive.from_events([Excitation(1e-3, one, one, one, 1.0, 1.0, 0.5)]);"
         "print(m.at_rest(np.array([p.default for p in m.parameters]), drive));"
         "print('sympy' in sys.modules, 'scipy.signal' in sys.modules)"
     )

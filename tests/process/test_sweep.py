@@ -622,7 +622,7 @@ def test_workers_end_with_a_parent_that_is_killed():
     script = """
 import time
 from tractexp.workers import Workers
-for _ in Workers(1, apart=True).completed(time.sleep, [0, 600], 2):
+for _ in Workers(1, apart=True).run_items(time.sleep, [0, 600], 2):
     print(flush=True)
 """
     process = subprocess.Popen(

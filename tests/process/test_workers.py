@@ -22,7 +22,7 @@ def grow(k):  # past the 300 MB at which joblib lets a worker end; it looks once
     time.sleep(1.1)
     return k
 
-print(sorted(k for _, k in Workers(2).completed(grow, range(10), 10)))
+print(sorted(k for _, k in Workers(2).run_items(grow, range(10), 10)))
 """
 
 
