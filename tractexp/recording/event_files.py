@@ -85,6 +85,8 @@ def check_joined(where: str, paths: Sequence[Any], endings: Collection[str]) -> 
     than one reader reads.
     """
     check_distinct(where, [*map(str, paths)])
+    if len(paths) == 1:
+        return  # its reader says what is wrong with one file alone
     for path in paths:
         ending = Path(str(path)).suffix.lower()
         if ending not in endings and not files.is_called_archive(str(path)):
