@@ -97,7 +97,8 @@ def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
 
 def deviance(left):
     """What a set leaves of held-out events."""
-    prediction = PredictedDeviance(left, SimpleNamespace(deviance=1000.0 + left), False, 10.8)
+    curves = SimpleNamespace(deviance=1000.0 + left, error=SimpleNamespace(value=0.1))
+    prediction = PredictedDeviance(left, curves, False, 10.8)
     return SetEvidence(refitted(0.0, 1), ("one",), ("one",), prediction=prediction)
 
 
