@@ -98,8 +98,7 @@ def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
     }
     assert names(held) == {"measured", "base model", "extended model", band}
     event = named.context.records.recorded[0]
-    part = named.context.drive.part(0)
-    calculated = named.train.after.calculated[:, part]
+    calculated = named.graded_overlays[0].after  # of the model that is graded
     for c, (channel, axis, below) in enumerate((("P", "y2", "y3"), ("Q", "y4", "y5"))):
         measured = getattr(event.record, channel)
         np.testing.assert_allclose(curve(first, "measured", axis), measured, rtol=1e-6)
