@@ -193,7 +193,7 @@ def test_contributions_begin_with_the_member_that_helps_most():
 
 def by_deviance(*names, left, rejected=False):
     """A set that leaves so much of the deviance on held-out events, beyond chance."""
-    curves = SimpleNamespace(deviance=900.0 + left)
+    curves = SimpleNamespace(deviance=900.0 + left, error=SimpleNamespace(value=0.1))
     prediction = PredictedDeviance(left, curves, rejected, Criteria().shown)
     return SetEvidence(Refit(names, np.zeros(0), 0.0, 1), names, names, prediction=prediction)
 
@@ -503,7 +503,7 @@ def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where
     lost = replace(
         made, base=lose(made.base), rows=tuple(map(lose, made.rows)), others=(), term=None
     )
-    assert "No set has a steady state on the held-out events" in page_of(lost)
+    assert "No set has a steady state and survives the held-out events." in page_of(lost)
 
 
 def test_without_held_out_events_nothing_incomplete_is_named():
