@@ -17,6 +17,7 @@ import numpy as np
 import pandas
 import pytest
 import test_cev
+import test_event_files
 from command_line import run_command
 from made_recordings import constant, recording
 from test_settings import check, hydra  # noqa: F401  a fixture of this module, too
@@ -76,6 +77,8 @@ def desk(tmp_path_factory):
         folder / "scada.xlsx", index=False
     )
     waveforms(folder)
+    phases = test_event_files.phase_tables(folder)
+    test_event_files.pack(folder / "event.zip", *phases)
     (folder / "report.cev").write_bytes("\r\n".join(test_cev.report()).encode("latin-1"))
     quick = (
         "optimizer=multistart_least_squares",

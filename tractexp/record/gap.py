@@ -31,8 +31,10 @@ def find_single_lost_rows(t: np.ndarray) -> np.ndarray:
     None where more than one is missing somewhere, or where the times are not uniform but for that.
     """
     none = np.empty(0, dtype=int)
+    if len(t) < 4 or not np.isfinite(t).all():
+        return none
     steps = np.diff(t)
-    if len(steps) < 3 or not (steps > 0).all():
+    if not (steps > 0).all():
         return none
     ratio = steps / np.median(steps)
     lost, (least, most) = ratio > ONE_ROW_LOST[0], ONE_ROW_LOST
