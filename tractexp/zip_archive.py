@@ -192,4 +192,6 @@ def open_member(archive: Path, name: str) -> Iterator[IO[bytes]]:
         with zipfile.ZipFile(archive) as opened, opened.open(entry) as file:
             yield file
     except DAMAGE as error:
-        raise UserError(f"{archive}: '{name}' is damaged ({error}); get it again") from error
+        raise UserError(
+            f"{archive}: '{name}' is damaged: it is not what the archive states; get it again"
+        ) from error

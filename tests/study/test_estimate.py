@@ -15,6 +15,7 @@ from tractexp.blocks import Table
 from tractexp.identification import adequacy
 from tractexp.identification.adequacy import Grade, Surprise, grade_errors
 from tractexp.identification.estimate import estimate, estimate_without_search
+from tractexp.inference import goodness_of_fit
 from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import ModelError
@@ -199,9 +200,12 @@ def test_two_dips_whose_loads_differ_are_told_by_parameters_of_each_event():
 
 def test_what_is_judged_is_the_estimate_against_all_draws(fit, monkeypatch):
     known, judged = fit.details.uncertainty, []
-    monkeypatch.setattr(
-        adequacy, "tail", lambda draws, value: judged.append((len(draws), len(value))) or 1.0
-    )
+
+    def count_draws(draws, value, scale=None):
+        judged.append((len(draws), len(value)))
+        return 1.0
+
+    monkeypatch.setattr(goodness_of_fit, "tail", count_draws)
     adequacy.surprise(Observed.from_problem(known.likelihood.problem), known.likelihood, known.unit)
     assert {*judged} == {(adequacy.FIT_DRAWS, 1)}
 
