@@ -23,7 +23,8 @@ VALUES = ("seed", "budget", "time_limit", "target", "tracking.enabled")
 READ = ("task.parameters", "task.values", "task.rivals")  # of a task: files that it reads
 KEY = re.compile(r"\+{0,2}([\w-]+(?:[./][\w-]+)*)")
 NAMES = re.compile(r"\[?\w+(\s*,\s*\w+)*\]?|null")  # no path: Hydra would leave its folders by one
-MODEL = re.compile(r"[^$]+\.ya?ml")  # a file of a model, of which values alone are read
+# a file of a model, of which values alone are read; Hydra keeps a path in quotes
+MODEL = re.compile(r"[^$'\"]+\.ya?ml|'(?:[^$'\\]|\\')+\.ya?ml'")
 
 
 def refusal(setting: str) -> str:

@@ -10,6 +10,7 @@ from tractexp.errors import UserError
 from tractexp.files import DEEPEST
 from tractexp.model_file import LARGEST, read_model_file
 from tractexp.overrides import overrides
+from tractexp.repeatable import refusal
 
 GOOD = """\
 # A comment, and @package hydra within it
@@ -97,6 +98,9 @@ def test_a_path_is_a_model_on_the_command_line(write, tmp_path, monkeypatch):
     assert overrides(["model=mine.yaml", "data=tibet"]) == [f"model='{path}'", "data=tibet"]
     odd = write(GOOD, "mein, 'Modell' [1].yaml")
     assert overrides([f"model={odd.name}"]) == ["model='" + str(odd).replace("'", "\\'") + "'"]
+    kept = overrides(["model=mine.yaml"]) + overrides([f"model={odd.name}"])
+    assert [*map(refusal, kept)] == ["", ""]  # a folder keeps them so, and repeats the run
+    assert refusal("model='/a/b.yaml' + 'c'") != ""
     assert overrides(["model=mine.yaml,third_order_zip"]) == [f"model='{path}',third_order_zip"]
     with pytest.raises(UserError, match="there is no such file"):
         overrides(["model=other.yaml"])

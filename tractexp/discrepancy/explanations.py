@@ -197,7 +197,8 @@ def search_effect_sets(
 def refit_sets(context: Context, noise: Noise, begin: Sequence[Start]) -> list[Refit]:
     """The sets of these starts refitted, those near the best exactly; the best first."""
     fits = rough_refit(context, noise, begin)
-    near = [f for f in fits if f.cost < fits[0].cost + NEAR_BEST]
+    # the best itself is near, though it diverges and its cost is infinite
+    near = [f for f in fits if f.cost <= fits[0].cost + NEAR_BEST]
     exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in near])}
     return [exact.get(f.names, f) for f in fits]
 
