@@ -221,7 +221,7 @@ def test_the_plan_task_answers_with_a_number_and_a_figure(tmp_path):
     np.testing.assert_allclose(unpacked(curve["y"]), told, rtol=1e-6)
     level, edge = first["layout"]["shapes"]
     assert (level["y0"], edge["x0"]) == (10.0, pytest.approx(100 * content["depth_needed"]))
-    assert first["layout"]["yaxis"]["ticktext"][:3] == ["0.1", "1", "10"]
+    assert first["layout"]["yaxis"]["ticktext"][:3] == ["1", "10", "100"]
     axes = {c["layout"]["xaxis"]["title"]["text"]: c["layout"]["xaxis"] for c in others}
     assert axes["samples per second"]["ticktext"] == ["25", "50", "100", "200", "500", "1000"]
     assert [c["layout"]["showlegend"] for c in (first, *others)] == [True, False, False, False]
