@@ -612,7 +612,9 @@ class Equations:
 
     def _derive_starts(self) -> None:
         """Take the values before the event of states that are written in others' by these."""
-        values: dict[Symbol, sympy.Expr] = {}
+        values: dict[Symbol, sympy.Expr] = {
+            start_symbol(symbol): memory.initial for symbol, memory in self.memories.items()
+        }
         for symbol, state in self.states.items():
             if not state.derived:
                 values[start_symbol(symbol)] = state.initial
