@@ -339,7 +339,12 @@ READ = {  # {module: {call: why it may}}; all else that is read goes through `tr
     "tractexp/kernel/kernel.py": {"json.loads": "the store"},
     "tractexp/store.py": {"np.load": "the store; nothing is unpickled"},
     "tractexp/api/survey.py": {"json.loads": "entries with their sums"},
-    "tractexp/studies/paper/search_store.py": {"json.loads": "the store"},
+    "tractexp/config.py": {"json.loads": "the store"},
+    "tractexp/studies/search_store.py": {"json.loads": "the store"},
+    "tractexp/sweep/job.py": {"json.loads": "its own text"},
+    "tractexp/sweep/elsewhere.py": {"read_bytes": "a folder that it made for its own job"},
+    "tractexp/sweep/live.py": {"loadtxt": "a text that `files` has read"},
+    "tractexp/tracking/store.py": {"read_bytes": "a database that it made"},
     "tractexp/studies/comparison/load.py": {
         "loadtxt": "a text that `files` has read",
         "json.loads": "a parameter",

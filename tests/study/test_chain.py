@@ -8,6 +8,7 @@ fits the model that the last one ended with, it gives the same grade.
 import json
 import re
 import shlex
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -70,7 +71,9 @@ def run_step(step: Step, folder: Path) -> None:
     """Run the command of a step, and read what it found and prints."""
     before = {*folder.glob("outputs/runs/*")}
     quiet = ["tracking.enabled=false"] if any("=" in word for word in step.command) else []
-    done = run_command(*step.command, *quiet, cwd=folder)
+    # a package is not overwritten: each is made in a folder of its own, as the refusal says
+    here = Path(tempfile.mkdtemp(dir=folder)) if step.command[0] == "new" else folder
+    done = run_command(*step.command, *quiet, cwd=here)
     assert done.returncode == 0, f"{step.command}: {done.stderr}"
     step.next = printed_commands(done.stdout)
     # no wheel has it
