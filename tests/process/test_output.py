@@ -70,7 +70,9 @@ def test_a_terminal_of_few_letters_gets_escapes(more, tmp_path):
     done = shell("tractexp look station.csv *.csv --folder run", tmp_path, LC_ALL="C", **more)
     assert done.returncode == 2  # there is no station.csv
     done = shell("tractexp look *.csv --folder run", tmp_path, LC_ALL="C", **more)
-    assert (done.returncode, done.stderr) == (0, "")
+    # a machine that takes its time has a line of the stage there
+    errors = [line for line in done.stderr.splitlines() if not line.startswith("  ")]
+    assert (done.returncode, errors) == (0, [])
     assert any(name in done.stdout for name in ("станция", r"\u0441\u0442", r"\udcd1\udc81"))
 
 
