@@ -3,6 +3,7 @@
 import os
 
 import pytest
+from command_line import as_it_was
 
 if os.name == "nt":
     pytest.skip("forks", allow_module_level=True)
@@ -13,7 +14,8 @@ def test_who_kills_a_command_leaves_the_earlier_files_or_the_new_ones(task, tmp_
     import kills
 
     monkeypatch.chdir(tmp_path)
-    counts = getattr(kills, f"kill_{task}")(every=20)
+    with as_it_was({}):  # a command that runs in this process sets Hydra's switches
+        counts = getattr(kills, f"kill_{task}")(every=20)
     assert counts.keys() <= {kills.EARLIER, kills.NEWER}
     assert counts.total() > 3
     assert counts[kills.EARLIER] > 0
