@@ -343,12 +343,9 @@ READ = {  # {module: {call: why it may}}; all else that is read goes through `tr
     "tractexp/studies/search_store.py": {"json.loads": "the store"},
     "tractexp/sweep/job.py": {"json.loads": "its own text"},
     "tractexp/sweep/elsewhere.py": {"read_bytes": "a folder that it made for its own job"},
-    "tractexp/sweep/live.py": {"loadtxt": "a text that `files` has read"},
     "tractexp/tracking/store.py": {"read_bytes": "a database that it made"},
-    "tractexp/studies/comparison/load.py": {
-        "loadtxt": "a text that `files` has read",
-        "json.loads": "a parameter",
-    },
+    "tractexp/identification/result.py": {"loadtxt": "a text that `files` has read"},
+    "tractexp/studies/comparison/load.py": {"json.loads": "a parameter"},
     "tractexp/filetypes/comtrade_samples.py": {
         "memmap": "numbers of a file that `files` has found to be ordinary"
     },

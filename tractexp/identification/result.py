@@ -326,6 +326,16 @@ def write_history(path: Path, history: History) -> Path:
     return files.write(path, "\n".join(["iteration,simulations,seconds,objective", *lines]) + "\n")
 
 
+def parse_history(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `write_history` wrote: simulations, seconds and the best objective so far [pu²], (n,)
+    each. Raises `ValueError` for a text that is none.
+    """
+    _, simulations, seconds, objective = np.loadtxt(
+        text.splitlines(), delimiter=",", skiprows=1, ndmin=2
+    ).T
+    return simulations, seconds, objective
+
+
 def load(path: Path) -> Result:
     """Read a `result.json`, or that of a run's folder. Raises `UserError` where it is missing or
     not one of ours.

@@ -208,14 +208,13 @@ def _read_time(folder: Path) -> int | None:
 def _read_curve(folder: Path) -> Curve | None:
     """The search of a job, of its `history.csv`; None where it left none."""
     from tractexp.identification.optimizer import REFUSED
+    from tractexp.identification.result import parse_history
 
     try:
         text = files.read_text(folder / "history.csv", files.RESULT)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # NumPy's about a file without a row
-            simulations, objective = np.loadtxt(
-                text.splitlines(), delimiter=",", skiprows=1, usecols=(1, 3), ndmin=2
-            ).T
+            simulations, _, objective = parse_history(text)
     except (OSError, ValueError, UserError):
         return None
     valid = objective < REFUSED

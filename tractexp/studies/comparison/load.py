@@ -12,7 +12,7 @@ import numpy as np
 from tractexp import files
 from tractexp.composition import leaves
 from tractexp.errors import TASK, UserError
-from tractexp.identification.result import by_event
+from tractexp.identification.result import by_event, parse_history
 from tractexp.studies.comparison.runs import SearchRun
 
 FITTING = "identify"  # the task whose runs are compared
@@ -101,9 +101,7 @@ def _read_job(folder: Path) -> SearchRun | None:
 
 def _history(text: str) -> dict[str, Any]:
     """The search by iteration, of a `history.csv`."""
-    _, simulations, seconds, history = np.loadtxt(
-        text.splitlines(), delimiter=",", skiprows=1, ndmin=2
-    ).T
+    simulations, seconds, history = parse_history(text)
     return {"simulations": simulations, "seconds": seconds, "history": history}
 
 
