@@ -65,6 +65,12 @@ def join_words(names: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
 
+def list_first(names: Sequence[str], most: int) -> str:
+    """The first of some names, and how many more there are: "a, b and 4 more"."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
 def alternatives(sets: Sequence[Sequence[str]]) -> str:
     """Sets of names as alternatives; many that share a name by that name and what may stand beside
     it: 'a and b or c', 'a beside one more effect (b, c or d)'.

@@ -1,5 +1,9 @@
 """Remarks on what was mended in a file, one for all lines concerned."""
 
+from tractexp.wording import list_first
+
+NAMED_LINES = 5  # of those concerned that are told
+
 
 class Remarks:
     """Notes about one file, in the order in which they came up; the same words about several lines
@@ -26,5 +30,4 @@ def _places(lines: list[int]) -> str:
         return ""
     if len(lines) == 1:
         return f", line {lines[0]}"
-    most = ", ".join(map(str, lines[:5]))
-    return f", lines {most}" + (f" and {len(lines) - 5} more" if len(lines) > 5 else "")
+    return f", lines {list_first([*map(str, lines)], NAMED_LINES)}"

@@ -7,6 +7,7 @@ import numpy as np
 
 from tractexp.record.gap import describe_bridged, estimate_wave_values, find_single_gaps
 from tractexp.recording.recording import NOTHING_BRIDGED, Channel, Recording, Segment
+from tractexp.wording import list_first
 
 NAMED_CHANNELS = 3  # that are told
 
@@ -22,8 +23,7 @@ def bridge_recording(recording: Recording) -> Recording:
         return recording
     at = np.unique(np.concatenate([channel.bridged[0] for _, channel in told]))
     names = [f"{k} '{channel.name.strip()}'" for k, channel in told]
-    more = len(names) - NAMED_CHANNELS
-    which = ", ".join(names[:NAMED_CHANNELS]) + (f" and {more} more" if more > 0 else "")
+    which = list_first(names, NAMED_CHANNELS)
     said = f"{describe_bridged(_times(recording, at))} ({which})"
     note = f"{said}: bridged, and in a dip in no sum of P and Q"
     return replace(recording, channels=channels, notes=(*recording.notes, note))

@@ -18,9 +18,10 @@ from tractexp.errors import UserError, check_distinct, setting
 from tractexp.quoting import shell
 from tractexp.recording.phase_mark import plain, spell_marks
 from tractexp.recording.record_files import find_packed
-from tractexp.wording import join_words
+from tractexp.wording import join_words, list_first
 
 MOST_FILES = 24  # of one event
+NAMED_FILES = 5  # of an archive that are told
 LARGEST_CLOCK_DIFFERENCE = 1e-3  # of rates that are the same by another clock
 FEWEST_COMMON = 10  # samples that all files have
 SAME_INSTANT = 0.01  # of a step, within which two samples are of one instant
@@ -99,10 +100,9 @@ def check_joined(where: str, paths: Sequence[Any], endings: Collection[str]) -> 
 
 def say_several(archive: str, inside: Sequence[str]) -> str:
     """That an archive holds several records, and how to name one of them."""
-    listed = ", ".join(Path(one).relative_to(archive).as_posix() for one in inside[:5])
-    more = f" and {len(inside) - 5} more" if len(inside) > 5 else ""
+    listed = list_first([Path(one).relative_to(archive).as_posix() for one in inside], NAMED_FILES)
     return (
-        f"{archive} holds {len(inside)} records, {listed}{more}: name one,"
+        f"{archive} holds {len(inside)} records, {listed}: name one,"
         f" {shell('tractexp', 'look', inside[0])}, or make a table of all,"
         f" {shell('tractexp', 'task=survey', f'data.path={archive}')}"
     )

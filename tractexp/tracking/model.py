@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RESULT = "result.json"
-NOTE = "mlflow.note.content"  # the tag that MLflow shows as a description
 
 
 def _columns(*names: str, optional: str = "") -> str:
@@ -51,6 +50,8 @@ def log_model(
     installed package (0.4 s) to find requirements that this module has at hand.
     """
     from mlflow.entities import LoggedModelOutput
+
+    from tractexp.tracking.run import NOTE
 
     experiment_id = client.get_run(run_id).info.experiment_id
     tags = {NOTE: description} if description else {}

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 STATUSES = ("FINISHED", "FAILED", "KILLED")
 KEY = "tractexp.key"  # a tag
+NOTE = "mlflow.note.content"  # the tag that MLflow shows as a description
 FITTED = "train"  # the role of a record
 PER_DECADE = 40  # steps that curves share
 CURVE_POINTS = 1000  # a longer curve is thinned evenly; the files of the run keep every point
@@ -275,7 +276,7 @@ def _create(client: Any, run: TrackedRun, uri: str) -> str:
         "mlflow.source.name": "tractexp",
         "mlflow.source.type": "LOCAL",
         "mlflow.source.git.commit": provenance.commit(),
-        "mlflow.note.content": run.description,
+        NOTE: run.description,
         "mlflow.parentRunId": run.parent or "",
         KEY: run.key,
         owner.TAG: owner.signature(),

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tractexp.tracking.run import tag_experiment
+from tractexp.tracking.run import NOTE, tag_experiment
 from tractexp.tracking.store import open_store, sentences
 
 KEY = "tractexp"
@@ -171,7 +171,7 @@ def tags_of_new(experiment_id: str) -> dict[str, str]:
     note = (
         f"[Errors, grades and where the searches ended, as columns]({page(experiment_id, 'TABLE')})"
     )
-    return {TAG: _pack_view(table), "mlflow.note.content": note, KIND: MODELS}
+    return {TAG: _pack_view(table), NOTE: note, KIND: MODELS}
 
 
 def comparison_view(uri: str) -> str:
