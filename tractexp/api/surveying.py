@@ -15,6 +15,7 @@ from tractexp.errors import UserError
 from tractexp.recording import archive
 from tractexp.recording.event_views import list_within, propose_joining, shows_load
 from tractexp.recording.overview import LoadEvent, Sight, View
+from tractexp.report.look import describe_dead_phases
 from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
 from tractexp.store import key
 from tractexp.workers import Workers
@@ -119,11 +120,7 @@ def _quiet(view: View) -> str:
 
 
 def _find_dead_phases(view: View) -> list[str]:
-    return [
-        f"no voltage in phase {s.dead_phases} from first to last"
-        for s in view.sights
-        if s.dead_phases
-    ]
+    return [*filter(None, (describe_dead_phases(s.dead_phases) for s in view.sights))]
 
 
 def _common(view: View) -> dict[str, Any]:

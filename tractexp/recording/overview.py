@@ -28,8 +28,7 @@ from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.quality import Quality, measure_stamp_jitter, network_frequency, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
-from tractexp.recording.trace import join_traces as joined_traces
-from tractexp.recording.trace import of_waves
+from tractexp.recording.trace import join_traces, of_waves
 from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
 
 TOO_SHORT = "fewer than four half cycles are measured: too few to tell what happened"
@@ -321,7 +320,7 @@ def sight(
                 traces.append(trace if feeder.currents else trace.without_currents())
         phasors += [join_phasors(parts)] if parts else []
         if traces:
-            trace = joined_traces(traces)
+            trace = join_traces(traces)
             changes += happenings_in(trace, recording.trigger)
             dead = dead or find_dead_phases(trace)
             brief.append(len(trace.t) < FEWEST_HALF_CYCLES)

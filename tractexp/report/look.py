@@ -221,16 +221,15 @@ def quiet(entry: Mapping[str, Any]) -> str:
     """What is said of a load without events."""
     if entry.get("unexamined"):
         return f"{NOT_EXAMINED}: {entry['unexamined']}"
-    if dead := describe_dead_phases(entry):
+    if dead := describe_dead_phases(entry.get("dead_phases")):
         return dead
     if entry["voltages"] and not entry["currents"]:
         return f"{NO_CURRENT}; {NOTHING}"
     return NOTHING if entry["loaded"] else NO_LOAD
 
 
-def describe_dead_phases(entry: Mapping[str, Any]) -> str:
-    """What is said of a bus with phases that have no voltage from first to last; "" for others."""
-    dead = entry.get("dead_phases")
+def describe_dead_phases(dead: str | None) -> str:
+    """What is said of phases that have no voltage from first to last; "" of none."""
     return f"no voltage in phase {dead} from first to last" if dead else ""
 
 

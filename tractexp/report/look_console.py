@@ -245,7 +245,7 @@ def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     events = join_words(told) or (
         quiet(bus[0]) if any(feeder["loaded"] or not feeder["currents"] for feeder in bus) else ""
     )
-    dead = "" if not happened else describe_dead_phases(bus[0])
+    dead = "" if not happened else describe_dead_phases(bus[0].get("dead_phases"))
     parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), dead, events])
     return f"bus {number}: {'; '.join(parts)}"
 
