@@ -238,7 +238,8 @@ def test_a_law_that_is_none_is_refused_when_the_model_is_composed(stranger, law,
         ),
         (
             late("lag", lambda eq: eq.U),
-            r"before the event of 'late' contains U, which moves; use eq\.U0 or eq\.evaluate_before",
+            r"before the event of 'late' contains U, which moves; "
+            r"use eq\.U0 or eq\.evaluate_before",
         ),
         (
             late("memory", lambda eq: eq[sites.static_voltage]),
