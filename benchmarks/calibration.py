@@ -168,7 +168,7 @@ def tables(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def in_words(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The sentences of docs/uncertainty.md."""
+    """The sentences of docs/coverage.md."""
     sentences = []
     for domain in DOMAINS:
         of = [row for row in rows if row["domain"] == domain]

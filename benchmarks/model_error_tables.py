@@ -225,12 +225,12 @@ def shift_lines(rows: Sequence[dict[str, Any]], before: Sequence[dict[str, Any]]
     return lines
 
 
-# parameters of the table in docs/uncertainty.md
+# parameters of the table in docs/coverage.md
 TOLD = ("T_prime", "X_prime", "M", "T_m", "p_v", "C")
 
 
 def documented(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """The lines of the table in docs/uncertainty.md: how many intervals hold the truth, of how
+    """The lines of the table in docs/coverage.md: how many intervals hold the truth, of how
     many, and the grades.
     """
     groups: dict[str, list[dict[str, Any]]] = {}

@@ -124,7 +124,7 @@ def row(seed: int) -> dict | None:
 
 
 def table(rows: Sequence[dict]) -> str:
-    """Predicted and seen, as docs/missing-effects.md has it."""
+    """Predicted and seen, as docs/coverage.md has it."""
     ties = [r for r in rows if r["verdict"] == "tied"]
     gone = [r for r in ties if r["after"] in ("named", "candidate")]
     right = [r for r in gone if r["sets_after"] == [[r["effect"]]]]

@@ -5,7 +5,7 @@ Records of known truth come from the printed, polar Eqs. (1)-(3) solved by SciPy
 from `tractexp.model`, and from the flux-state simulator in `independent`, whose truth lies outside
 the model class. Each record is read, searched and judged as `task=identify` does it. Rows are
 stored in uncertainty.jsonl record by record, so that an interrupted study goes on where it stopped;
-docs/uncertainty.md has its table from there.
+docs/coverage.md has its table from there.
 """
 
 import os
@@ -26,7 +26,7 @@ import oracle  # noqa: F401
 from model_error import rows_of, six_digits
 
 STORED = Path(__file__).with_suffix(".jsonl")
-PAGE = Path(__file__).parents[1] / "docs" / "uncertainty.md"
+PAGE = Path(__file__).parents[1] / "docs" / "coverage.md"
 NAMES = ("T_prime", "X_prime", "C", "M", "T_m", "p_v", "q_v")
 LOW = np.array([0.04, 0.2, 0.7, 0.003, 0.3, 0.8, 2.6])  # truths are drawn between these
 HIGH = np.array([0.15, 0.5, 0.92, 0.010, 0.6, 2.0, 5.0])

@@ -124,8 +124,8 @@ def test_every_task_has_a_page_with_its_settings_and_the_commands_that_pages_sho
     )
     assert "null: in single runs, not in sweeps" in made["identify"]
     assert "task=discrepancy data=contactors" in made["discrepancy"]
-    assert "[The missing effect: The order of the model](" in made["discrepancy"]
-    assert "](../../missing-effects.md#the-order-of-the-model)" in made["discrepancy"]
+    assert "[How an effect is named: A worked example](" in made["discrepancy"]
+    assert "](../../missing-effects.md#a-worked-example)" in made["discrepancy"]
     assert "## Shown in" in made["identify"]
     assert "tractexp look" not in made["identify"]
 

@@ -49,7 +49,7 @@ def test_a_set_of_the_generator_has_the_ranks_that_are_stored():
 
 
 def test_the_docs_say_what_is_stored():
-    docs = (Path(__file__).parents[2] / "docs" / "uncertainty.md").read_text(encoding="utf-8")
+    docs = (Path(__file__).parents[2] / "docs" / "coverage.md").read_text(encoding="utf-8")
     assert calibration.in_words(ROWS) in " ".join(docs.split())
 
 

@@ -123,7 +123,7 @@ def test_the_error_in_S_is_of_the_excursion():
 def test_the_page_tells_what_the_stored_rows_hold():
     root = Path(__file__).parents[2]
     stored = (root / "benchmarks" / "model_error.jsonl").read_text(encoding="utf-8").splitlines()
-    page = (root / "docs" / "uncertainty.md").read_text(encoding="utf-8")
+    page = (root / "docs" / "coverage.md").read_text(encoding="utf-8")
     lines = documented([json.loads(line) for line in stored])
     assert len(lines) > 6
     for line in lines:

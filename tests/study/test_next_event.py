@@ -296,7 +296,7 @@ def test_a_plan_for_rivals_says_what_an_investigation_says(tied, tmp_path):
 def test_the_docs_report_what_the_stored_study_holds():
     root = Path(__file__).parents[2]
     rows = json.loads((root / "benchmarks" / "next_event.json").read_text())["rows"]
-    docs = (root / "docs" / "missing-effects.md").read_text()
+    docs = (root / "docs" / "coverage.md").read_text()
     part = docs.partition("<!-- next event -->")[2].partition("<!-- end of next event -->")[0]
     assert part.strip() == study.table(rows)
 

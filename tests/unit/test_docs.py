@@ -36,3 +36,10 @@ def test_the_pages_are_read_in_an_afternoon():
         sum(len(page.read_text(encoding="utf-8").split()) for page in (ROOT / "docs").glob("*.md"))
         <= 30_000
     )
+
+
+@pytest.mark.parametrize("page", ["identification", "missing-effects"])
+def test_a_page_of_method_is_read_at_one_sitting(page):
+    """At most 900 words: what a method needs beyond that is a catalogue, a study or a docstring."""
+    text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    assert len(text.split()) <= 900

@@ -501,7 +501,36 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
 
 @plugin
 class Discrepancy(Task, call=investigate):
-    """Investigate the training events and judge what is found on the held-out ones."""
+    """Investigate the training events and judge what is found on the held-out ones.
+
+    Writes
+
+        discrepancy.html         every event, measured and calculated before and after, where they
+                                 disagree, candidates by evidence, the equations that changed
+        discrepancy.json         the same for machines
+        result.json              parameters of the extended model, or of the base model where
+                                 nothing is added
+        conf/model/extended.yaml the extended model with the recorder's window, where a set is
+                                 kept; its first line is the command that uses it
+        unexplained.csv          the residual, where more than noise is left
+        proposed_effect.py       a proposed term as an effect that runs
+
+    Keys of `discrepancy.json`: `verdict`, `complete` (nothing but noise is left) and `reason`;
+    `effects` that were added, all `name_sets` that were not rejected, and `forms` {name: {`place`,
+    `kind`, `law`, `differs`, `effect` (for `model.effects`), `curve` (with its 95 % band beside the
+    catalogue's)}}; `where` [{`event`, `channel`, `start`, `end`, `share`}]; `gap` {`train`,
+    `validate`: {`before`, `after`, `closed`}}; `candidates` [{`effects`, `status`,
+    `likelihood_ratio`, `parameters`, `evidence`, which is what the decision reads}];
+    `contributions`, what each name is good for; `remainder`, the loudest shapes of what is left
+    (ringing, decay, step, pulse), and `left`, p of each test of it; `next_event` {`sentence`,
+    `rivals`, `model_error`, `recommended`, `indistinguishable`, `no_event_separates`, `tried`};
+    `adequacy`, the grade.
+
+    `proposal` is null, and `no_proposal` says why, or it holds `terms` [{`balance`, `signal`,
+    `clock`, `words`, `latex`, `function_of_voltage`, `parameters`}], `explained` and `left`
+    {`train`, `validate`}, `p`, `when`, `ties`, `alike` (textbook effects that could make most of
+    the same change) and `plugin`.
+    """
 
     resumes = True
     instead = {"model.per_event": "its parameters are shared by all events, so leave it out"}

@@ -3,7 +3,7 @@
 A model that lacks a stator resistance, or whose static load follows another law, is fitted again
 with it, from where its own fit ended. Where that fits as well or better, each parameter that both
 have moves. The move is told beside the estimate, and where more than noise is left the interval
-reaches over it (docs/uncertainty.md has how often that holds). Which structures are tried the
+reaches over it (docs/coverage.md has how often that holds). Which structures are tried the
 plugins say (`Part.rival`); an effect that the equations refuse is none, and neither is a static
 load that refuses an effect of the model.
 """
