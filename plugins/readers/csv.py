@@ -44,22 +44,24 @@ PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips
 
 @plugin
 class CSV(Tabular, Reader):
-    """Tables of t, U, P, Q and, where recorded, f and U2: CSV and other text, Parquet, Excel, logs
-    of instruments.
+    """Tables of t, U, P, Q and, where recorded, f, U2 and U_angle: CSV and other text, Parquet,
+    Excel, logs of instruments.
 
     A file named in `train` or `validate` is one record. With `path` the dips of one long table are
     numbered from 1 in order of time, and `train` and `validate` are numbers: the first is fitted
     and the others validate unless said otherwise. Names, units, delimiter, decimal mark and
     encoding are found and said in a note, or given (`columns`, `units`, ...); phasors (magnitudes
-    and angles) become U, P, Q, f, U2. Without units U, P, Q, U2 are per unit, or in kV (line to
+    and angles) become U, P, Q, U_angle, f, U2. U_angle [rad or deg] is the voltage's angle in a
+    frame that turns at nominal frequency, wrapped or not: f is the frequency at which it turns
+    between its jumps. Without units U, P, Q, U2 are per unit, or in kV (line to
     line), MW and Mvar where `base_voltage` [kV] and `base_power` [MVA] say what one per unit is;
     with units and no base, the base is the steady state before the first dip. A path
     `pkg://package/file.csv` reads a file inside an installed package. A file of the same name
     ending in .json beside the table may give its "name", a "note" on where it comes from, "base",
     "columns" and "units".
 
-    Source: RFC 4180, with comment lines; the names t, U, P, Q, f, U2 are tractexp's own. Phasors:
-    Fortescue 1918.
+    Source: RFC 4180, with comment lines; the names t, U, P, Q, f, U2, U_angle are tractexp's own.
+    Phasors: Fortescue 1918.
     Departures: any delimiter, title lines, unit rows.
     """
 
@@ -183,6 +185,7 @@ class CSV(Tabular, Reader):
             source=path,
             notes=(*sidecar.notes, *quantities.notes),
             identity=begun,
+            base=Base(frequency=quantities.frequency),
             **arrays,
         )
         even = raw if sidecar.uniform else raw.uniform(table.place)

@@ -23,11 +23,12 @@ from tractexp.record import (
     detect,
     on_own_base,
 )
+from tractexp.record.angle import unwrap_angle
 from tractexp.record.dips import around
 from tractexp.recording.event_views import settings_of
 from tractexp.wording import count_noun
 
-REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
+REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2", "U_angle")
 GROUP = "data"
 
 
@@ -94,15 +95,17 @@ def read(
     Q: Any = None,
     f: Any = None,
     U2: Any = None,
+    U_angle: Any = None,
     name: str | None = None,
     **settings: Any,
 ) -> Dips:
     """Read records of voltage dips, check them and find the dip in each.
 
-    A source is the path of a CSV file (columns t, U, P, Q and, where recorded, f, U2) or of a
+    A source is the path of a CSV file (columns t, U, P, Q and, where recorded, f, U2, U_angle) or a
     COMTRADE file (.cfg), a pandas or polars frame or a mapping with those columns, a shipped name
     ("tibet_50pct"), or a `Record`. Arrays (N,) can be given directly as `t` [s], `U`, `P`, `Q`,
-    `U2` [pu] and `f` [Hz], and are called `name`. Loads count P and Q as positive when consumed. P
+    `U2` [pu], `f` [Hz] and `U_angle` [rad, in a frame that turns at nominal frequency, wrapped or
+    not], and are called `name`. Loads count P and Q as positive when consumed. P
     and Q may have gaps (nan).
 
     `settings` are those of the reader: `base_voltage` [kV, line to line] and `base_power` [MVA]
@@ -114,7 +117,7 @@ def read(
     naming the file, the place and the value, for what is no record, holds no dip or has settings
     that its reader does not know.
     """
-    arrays = {"t": t, "U": U, "P": P, "Q": Q, "f": f, "U2": U2}
+    arrays = {"t": t, "U": U, "P": P, "Q": Q, "f": f, "U2": U2, "U_angle": U_angle}
     columns = {key: values for key, values in arrays.items() if values is not None}
     if name is not None and not columns:
         raise UserError(f"name={name} names arrays (t=, U=, P=, Q=), and none are given")
@@ -164,6 +167,8 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
         for key in (*REQUIRED, *OPTIONAL)
         if key in columns
     }
+    if "U_angle" in values:
+        values["U_angle"] = unwrap_angle(values["U_angle"])
     base = Base(
         bases["base_voltage"] or 1.0, bases["base_power"] or 1.0, bases["frequency"] or 50.0
     )
@@ -261,7 +266,7 @@ def record_from_dict(content: Mapping[str, Any]) -> Record:
     arrays: Any = {
         k: np.array(content[k], dtype=float)
         for k in (*REQUIRED, *OPTIONAL)
-        if content[k] is not None
+        if content.get(k) is not None
     }
     base, notes = Base(**content["base"]), tuple(content["notes"])
     original = Base(**content["given_base"]) if content.get("given_base") else None

@@ -40,6 +40,7 @@ def phasors(
         weight_P=weights[0],
         weight_Q=weights[1],
         window=averaging and averaging.weights,
+        U_angle=record.U_angle,
     )
 
 

@@ -14,11 +14,11 @@ from tractexp.filetypes.columns import Role, fits, is_unit, order_of, role
 from tractexp.filetypes.table import TableFile
 from tractexp.recording.unit import amount
 
-CONTRACT = ("t", "U", "P", "Q", "f", "U2")
+CONTRACT = ("t", "U", "P", "Q", "f", "U2", "U_angle")
 PHASES = ("a", "b", "c")
 LINES = ("ab", "bc", "ca")
 KEYS = (
-    *CONTRACT,
+    *(key for key in CONTRACT if key != "U_angle"),
     "dfdt",
     "frac",
     "I",
@@ -388,7 +388,10 @@ def _set(keys: Iterable[str], letter: str, single: Sequence[str]) -> list[str]:
 def _powers(options: Mapping[str, Any]) -> list[str]:
     U = _set(options, "U", ("U", "U1")) or _some(options, "U")
     P, Q = _set(options, "P", ("P",)), _set(options, "Q", ("Q",))
-    return [*U, *P, *Q, *(key for key in ("f", "U2") if key in options)] if U and P and Q else []
+    if not (U and P and Q):
+        return []
+    angle = [key for key in ("U_angle", "U1_angle") if key in options][:1]
+    return [*U, *P, *Q, *(key for key in ("f", "U2") if key in options), *angle]
 
 
 def _telling_current(

@@ -23,6 +23,7 @@ from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.row_quality import find_bad_rows, find_filled_rows
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar
 from tractexp.filetypes.table import TableFile, TableForm, instrument_of, open_table
+from tractexp.record.angle import unwrap_angle
 from tractexp.record.phasor import sequences
 from tractexp.recording.nominal_voltage import is_between_phases, off_nominal
 from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
@@ -33,6 +34,9 @@ LARGEST_KILOVOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
 LEAST_LIVE_VOLTAGE = 0.5  # of the median voltage: at less the frequency is noise
 SLOWEST = 10.0  # Hz: no network's frequency is lower
+ANGLES = frozenset(("U_angle", "U1_angle"))  # of the voltage, beside powers
+BESIDE = ANGLES | {"U2"}
+WHOLE_TURN = 0.85  # of a turn: an angle that steps by more from row to row was wrapped there
 AGREES = 0.05  # of the apparent power, within which it is the product of voltage and current
 
 
@@ -165,7 +169,7 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     values, start, said = _read(table, mapping)
     columns, notes = {"t": values["t"]}, [*mapping.notes, *said]
     for letter in "UPQ":
-        keys = [key for key in values if key[0] == letter and key != "U2"]
+        keys = [key for key in values if key[0] == letter and key not in BESIDE]
         columns[letter] = (
             values[keys[0]] if len(keys) == 1 else np.add.reduce([values[key] for key in keys])
         )
@@ -175,6 +179,9 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
                 f"{letter} is the {'mean' if letter == 'U' else 'sum'} of {', '.join(keys)}"
             )
     columns |= {key: values[key] for key in ("f", "U2") if key in values}
+    for key in ANGLES & values.keys():
+        columns["U_angle"], note = _turned_angle(mapping.columns[key], values[key])
+        notes.append(note)
     first = next(key for key in mapping.columns if key[0] == "U" and key != "U2")
     power = next(key for key in mapping.columns if key[0] == "P")
     absolute = {"U": _absolute(mapping, first), "P": _absolute(mapping, power)}
@@ -185,6 +192,19 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
             notes += check_alternating(table.source, told.name, columns, kilovolts)
         notes += _to_lines(columns, told.role.line, first, current)
     return Powers(columns, absolute, (*table.notes, *notes), start=start)
+
+
+def _turned_angle(one: MappedColumn, values: np.ndarray) -> tuple[np.ndarray, str]:
+    """An angle (N,) in rad, not wrapped, and what is said of it.
+
+    Without a unit it is in degrees where it is wrapped by 360, else in rad.
+    """
+    steps = np.abs(np.diff(values[np.isfinite(values)]))
+    by_degrees = float(steps.max(initial=0.0)) > WHOLE_TURN * 360
+    scale = factor(one.role.unit) if one.role.unit else np.pi / 180 if by_degrees else 1.0
+    unit = one.role.unit or ("deg, for it is wrapped by 360" if by_degrees else "rad")
+    note = f"{one.label} drives the model: the voltage's angle, {unit}"
+    return unwrap_angle(scale * values), note
 
 
 def _check_power_units(table: TableFile, mapping: Mapped) -> None:
@@ -295,25 +315,14 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
         columns["U2"] = size * np.abs(V2)
     source = "U, P, Q from phasors" + (", positive sequence" if V2 is not None else "")
     notes = [*mapping.notes, *note, *angle_notes, *turned, *sort, source]
+    columns["U_angle"] = unwrap_angle(np.angle(V1))
     if "f" in values:
         columns["f"] = (
             values["f"] if np.nanmedian(values["f"]) > nominal / 2 else nominal + values["f"]
         )
     else:
-        columns["f"] = nominal + _measure_turning(V1, values["t"])
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
     return Powers(columns, {"U": absolute, "P": absolute}, (*table.notes, *notes), start=start)
-
-
-def _measure_turning(V: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """How fast phasors (N,) turn [Hz] at times t (N,) [s]; over a gap as from one side to the
-    other.
-    """
-    there = np.isfinite(V)
-    if np.count_nonzero(there) < 2:
-        return np.full(len(t), np.nan)
-    angle = np.interp(t, t[there], np.unwrap(np.angle(V[there])))
-    return np.gradient(angle, t) / (2 * np.pi)
 
 
 def _forward(V: np.ndarray, sources: Sequence[MappedColumn]) -> tuple[np.ndarray, list[str]]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.kernel import objects, steady
-from tractexp.kernel.layout import INPUTS, LANES
+from tractexp.kernel.layout import INPUTS, LANES, PHASOR_INPUTS
 
 # releases Python's lock
 FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 15, *[ctypes.c_int64] * 6)
@@ -72,18 +72,19 @@ class Kernel:
         """Simulate candidates over events and sum their weighted squared errors.
 
         candidates (E, given, n): parameters, then P0 and Q0; event (E, columns as in EVENT); first
-        (E + 1,) where each event begins in the samples; inputs (rows as in INPUTS or its first
-        five, N); measured, weights (C, N); substeps (E,) Runge-Kutta steps a sample. Written are
-        sums (E, C, n), miss (E, n), and, unless they are empty, outputs (C, n, N) and starts (E, K,
-        n): states and memories before the event. All are C-contiguous, of float64, `first` and
-        `substeps` of int64. Raises `ValueError` for anything else.
+        (E + 1,) where each event begins in the samples; inputs (rows as in INPUTS or
+        PHASOR_INPUTS, N); measured, weights (C, N); substeps (E,) Runge-Kutta steps a sample.
+        Written are sums (E, C, n), miss (E, n), and, unless they are empty, outputs (C, n, N) and
+        starts (E, K, n): states and memories before the event. All are C-contiguous, of float64,
+        `first` and `substeps` of int64. Raises `ValueError` for anything else.
         """
         room = self.room
-        if candidates.ndim != 3 or inputs.ndim != 2 or inputs.shape[0] not in (5, len(INPUTS)):
+        rows = len(PHASOR_INPUTS), len(INPUTS)
+        if candidates.ndim != 3 or inputs.ndim != 2 or inputs.shape[0] not in rows:
             raise ValueError(
                 f"candidates {candidates.shape} and inputs {inputs.shape} must have shapes (events,"
                 f" {room.given},"
-                f" n) and (5 or {len(INPUTS)}, samples)"
+                f" n) and ({rows[0]} or {rows[1]}, samples)"
             )
         (events, _, n), samples = candidates.shape, inputs.shape[1]
         _check("candidates", candidates, (events, room.given, n))

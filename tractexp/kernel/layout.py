@@ -2,15 +2,12 @@
 lanes go together.
 """
 
-# Rows of the inputs: U_rate is the slope of U there [pu/s]. Those of waves follow: the voltage's
-# space vector v in the frame, its zero sequence, their slopes, and the frame's angle to phase a by
-# cosine and sine.
-INPUTS = (
-    "U",
-    "omega_s",
-    "U_rate",
-    "U2",
-    "t",
+# Rows of the inputs: U_rate is the slope of U there [pu/s], U_angle the voltage's angle [rad] in a
+# frame that turns at nominal speed.
+PHASOR_INPUTS = ("U", "omega_s", "U_rate", "U2", "t", "U_angle")
+# Those of waves follow: the voltage's space vector v in the frame, its zero sequence, their slopes,
+# and the frame's angle to phase a by cosine and sine.
+WAVE_INPUTS = (
     "v_d",
     "v_q",
     "v_zero",
@@ -20,8 +17,10 @@ INPUTS = (
     "turn_re",
     "turn_im",
 )
-# what is a cubic between samples: its slope
-SMOOTH = {name: f"{name}_rate" for name in ("U", "v_d", "v_q", "v_zero")}
+INPUTS = (*PHASOR_INPUTS, *WAVE_INPUTS)
+# what is a cubic between samples: its slope. The speed omega_s is that of the angle, so that within
+# a step the angle moves by what it was recorded to move, also where it jumps.
+SMOOTH = {name: f"{name}_rate" for name in ("U", "v_d", "v_q", "v_zero")} | {"U_angle": "omega_s"}
 EVENT = ("U0", "omega_s0", "U20", "omega_n", "step")  # one number each per event
 # lanes of a vector: wider than many a processor's, whose instructions then need not wait for each
 # other

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tractexp.kernel.layout import EVENT, INPUTS
+from tractexp.record.curve import slopes
 
 PHASORS, WAVES = DOMAINS = ("phasors", "waves")
 OUTPUTS = {
@@ -25,7 +26,8 @@ class Excitation:
 
     U [pu] (N,); P, Q [pu] (N,), nan where missing; step [s]; U0, P0, Q0 [pu] and omega_s0 are the
     steady state before the event; omega_s (N,) is the synchronous speed relative to nominal
-    [rad/s]; omega_n is nominal; U2 (N,) and U20 are the negative-sequence voltage [pu], where
+    [rad/s], U_angle (N,) the voltage's angle [rad] whose slope it is where that was recorded, else
+    its integral; omega_n is nominal; U2 (N,) and U20 are the negative-sequence voltage [pu], where
     recorded.
     """
 
@@ -45,18 +47,21 @@ class Excitation:
     weight_Q: float = 1.0
     # (odd,) weights of the recorder's window, through which power is looked at
     window: np.ndarray | None = None
+    U_angle: np.ndarray | None = None
 
     @property
     def inputs(self) -> np.ndarray:
-        """The kernel's rows (5, N)."""
+        """The kernel's rows (6, N)."""
         absent = np.full(len(self.U), np.nan)
+        omega_s = np.zeros(len(self.U)) if self.omega_s is None else self.omega_s
         return np.stack(
             [
                 self.U,
-                np.zeros(len(self.U)) if self.omega_s is None else self.omega_s,
+                omega_s,
                 slopes(self.U) / self.step,
                 absent if self.U2 is None else self.U2,
                 np.arange(len(self.U)) * self.step,
+                integrate(omega_s, self.step) if self.U_angle is None else self.U_angle,
             ]
         )
 
@@ -102,7 +107,7 @@ class WaveformDrive:
 
     @property
     def inputs(self) -> np.ndarray:
-        """The kernel's rows (13, N)."""
+        """The kernel's rows (14, N)."""
         n, smooth = len(self.v), (self.v.real, self.v.imag, self.v_zero)
         rows = [
             self.U,
@@ -110,6 +115,7 @@ class WaveformDrive:
             slopes(self.U) / self.step,
             self.U2,
             np.arange(n) * self.step,
+            self.omega_s0 * np.arange(n) * self.step,
         ]
         bends = (band_limited(y) / self.step for y in smooth)
         return np.stack([*rows, *smooth, *bends, self.turn.real, self.turn.imag])
@@ -120,27 +126,9 @@ class WaveformDrive:
         return self.currents
 
 
-def slopes(y: np.ndarray) -> np.ndarray:
-    """Slope at each sample (N,), per sample, of the smooth curve through them: Akima's, which does
-    not overshoot.
-
-    Between samples the kernel reads the voltage off the cubics these slopes define. A straight line
-    would round the edges of a dip recorded every 10 ms by more than the noise of a good recorder.
-
-    Source: Akima 1970, with the weights that keep flat stretches flat (makima).
-    """
-    if len(y) < 3:
-        return np.gradient(y) if len(y) > 1 else np.zeros(len(y))
-    m = np.diff(y)
-    before = [2 * m[0] - m[1], 3 * m[0] - 2 * m[1]]
-    after = [2 * m[-1] - m[-2], 3 * m[-1] - 2 * m[-2]]
-    m = np.concatenate((before[::-1], m, after))  # m[k + 2] is the slope after sample k
-    spread = np.abs(np.diff(m)) + np.abs(m[1:] + m[:-1]) / 2
-    left, right = spread[2:], spread[:-2]  # weights of the slopes before and after each sample
-    total = left + right
-    return np.where(
-        total > 0, (left * m[1:-2] + right * m[2:-1]) / np.where(total > 0, total, 1.0), 0.0
-    )
+def integrate(speed: np.ndarray, step: float) -> np.ndarray:
+    """The angle (N,) [rad] that a speed (N,) [rad/s] on straight lines between samples turns."""
+    return np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) * (step / 2))])
 
 
 def band_limited(y: np.ndarray) -> np.ndarray:
@@ -159,7 +147,7 @@ def band_limited(y: np.ndarray) -> np.ndarray:
 class Drive:
     """One or several events end to end. Shapes: N samples in all, E events."""
 
-    # (5, N) or (13, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
+    # (6, N) or (14, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
     inputs: np.ndarray
     measurements: np.ndarray  # (C, N): P and Q, or three currents; gaps filled with 0
     weights: np.ndarray  # (C, N): 0 in a gap

@@ -14,7 +14,7 @@ from sympy import I, conjugate, im, re
 
 from tractexp.errors import Unfit, Unknown, UserError, nearest
 from tractexp.kernel.graph import Symbol, symbols_of
-from tractexp.kernel.layout import EVENT, INPUTS
+from tractexp.kernel.layout import EVENT, INPUTS, WAVE_INPUTS
 from tractexp.model import sites
 from tractexp.model.apart import Apart
 from tractexp.model.drive import OUTPUTS, PHASORS, WAVES
@@ -70,8 +70,11 @@ class Equations:
 
     def __init__(self, domain: str = PHASORS) -> None:
         self.waves = domain == WAVES
-        self.U, self.omega_s, self.U_rate, self.U2, self.t, *waves = map(_real, INPUTS)
-        v_d, v_q, self.v_zero, v_d_rate, v_q_rate, self.v_zero_rate, turn_re, turn_im = waves
+        inputs = ("U", "omega_s", "U_rate", "U2", "t")
+        self.U, self.omega_s, self.U_rate, self.U2, self.t = map(_real, inputs)
+        v_d, v_q, self.v_zero, v_d_rate, v_q_rate, self.v_zero_rate, turn_re, turn_im = map(
+            _real, WAVE_INPUTS
+        )
         self.v, self.v_rate, self.turn = self.U, self.U_rate, sympy.Integer(1)
         if self.waves:
             self.v, self.v_rate, self.turn = (

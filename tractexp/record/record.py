@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import DATA, UserError
+from tractexp.record.angle import measure_frequency
 from tractexp.record.gap import (
     bridge_values,
     describe_bridged,
@@ -30,6 +31,9 @@ FEWEST_SAMPLES = 20
 PLAUSIBLE_VOLTAGE = (0.5, 1.5)  # pu, at the start of a record
 DEAD_VOLTAGE_SHARE = 0.05  # of the voltage at the start: less is no voltage at all
 PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
+PLAUSIBLE_FREQUENCY = 0.2  # of the nominal one: how far off it is at most, but at a jump
+LARGEST_JUMP = 0.5  # turns: what an angle jumps by at most, and so what a peak of f may turn it by
+SAME_FRAME = 0.01  # Hz: within it f and the slope of an angle are of one frame
 GREATEST_CURRENT = 50.0  # kA, of a load before a dip
 # of a base [kV, MVA, Hz]
 SIZES = {"voltage": (1e-6, 1500.0), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}
@@ -82,7 +86,8 @@ class Record:
     and are sampled uniformly. `window` is the averaging window of its phasors, None where no one
     says it; `more` are further channels, which no model reads. `source` says where the record came
     from, `notes` what was changed in it or is odd about it, one sentence each. `original_base` is
-    the base of the file, None where that is `base`; `identity` says which load it is: station,
+    the base of the file, None where that is `base`; where `U_angle` is recorded, f is the frequency
+    at which it turns between its jumps; `identity` says which load it is: station,
     device, load, channels; `digest` is the SHA-256 of its channels as they were read, "" where they
     still are that.
     """
@@ -103,14 +108,16 @@ class Record:
     original_base: Base | None = None
     identity: Mapping[str, str] = field(default_factory=dict)
     digest: str = ""
+    # rad, not wrapped, in a frame that turns at nominal frequency
+    U_angle: np.ndarray | None = None
 
     def __repr__(self) -> str:
         span = f"{self.samples} samples of {', '.join(self.channels)}"
         return f"{self.name}: {span}, {self.t[0]:.3f} to {self.t[-1]:.3f} s, {self.rate:.0f} Hz"
 
     def to_frame(self) -> Any:
-        """A pandas frame of what a model reads: t [s], U, P, Q and, where recorded, f [Hz] and U2,
-        per unit of `base`.
+        """A pandas frame of what a model reads: t [s], U, P, Q and, where recorded, f [Hz], U2 and
+        U_angle [rad], per unit of `base`.
         """
         import pandas
 
@@ -144,6 +151,7 @@ class Record:
     def channels(self) -> dict[str, np.ndarray]:
         """The arrays present, by name, time first."""
         every = {"t": self.t, "U": self.U, "P": self.P, "Q": self.Q, "f": self.f, "U2": self.U2}
+        every["U_angle"] = self.U_angle
         return {name: values for name, values in every.items() if values is not None}
 
     def part(self, window: slice) -> "Record":
@@ -182,7 +190,25 @@ class Record:
             self._with_rows(rows)
             ._bridge()
             ._even_out(lambda i: given(i - int(np.searchsorted(rows + np.arange(len(rows)), i))))
+            ._turn()
         )
+
+    def _turn(self) -> "Record":
+        """The record with the frequency at which its angle turns between jumps.
+
+        Where f was recorded and says that the angle turns in another frame than that of the nominal
+        frequency, a note says so and the angle is left out.
+        """
+        if self.U_angle is None:
+            return self
+        f = measure_frequency(self.U_angle, self.step, self.base.frequency)
+        if self.f is None or abs(float(np.median(f - self.f))) < SAME_FRAME:
+            return replace(self, f=f)
+        note = (
+            f"U_angle turns as at {np.median(f):.5g} Hz where f is {np.median(self.f):.5g} Hz: it"
+            f" is no angle in a frame of {self.base.frequency:g} Hz, and f is used without it"
+        )
+        return replace(self, U_angle=None, notes=(*self.notes, note))
 
     def _with_rows(self, rows: np.ndarray) -> "Record":
         """The record with a row that is missing (nan) before each of `rows` (K,)."""
@@ -198,7 +224,7 @@ class Record:
 
         P and Q are not invented: of these samples they are in no sum.
         """
-        drives = {name: x for name, x in self.channels.items() if name in ("U", "f", "U2")}
+        drives = {name: x for name, x in self.channels.items() if name not in ("t", "P", "Q")}
         at = find_single_gaps(np.any(np.isnan(np.stack([*drives.values()])), axis=0))
         if not len(at):
             return self
@@ -366,15 +392,25 @@ class Record:
                 f"if it is in kW or MW, say so, {DATA.units}={{P: kW, Q: kvar}}, or give the "
                 f"base as {DATA.base_power} (MVA)"
             )
+        self._check_frequency(DEAD_VOLTAGE_SHARE * U)
+
+    def _check_frequency(self, dead: float) -> None:
+        """Refuse a frequency that is none, at a voltage above `dead`; below it only noise turns.
+
+        A jump of the angle is a peak of f that turns it by half a turn at most.
+        """
         if self.f is None:
             return
-        alive = self.U > DEAD_VOLTAGE_SHARE * U  # what turns while there is no voltage is noise
-        off = np.where(alive, np.abs(self.f / self.base.frequency - 1), 0.0)
-        if off.max() > 0.2:
-            i = int(np.argmax(off))
+        off = np.where(dead < self.U, self.f - self.base.frequency, 0.0)
+        odd = np.abs(off) > PLAUSIBLE_FREQUENCY * self.base.frequency
+        begins = np.flatnonzero(np.diff(odd, prepend=False) & odd)
+        stretches = np.split(np.where(odd, np.abs(off), 0.0), begins)[1:]
+        turned = [float(stretch.sum()) * self.step for stretch in stretches]
+        if max(turned, default=0.0) > LARGEST_JUMP:
+            i = int(begins[int(np.argmax(turned))])
             raise UserError(
-                f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than 20 % off the"
-                " nominal "
+                f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than"
+                f" {100 * PLAUSIBLE_FREQUENCY:.0f} % off the nominal "
                 f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz; say"
                 " its unit, "
                 f"{DATA.units}={{f: mHz}}, the nominal frequency, {DATA.frequency}=60, or leave f"
