@@ -28,6 +28,7 @@ from tractexp.recording.railway import direct_voltage
 from tractexp.recording.recording import unit_of
 from tractexp.wording import count_noun
 
+NAME_THEM = "name the channels of one load: voltages=[...] currents=[...]"
 # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves
 # out
 EARLIER = 3.0
@@ -379,6 +380,8 @@ def _content(view: View) -> dict[str, Any]:
         last = recording.segments[-1]
         shown = any(each.feeder is None or each.feeder.currents for each in view.sights)
         lacks = "" if shown else explain_unrecognized(recording)
+        named = not lacks or can_be_named(recording)
+        remedy = f"; {NAME_THEM}" if lacks and named else ""
         content |= {
             "station": recording.station,
             "device": recording.device,
@@ -393,12 +396,11 @@ def _content(view: View) -> dict[str, Any]:
             "notes": [
                 *filter(None, [view.proposed]),
                 *recording.notes,
-                *([f"no load was recognised: {lacks}"] if lacks else []),
+                *([f"no load was recognised: {lacks}{remedy}"] if lacks else []),
             ],
             "channels": [_channel(view, number) for number in range(len(recording.channels))],
         }
         direct = bool(lacks and direct_voltage(recording))
-        named = not lacks or can_be_named(recording)
         content |= {"lacks": lacks, "can_be_named": named, "direct": direct}
     content["measured_frequency"] = view.frequency
     return content | {"feeders": [_feeder(view, shown) for shown in view.sights]}

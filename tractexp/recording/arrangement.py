@@ -20,7 +20,14 @@ from tractexp.record.direction import at_level, direction
 from tractexp.record.phasor import sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.label import backward, groups, is_to_ground, kind, order, residual
+from tractexp.recording.label import (
+    backward,
+    find_residuals,
+    groups,
+    is_to_ground,
+    kind,
+    order,
+)
 from tractexp.recording.nominal_voltage import is_between_phases
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import OTHER_FREQUENCY, frequency, nearest_nominal, snapshots
@@ -147,7 +154,8 @@ def _arrange_order(recording: Recording, feeder: Feeder) -> Feeder:
 def _residuals(recording: Recording, feeder: Feeder) -> None:
     """Refuse what is measured of all phases together, where a phase or a line is needed."""
     for key, numbers in (("voltages", feeder.voltages), ("currents", feeder.currents)):
-        if odd := [i for i in numbers if len(numbers) > 1 and residual(recording.channels[i])]:
+        residuals = find_residuals([recording.channels[i] for i in numbers])
+        if odd := [numbers[k] for k in residuals if len(numbers) > 1]:
             rest = [i for i in numbers if i not in odd]
             where = setting(f"data.{key}")
             raise UserError(

@@ -15,8 +15,10 @@ from tractexp.recording.connection import usual
 from tractexp.recording.kirchhoff import closed_sums
 from tractexp.recording.label import (
     Group,
+    find_residuals,
     groups,
     kind,
+    order,
     other_quantity,
     residual,
     shared_name,
@@ -26,9 +28,10 @@ from tractexp.recording.railway import (
     conductor_pairs,
     contact_first,
     direct_voltage,
+    is_between_conductors,
     is_opposite,
     is_return,
-    opposite_pair,
+    opposite_pairs,
     other_conductor,
 )
 from tractexp.recording.recording import Recording
@@ -46,7 +49,9 @@ PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
 LARGEST_RESIDUAL_SHARE = 0.5
 COUPLER = re.compile(r"coupler|bus[ _-]?tie|sectionali[sz]|kuppl|母联|分段|шсв|секцион|acoplador")
 ALONE = "no current is recorded: there is no load to fit"
+ONE_PHASE = "one phase of a three-phase load, a part of its power"
 HALF = "half of an autotransformer feeder"
+MAYBE_HALF = f"may be {HALF}"
 SAME_BUS = 0.02  # voltages that never differ by more are those of one bus, or of two tied ones
 
 
@@ -102,7 +107,7 @@ def propose(recording: Recording) -> list[Feeder]:
     two = any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)
     fitting = [load for load in loads if buses and (two or len(load.numbers) == 3)]
     options = [_feeders(recording, phasors, load, buses, level) for load in fitting]
-    options += _conductors(recording, phasors, volts, amps, [*buses, *loads])
+    options += _conductors(recording, phasors, volts, amps, [*buses, *loads], level)
     taken = [
         *buses,
         *loads,
@@ -142,18 +147,26 @@ def buses_alone(recording: Recording) -> list[Feeder]:
             (),
             usual(1, 1),
             name=recording.channels[i].name.strip(),
-            why=(ALONE,),
+            why=(_why_alone(recording),),
             loaded=False,
         )
         for i in alone
     ]
 
 
+def _why_alone(recording: Recording) -> str:
+    """Why voltages are shown without currents."""
+    amps = [i for i, c in enumerate(recording.channels) if kind(c) == "current"]
+    if not amps:
+        return ALONE
+    return f"which voltages {_names(recording, amps)} belong to cannot be told: no load is shown"
+
+
 def _bus_alone(recording: Recording, phasors: Snapshots, group: Group) -> Feeder:
     """A bus without currents, its voltages in the order in which they turn."""
     numbers, said = (
         group.numbers,
-        [f"voltages {_names(recording, group.numbers)}: {group.evidence}", ALONE],
+        [f"voltages {_names(recording, group.numbers)}: {group.evidence}", _why_alone(recording)],
     )
     if len(numbers) == 3:
         first, second = (
@@ -206,14 +219,14 @@ def explain_unrecognized(recording: Recording) -> str:
             f"it lasts {seconds:.3g} s at {longest.rate:g} Hz, less than two cycles of"
             f" {recording.frequency:g} Hz"
         )
+    if direct := direct_voltage(recording):
+        return direct
     for wanted in ("voltage", "current"):
         if wanted not in kinds:
             units = ", ".join(sorted({f"'{c.unit.strip()}'" for c in recording.channels}))
             return (
                 f"no channel is a {wanted} by its unit, of which there are {units}, or by its name"
             )
-    if direct := direct_voltage(recording):
-        return direct
     volts = [i for i, c in enumerate(recording.channels) if kind(c) == "voltage"]
     f = frequency(recording, volts)
     if f is not None and nearest_nominal(f) is None:
@@ -263,11 +276,9 @@ def _groups(recording: Recording, phasors: Snapshots, numbers: Sequence[int]) ->
     ]
     result = [g for g in result if g.certain or all(phasors.pure(i) for i in g.numbers)]
     taken = {i for g in result for i in g.numbers}
-    free = [
-        i
-        for i in numbers
-        if i not in taken and not residual(recording.channels[i]) and phasors.pure(i)
-    ]
+    residuals = find_residuals([recording.channels[i] for i in numbers])
+    left_out = {*taken, *(numbers[k] for k in residuals)}
+    free = [i for i in numbers if i not in left_out and phasors.pure(i)]
     k = 0
     while k + 3 <= len(free):
         ordered = _symmetric(phasors, free[k : k + 3])
@@ -295,9 +306,9 @@ def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
     if not size.min() > 0 or np.ptp(size) > LARGEST_PHASE_DIFFERENCE * size.mean():
         return ()
     off = np.abs(np.degrees(np.angle(X[1:] / X[0] * [[TURN, TURN**2], [TURN**2, TURN]])))
-    for angles, order in zip(off, ((0, 1, 2), (0, 2, 1)), strict=True):
+    for angles, turn in zip(off, ((0, 1, 2), (0, 2, 1)), strict=True):
         if angles.max() < SYMMETRIC:
-            return tuple(numbers[i] for i in order)
+            return tuple(numbers[i] for i in turn)
     return ()
 
 
@@ -378,6 +389,12 @@ def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
         settings["phases"] = "".join(p for k, p in enumerate("abc") if k != load.missing)
     if bus.missing not in (None, 2):
         settings["pairs"] = [pair for k, pair in enumerate(("ab", "bc", "ca")) if k != bus.missing]
+    if bus.backward:
+        pairs = settings.get("pairs", ["ab", "bc"])
+        down = (number in bus.backward for number in voltages)
+        settings["pairs"] = [
+            pair[::-1] if turned else pair for pair, turned in zip(pairs, down, strict=True)
+        ]
     if isinstance(connection, str) and settings:
         return voltages, {"name": connection, **settings}
     return voltages, settings or connection
@@ -501,6 +518,7 @@ def _conductors(
     volts: Sequence[int],
     amps: Sequence[int],
     taken: Sequence[Group],
+    level: float,
 ) -> list[list[Feeder]]:
     """Railway feeders of two conductors: contact line and negative feeder, each with
     its current.
@@ -509,28 +527,42 @@ def _conductors(
     volts, amps = (
         [i for i in numbers if i not in used and phasors.pure(i)] for numbers in (volts, amps)
     )
-    pair = opposite_pair(phasors, volts)
-    if pair is None and len(volts) != 1:
+    arms = [contact_first(recording, pair) for pair in opposite_pairs(phasors, volts)]
+    arms = arms or ([(volts[0],)] if len(volts) == 1 else [])
+    if not arms or usual(len(arms[0]), 2) is None:
         return []
-    voltages = tuple(volts) if pair is None else contact_first(recording, pair)
-    connection = usual(len(voltages), 2)
-    feeders = []
-    for k, currents in enumerate(conductor_pairs(recording, phasors, voltages, amps), 1):
-        why = f"the currents {_names(recording, currents)} are those of its two conductors"
-        of = (
-            f"contact line and negative feeder, {_names(recording, voltages)}: opposite to each"
-            " other"
-            if pair
-            else f"{_names(recording, voltages)} is the voltage between contact line and negative"
-            " feeder"
-        )
-        name = (
-            shared_name([recording.channels[i] for i in currents]) or f"autotransformer feeder {k}"
-        )
-        feeders.append(
-            [Feeder(voltages, currents, connection, name=name, why=(of, why))] if connection else []
-        )
-    return [each for each in feeders if each]
+    buses = [Group(arm, False, "", False, "") for arm in arms]
+    options = []
+    pairs = conductor_pairs(recording, phasors, arms[0], amps)
+    for k, (contact, feeder, inward) in enumerate(pairs, 1):
+        currents = contact, feeder
+        shared = shared_name([recording.channels[i] for i in currents])
+        load = Group(currents, False, shared or f"autotransformer feeder {k}", False, "")
+        found = [
+            _build_conductor_feeder(recording, load, bus, why, inward)
+            for bus, why in _buses(recording, phasors, load, buses, level)
+        ]
+        options.append(_add_question(recording, phasors, found))
+    return options
+
+
+def _build_conductor_feeder(
+    recording: Recording, load: Group, bus: Group, why: str, inward: bool
+) -> Feeder:
+    """The feeder of the currents of a contact line and a negative feeder, at their voltages."""
+    names = _names(recording, bus.numbers)
+    of = (
+        f"contact line and negative feeder, {names}: opposite to each other, {why}"
+        if len(bus.numbers) == 2
+        else f"{names} is the voltage between contact line and negative feeder"
+    )
+    said = [of, f"the currents {_names(recording, load.numbers)} are those of its two conductors"]
+    connection = usual(len(bus.numbers), 2)
+    if inward:
+        settings = {"name": connection} if isinstance(connection, str) else connection
+        connection = {**settings, "feeder": "inward"}
+        said.append("both have one angle: that of the negative feeder is counted the other way")
+    return Feeder(bus.numbers, load.numbers, connection, name=load.name, why=tuple(said))
 
 
 def _single(
@@ -565,8 +597,10 @@ def _single(
                 f"one voltage {_names(recording, bus.numbers)}: {why}",
             )
             said += _part_of_railway(recording, phasors, volts, amps, bus.numbers[0], i)
+            said += _part_of_phases(recording, phasors, free, bus.numbers[0])
             loaded = not is_return(recording, i)
-            name = f"{group.name} ({HALF})" if any(HALF in each for each in said) else group.name
+            parts = [part for part in (MAYBE_HALF, HALF, ONE_PHASE) if part in " ".join(said)]
+            name = f"{group.name} ({parts[0]})" if parts else group.name
             feeders.append(
                 Feeder(bus.numbers, (i,), usual(1, 1), name=name, why=said, loaded=loaded)
             )
@@ -594,11 +628,29 @@ def _part_of_railway(
     if others:
         return (f"{HALF}: no current goes with the other voltage, {_names(recording, others[:1])}",)
     other = other_conductor(recording, phasors, current, [i for i in amps if phasors.pure(i)])
-    return (
-        ()
-        if other is None
-        else (f"{HALF}: no voltage goes with the other current, {_names(recording, [other])}",)
-    )
+    if other is not None:
+        return (f"{HALF}: no voltage goes with the other current, {_names(recording, [other])}",)
+    if is_between_conductors(phasors, voltage):
+        return (
+            f"{MAYBE_HALF}: {phasors.size([voltage]):.4g} kV is the voltage between contact line"
+            " and negative feeder of such ones, and the current of one is recorded",
+        )
+    return ()
+
+
+def _part_of_phases(
+    recording: Recording, phasors: Snapshots, volts: Sequence[int], voltage: int
+) -> tuple[str, ...]:
+    """What is said of a single voltage that is one of several phases, by its name and angle."""
+    x, channels = phasors.select_channels([voltage])[0], recording.channels
+    for other in volts:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ratio = np.nanmedian(phasors.select_channels([other])[0] / x)
+        apart = abs(np.degrees(np.angle(ratio)))
+        alike = abs(abs(ratio) - 1) < LARGEST_PHASE_DIFFERENCE and abs(apart - 120) < SYMMETRIC
+        if other != voltage and alike and order([channels[voltage], channels[other]]):
+            return (f"{ONE_PHASE}: its voltage is 120 degrees from {_names(recording, [other])}",)
+    return ()
 
 
 def _dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:

@@ -494,7 +494,7 @@ def _worth(
         return False, f"{size}: too little to separate a load's answer from its noise"
     noise = len(trace.I) and not np.median(_clean(trace)[:, first : e.start], axis=1).any()
     if not np.isfinite(trace.P).any():
-        return False, f"{size}, but no current is recorded, and without it no load"
+        return False, f"{size}, but no current is recorded with it, and without one no load"
     if not np.isfinite(before[0]) or np.hypot(*before) == 0 or noise:
         return False, f"{size}, but no load current flows before it"
     if np.hypot(*after) < CARRIES * np.hypot(*before):

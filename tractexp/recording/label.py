@@ -10,11 +10,12 @@ import functools
 import itertools
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
 from tractexp.recording.phase_mark import (
+    CYRILLIC,
     DIGITS,
     MOST_KNOWN_NAMES,
     ORDERS,
@@ -27,8 +28,13 @@ from tractexp.recording.phase_mark import (
 from tractexp.recording.recording import Channel
 
 RESIDUAL = re.compile(
-    r"3[uvi][o0]|(?<![a-z])[uvi][_"
-    r" ]?[ong0](?![a-z])|(?<![a-z])3?[uvi]_?(?:res|gnd|neutral)|零序|нулев"
+    (
+        r"3[uvi][o0]|(?<![a-z])[uvi][_ ]?[ong0](?![a-z])|(?<![a-z])[ui][_ ]?e(?![a-z])"
+        r"|(?<![a-z])3?[uvi][_ ]?(?:res|resid[a-z]*|gnd|ground|earth[a-z]*|neutr[a-z]*|null[a-z]*"
+        r"|erde|erdung|terre|tierra|homopol[a-z]*|sum|summe|mp|diff|tank|gestell)(?![a-z])"
+        r"|(?:residual|neutral|earth|ground|zero[- ]sequence) (?:current|voltage)"
+        r"|erdstrom|summenstrom|nullstrom|零序|接地|中性|нулев|земл|нейтрал|(?<![a-z])i ?[δ地]"
+    ).translate(CYRILLIC)
 )
 # "12-Ia", "F5-VA": a number of its own before the name
 COUNTER = re.compile(r"^[a-z]{0,2}\d+[-_. :)]+")
@@ -93,6 +99,7 @@ class Group:
     certain: bool  # said by the names, not only by the file's phase column or by geometry
     evidence: str  # what says that they belong together
     missing: int | None = None  # the phase that is not there, of two phases
+    backward: tuple[int, ...] = ()  # of line voltages those that count down beside others: CB
 
 
 def residual(channel: Channel) -> bool:
@@ -104,6 +111,22 @@ def residual(channel: Channel) -> bool:
         "3i0",
         "3u0",
     )
+
+
+def find_residuals(channels: Sequence[Channel]) -> list[int]:
+    """Places in a list of the channels that are residual; U0 beside U4 and U8 is the phase at that
+    hour of a clock.
+    """
+    names = {plain(channel.name) for channel in channels}
+    return [
+        k
+        for k, channel in enumerate(channels)
+        if residual(channel) and not _is_hour(plain(channel.name), names)
+    ]
+
+
+def _is_hour(name: str, names: Collection[str]) -> bool:
+    return "0" in name and all(name.replace("0", hour) in names for hour in "48")
 
 
 def is_to_ground(channel: Channel) -> bool:
@@ -127,6 +150,8 @@ def kind(channel: Channel) -> str:
         return channel.quantity if channel.quantity in ("voltage", "current") else ""
     if channel.unit.strip().lower() in OTHER_UNITS:
         return ""
+    if plain(channel.name) in ("u", "v", "i", "udc", "vdc", "idc"):
+        return "current" if plain(channel.name)[0] == "i" else "voltage"
     letter = re.search(
         r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwyn]{1,2})(?![a-z]))", plain(channel.name)
     )
@@ -172,7 +197,9 @@ def groups(channels: Mapping[int, Channel]) -> list[Group]:
     searches = [
         functools.partial(_by_name, full=full, counters=counters) for full, counters in readings
     ]
-    for search, size in itertools.product((*searches, _by_column), (3, 2)):
+    every = (*searches, _by_column)
+    threes, twos = (itertools.product(every, (size,)) for size in (3, 2))
+    for search, size in (*threes, (_by_mixed_pairs, 2), *twos):
         matches = search(free, size)
         result += matches
         free = {i: c for i, c in free.items() if not any(i in g.numbers for g in matches)}
@@ -194,6 +221,8 @@ def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
     for counters in (True, False):
         texts = [plain(c.name) if counters else COUNTER.sub("", plain(c.name)) for c in channels]
         read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]
+        if len(channels) == 2:  # of which one may count down: AB and CB
+            read = [{(k[0].removesuffix("-"), *k[1:]): v for k, v in r.items()} for r in read]
         shared = set.intersection(*(set(each) for each in read))
         readings = [
             (max(r[s][1] for r in read), tuple(r[s][0] for r in read), s[2]) for s in shared
@@ -286,6 +315,29 @@ def _single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int
             for those in itertools.combinations(several, size):
                 key = "".join("*" if i in dict(those) else c for i, c in enumerate(text))
                 yield key, letters, False, place, max(score for _, score in those)
+
+
+def _by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Group]:
+    """Two line voltages of which one counts down, as voltage transformers in V are named: AB and
+    CB.
+    """
+    buckets: dict[tuple[str, str], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
+    down: dict[tuple[str, str], set[int]] = defaultdict(set)
+    for i, channel in channels.items():
+        for key, letters, two, place, _ in _marks(plain(channel.name)):
+            if two:
+                label = key.removesuffix("-"), letters
+                buckets[label][place].append(i)
+                down[label] |= {i} if key.endswith("-") else set()
+    result: list[Group] = []
+    for label, places in buckets.items():
+        for have, missing in _sets(places, size):
+            backward = tuple(i for i in have if i in down[label])
+            used = any({*group.numbers} & {*have} for group in result)
+            if len(backward) == 1 and not used:
+                shared = shared_name([channels[n] for n in have])
+                result.append(Group(have, True, shared, True, BY_NAME, missing, backward))
+    return result
 
 
 def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.recording.label import kind, plain
+from tractexp.recording.phase_mark import CYRILLIC
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots
 from tractexp.recording.unit import in_doubt
@@ -22,13 +23,21 @@ TURNED = 40.0  # degrees off 180 that the currents of the two conductors are at 
 BETWEEN = (45.0, 62.0)  # kV: a voltage between contact line and negative feeder, of 2x25 kV
 EACH = (20.0, 31.0)  # kV: a voltage of either of them to the rail
 RETURN = re.compile(
-    r"return|retour|retorno|ritorno|rück|schien|carril|binari|(?:ground|earth) wire"
-    r"|(?<![a-z])(?:rc|ret|rail|rails|riel|rl|bt|aew)(?![a-z])|обр|рельс|回流|回线|钢轨"
+    (
+        r"return|retour|retorno|ritorno|rück|schien|carril|binari|booster|erdseil|sheath|screen"
+        r"|schirm|(?:ground|earth|protective) (?:wire|conductor)|обр|рельс|回流|回线|钢轨|保护线"
+        r"|(?<![a-z])(?:rc|ret|rail|rails|riel|rl|bt|aew|gw|pw|ew)(?![a-z])"
+    ).translate(CYRILLIC)
 )
 CONTACT = re.compile(
-    r"cat|contact|cont|ocl|ohl|trolley|oberleit|fahrleit|(?<![a-z])[tck](?![a-z])|контакт|接触|кс"
+    (
+        r"cat|contact|cont|ocl|ohl|trolley|oberleit|fahrleit|(?<![a-z])[tck](?![a-z])"
+        r"|контакт|接触|кс"
+    ).translate(CYRILLIC)
 )
-FEED = re.compile(r"feed|neg|(?<![a-z])(?:nf|af|f|n)(?![a-z])|speise|питающ|负馈|正馈|馈线")
+FEED = re.compile(
+    (r"feed|neg|(?<![a-z])(?:nf|af|f|n)(?![a-z])|speise|питающ|负馈|正馈|馈线").translate(CYRILLIC)
+)
 DIRECT = 3.0  # times what alternates: a greater mean is a direct voltage
 RIPPLE_SECONDS = 0.02  # s over which its ripple is averaged out
 LEAST_DC_DIP = 0.03  # of it: a dip
@@ -36,16 +45,19 @@ LONGEST = 1 << 20  # samples that are looked at
 ALTERNATING = "the models here are those of loads at alternating voltage"
 
 
-def opposite_pair(phasors: Snapshots, volts: Sequence[int]) -> tuple[int, int] | None:
-    """The first two voltages of 25 kV that are opposite to each other while they are alive; None
-    where none are.
+def opposite_pairs(phasors: Snapshots, volts: Sequence[int]) -> list[tuple[int, int]]:
+    """Voltages of 25 kV that are opposite to each other while they are alive, two by two: those of
+    each arm of a substation.
     """
-    volts = [i for i in volts if EACH[0] <= phasors.size([i]) <= EACH[1]]
-    for k, first in enumerate(volts):
-        for second in volts[k + 1 :]:
-            if is_opposite(phasors, first, second):
-                return first, second
-    return None
+    free = [i for i in volts if EACH[0] <= phasors.size([i]) <= EACH[1]]
+    pairs = []
+    while free:
+        first = free.pop(0)
+        second = next((i for i in free if is_opposite(phasors, first, i)), None)
+        if second is not None:
+            free.remove(second)
+            pairs.append((first, second))
+    return pairs
 
 
 def is_opposite(phasors: Snapshots, first: int, second: int, most: float = OPPOSITE) -> bool:
@@ -56,35 +68,44 @@ def is_opposite(phasors: Snapshots, first: int, second: int, most: float = OPPOS
     return bool(alive.any() and np.median(np.abs(x + y)[alive] / large[alive]) < most / 2)
 
 
+def is_between_conductors(phasors: Snapshots, voltage: int) -> bool:
+    """Whether a voltage has the size of that between contact line and negative feeder."""
+    return BETWEEN[0] <= phasors.size([voltage]) <= BETWEEN[1]
+
+
 def conductor_pairs(
     recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int]
-) -> list[tuple[int, int]]:
+) -> list[tuple[int, int, bool]]:
     """(contact line, negative feeder) currents that belong to `volts`, one voltage each or the one
-    between them.
+    between them, and whether that of the feeder is counted the other way.
+
+    Currents of one direction are those of two conductors only where names say so: else they may be
+    the contact lines of two tracks.
     """
+    if len(volts) == 1 and not is_between_conductors(phasors, volts[0]):
+        return []
     names = {
         i: plain(f"{recording.channels[i].name} {recording.channels[i].circuit}") for i in amps
     }
     feeds = [i for i in amps if FEED.search(names[i]) and not RETURN.search(names[i])]
     contacts = [i for i in amps if i not in feeds and not RETURN.search(names[i])]
-    if len(contacts) == len(feeds):
+    named = len(contacts) == len(feeds)
+    if named:
         pairs = [*zip(contacts, feeds, strict=True)]
     else:
         pairs = [*zip(amps[::2], amps[1::2], strict=False)] if len(amps) % 2 == 0 else []
-    return [pair for pair in pairs if _carry_one_load(phasors, volts, pair)]
+    carried = [(*pair, False) for pair in pairs if _opposite_angles(phasors, pair)]
+    if named:
+        carried += [(*pair, True) for pair in pairs if _opposite_angles(phasors, pair, -1.0)]
+    return carried
 
 
-def _carry_one_load(phasors: Snapshots, volts: Sequence[int], pair: tuple[int, int]) -> bool:
+def _opposite_angles(phasors: Snapshots, pair: tuple[int, int], sign: float = 1.0) -> bool:
     """Whether two currents are opposite in angle, as those of contact line and feeder are, though
-    not in size.
+    not in size; with `sign` -1 whether they have one angle.
     """
-    if len(volts) == 1 and not BETWEEN[0] <= phasors.size(volts) <= BETWEEN[1]:
-        return False
-    return _opposite_angles(phasors, pair)
-
-
-def _opposite_angles(phasors: Snapshots, pair: tuple[int, int]) -> bool:
     x, y = np.nan_to_num(phasors.select_channels(pair))
+    y = sign * y
     both = (np.abs(x) > 0.3 * np.abs(x).max(initial=0.0)) & (
         np.abs(y) > 0.3 * np.abs(y).max(initial=0.0)
     )
@@ -112,9 +133,18 @@ def other_conductor(
 
 
 def is_return(recording: Recording, number: int) -> bool:
-    """Whether the name of a current says that it is that of a return conductor or of the rail."""
+    """Whether the name of a current says that it is that of a return conductor or of the rail.
+
+    "I_R" is, where no voltage is called R, as that of a phase is.
+    """
     channel = recording.channels[number]
-    return bool(RETURN.search(plain(f"{channel.name} {channel.circuit}")))
+    if RETURN.search(plain(f"{channel.name} {channel.circuit}")):
+        return True
+    name = plain(channel.name)
+    voltages = (plain(c.name) for c in recording.channels if kind(c) == "voltage")
+    return name in ("ir", "i_r", "i r") and not any(
+        re.search(r"(?<![a-z])(?:[uve][_ ]?)?r(?![a-z])", one) for one in voltages
+    )
 
 
 def contact_first(recording: Recording, pair: tuple[int, int]) -> tuple[int, int]:

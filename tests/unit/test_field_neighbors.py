@@ -1,0 +1,186 @@
+"""Neighbors of the kinds of field records: other names, arms, conductors, and lone phases.
+
+Each record is written as COMTRADE and looked at, as a user's is.
+"""
+
+import numpy as np
+import pytest
+
+import tractexp
+from tractexp.filetypes import comtrade
+from tractexp.recording import Channel, Recording, Segment
+
+RATE = 1600.0
+T = np.arange(0, 2, 1 / RATE)
+DIP = np.where((T >= 1) & (T < 1.25), 0.7, 1.0)
+TURN = np.exp(-2j * np.pi / 3 * np.arange(3))
+
+
+def write(tmp_path, *rows, f=50.0, segments=None):
+    """A record of (name, unit, phasor (N,) RMS); the name says voltage or current by the unit."""
+    channels = []
+    for k, (name, unit, z) in enumerate(rows):
+        x = np.sqrt(2) * np.real(z * np.exp(2j * np.pi * f * T))
+        x += 1e-4 * np.abs(x).max() * np.random.default_rng(k).standard_normal(len(T))
+        gain = np.abs(x).max() / 30000
+        quantity = "voltage" if unit.endswith("V") else "current"
+        channels.append(
+            Channel(name, np.round(x / gain).astype(np.int16), unit, quantity, gain=gain)
+        )
+    made = Recording("made", channels, segments or [Segment(0, len(T), RATE, 0.0)], f)
+    return next(p for p in comtrade.write(made, tmp_path / "a.cfg") if p.suffix == ".cfg")
+
+
+def loads_of(path, **settings):
+    """(the loads, the first line, all that is printed) of a look."""
+    seen = tractexp.look(path, progress=False, **settings)
+    text = str(seen.summary())
+    return [x for x in seen.feeders if x["loaded"]], text.splitlines()[0], text
+
+
+def single(S=12 + 4j, kilovolts=27.5, turn=0.0):
+    """Voltage and current (N,) of a single-phase load [MVA], turned by an angle [degrees]."""
+    V = kilovolts * DIP * np.exp(1j * np.radians(turn))
+    return V, np.conj((S.real * DIP**1.5 + 1j * S.imag * DIP**2) / V)
+
+
+def three(S=20 + 8j, kilovolts=110.0):
+    """Voltages to ground and currents (3, N) of a load [MVA]."""
+    V = kilovolts / np.sqrt(3) * DIP
+    return V * TURN[:, None], np.conj((S.real * DIP**1.5 + 1j * S.imag * DIP**2) / (3 * V)) * TURN[
+        :, None
+    ]
+
+
+RESIDUALS = (
+    *("I_R", "I0", "In", "IN", "Ie", "I_E", "3I0", "Ires", "Isum", "Idiff", "I_gnd", "Imp"),
+    *("I earth", "I ground", "I residual", "I Nullleiter", "I Erde", "I terre", "I tierra"),
+    *("I_neutral", "I земля", "I нейтраль", "I 接地", "IΔ", "earth current"),
+)
+
+
+@pytest.mark.parametrize("name", RESIDUALS)
+@pytest.mark.parametrize("share", [0.03, -0.5])
+def test_a_neutral_or_residual_current_is_no_load(tmp_path, name, share):
+    V, I = single()
+    [load], _, _ = loads_of(
+        write(tmp_path, ("U", "kV", V), ("I", "kA", I), (name, "kA", share * I))
+    )
+    assert (load["name"], load["P"]) == ("I", pytest.approx(12, rel=0.01))
+
+
+def test_i_r_is_a_load_beside_a_voltage_of_phase_r(tmp_path):
+    V, I = single()
+    rows = [("U_R", "kV", V), ("U_S", "kV", 0.9 * V), ("I_R", "kA", I), ("I_S", "kA", 0.5 * I)]
+    loads, _, _ = loads_of(write(tmp_path, *rows))
+    assert [load["name"] for load in loads] == ["I_R", "I_S"]
+
+
+@pytest.mark.parametrize("name", ["I booster", "I GW", "I PW", "I protective wire", "I обратный"])
+def test_other_names_of_return_conductors_are_no_loads(tmp_path, name):
+    V, I = single()
+    [load], _, _ = loads_of(
+        write(tmp_path, ("U_C", "kV", V), ("I_C", "kA", I), (name, "kA", -0.8 * I))
+    )
+    assert load["name"] == "I_C"
+
+
+@pytest.mark.parametrize("turn", [60.0, 90.0, 120.0])
+def test_each_arm_of_a_substation_has_its_own_voltages(tmp_path, turn):
+    rows = []
+    for arm, (V, I) in (("alpha", single()), ("beta", single(6 + 2j, turn=-turn))):
+        rows += [(f"{arm} U_T", "kV", V), (f"{arm} U_F", "kV", -V)]
+        rows += [(f"{arm} I_T", "kA", 0.6 * I), (f"{arm} I_F", "kA", -0.4 * I)]
+    loads, _, _ = loads_of(write(tmp_path, *rows))
+    assert [(x["P"], x["Q"]) for x in loads] == [
+        pytest.approx((12, 4), rel=0.01),
+        pytest.approx((6, 2), rel=0.01),
+    ]
+
+
+def test_a_feeders_current_that_counts_inward_is_turned_and_said(tmp_path):
+    V, I = single()
+    rows = [
+        ("U_CAT", "kV", V),
+        ("U_FEED", "kV", -V),
+        ("I_CAT", "kA", 0.6 * I),
+        ("I_FEED", "kA", 0.4 * I),
+    ]
+    path = write(tmp_path, *rows)
+    [load], first, _ = loads_of(path)
+    assert (load["U"], load["P"], load["Q"]) == pytest.approx((27.5, 12, 4), rel=0.01)
+    assert "feeder:inward" in first
+    assert any("counted the other way" in said for said in load["why"])
+    connection = {"name": "autotransformer", "feeder": "inward"}
+    [dip] = tractexp.read(path, voltages=[0, 1], currents=[2, 3], connection=connection)
+    assert dip.P0 * dip.record.base.power == pytest.approx(12, rel=0.01)
+
+
+def test_currents_of_two_tracks_are_two_halves_not_one_load(tmp_path):
+    V, I = single()
+    rows = [("U_C", "kV", V), ("U_F", "kV", -V), ("I_C1", "kA", 0.6 * I), ("I_C2", "kA", 0.3 * I)]
+    loads, _, _ = loads_of(write(tmp_path, *rows))
+    assert len(loads) == 2
+    assert all("half" in load["name"] for load in loads)
+
+
+def test_one_current_at_the_voltage_between_both_conductors_may_be_half(tmp_path):
+    V, I = single()
+    [load], first, _ = loads_of(write(tmp_path, ("U T-F", "kV", 2 * V), ("I T", "kA", 0.6 * I)))
+    assert "may be half of an autotransformer feeder" in load["name"]
+    assert "may be half" in first
+
+
+@pytest.mark.parametrize(
+    "names", [("V_R-Y", "V_B-Y"), ("Uab", "Ucb"), ("U12", "U32"), ("U L1-L2", "U L3-L2")]
+)
+def test_two_line_voltages_of_which_one_counts_down_make_a_load(tmp_path, names):
+    V, I = three()
+    rows = [(names[0], "kV", V[0] - V[1]), (names[1], "kV", V[2] - V[1])]
+    rows += [(f"I{p}", "kA", x) for p, x in zip("ABC", I, strict=True)]
+    path = write(tmp_path, *rows)
+    [load], _, _ = loads_of(path)
+    assert (load["U"], load["P"], load["Q"]) == pytest.approx((110, 20, 8), rel=0.01)
+    [dip] = tractexp.read(path)
+    assert dip.P0 * dip.record.base.power == pytest.approx(20, rel=0.01)
+
+
+def test_phases_at_the_hours_of_a_clock_are_three(tmp_path):
+    V, I = three()
+    rows = [(f"U{h}", "kV", x) for h, x in zip((0, 4, 8), V, strict=True)]
+    rows += [(f"I{h}", "kA", x) for h, x in zip((0, 4, 8), I, strict=True)]
+    [load], _, _ = loads_of(write(tmp_path, *rows))
+    assert (load["U"], load["P"], load["Q"]) == pytest.approx((110, 20, 8), rel=0.01)
+
+
+def test_one_phase_of_several_is_called_a_part(tmp_path):
+    V, I = three()
+    rows = [("UA", "kV", V[0]), ("UB", "kV", V[1]), ("IA", "kA", I[0]), ("IB", "kA", I[1])]
+    loads, first, _ = loads_of(write(tmp_path, *rows))
+    assert all("one phase of a three-phase load" in load["name"] for load in loads)
+    assert "one phase of a three-phase load" in first
+
+
+def test_currents_that_go_with_no_voltage_are_not_said_to_be_missing(tmp_path):
+    V, I = three()
+    rows = [(f"U{p}", "kV", x) for p, x in zip("ABC", V, strict=True)] + [("IA", "kA", I[0])]
+    path = write(tmp_path, *rows)
+    _, first, text = loads_of(path)
+    assert "no current is recorded with it" in first
+    assert "name the channels of one load: voltages=[...] currents=[...]" in text
+    [load], _, _ = loads_of(path, voltages=[0], currents=[3])
+    assert load["P"] == pytest.approx(20 / 3, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["Udc", "U", "V line"])
+def test_a_direct_voltage_without_a_current_is_said_to_be_one(tmp_path, name):
+    gain = 0.05
+    u = 1500 * DIP * (1 + 0.02 * np.sin(2 * np.pi * 300 * T))
+    raw = np.round(u / gain).astype(np.int32)
+    made = Recording(
+        "made", [Channel(name, raw, "V", "voltage", gain=gain)], [Segment(0, len(T), RATE, 0.0)]
+    )
+    path = next(p for p in comtrade.write(made, tmp_path / "dc.cfg") if p.suffix == ".cfg")
+    _, first, _ = loads_of(path)
+    assert "is direct: 1500 V in the mean with a ripple of 1.4% RMS" in first
+    assert "(30.0%) at 1.000 s for 250 ms" in first
