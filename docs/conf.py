@@ -14,7 +14,7 @@ sys.path.insert(0, str(HERE))
 
 project, author = "tractexp", "the tractexp authors"
 copyright = f"2026 {author}"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "site_pages.mathml"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "site_pages.mathml"]
 exclude_patterns = ["site_pages"]
 root_doc = "index"
 
@@ -26,6 +26,8 @@ smartquotes = False  # X' is a reactance
 highlight_language = "none"  # what has no language is a terminal's answer
 default_role = "code"  # single backticks of docstrings
 autodoc_typehints = "signature"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
 autodoc_member_order = "bysource"
 # types of signatures are no links; links of pages are checked all the same
 nitpick_ignore_regex = [("py:.*", ".*")]

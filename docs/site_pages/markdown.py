@@ -31,8 +31,8 @@ def folded(summary: str, inside: str) -> str:
 
 
 def docstring(what: Any) -> str:
-    """The docstring of a class or a call: paragraphs, indented lines, and `Source:` and
-    `Departures:` marked.
+    """The docstring of a class or a call: paragraphs, indented lines, sections of numpydoc, and
+    `Source:` and `Departures:` marked.
     """
     blocks = re.split(r"\n\s*\n", inspect.cleandoc(what.__doc__ or ""))
     return "\n\n".join(filter(None, map(_block, blocks)))
@@ -41,12 +41,25 @@ def docstring(what: Any) -> str:
 def _block(block: str) -> str:
     if block.startswith("    "):
         return f"```text\n{textwrap.dedent(block).rstrip()}\n```"
+    if section := re.match(r"(\w+)\n-+\n", block):
+        return _section(section[1], block[section.end() :])
+    if block.startswith(">>> "):
+        return f"```python\n{block}\n```"
     marked = re.split(r"(?m)^(Source|Departures): ", block)
     parts = [plain(marked[0])] if marked[0].strip() else []
     parts += [
         f"**{word}:** {plain(text)}" for word, text in zip(marked[1::2], marked[2::2], strict=True)
     ]
     return "\n\n".join(parts)
+
+
+def _section(title: str, body: str) -> str:
+    """A section of numpydoc: its title, then its paragraph, its example or a list of its terms."""
+    if body.startswith(">>> ") or "\n    " not in body:
+        return f"**{title}**\n\n{_block(body)}"
+    terms = re.findall(r"(?m)^(\S.*)((?:\n    .*)*)", body)
+    rows = [f"- **{plain(term)}**: {plain(about)}" for term, about in terms]
+    return "\n".join([f"**{title}**\n", *rows])
 
 
 def settings(cls: type) -> list[list[str]]:

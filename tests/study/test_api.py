@@ -4,8 +4,10 @@ load.
 
 import ast
 import dataclasses
+import inspect
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -416,8 +418,14 @@ def test_every_public_name_is_there_and_says_what_it_does():
 
     for name in PUBLIC:
         assert name in dir(tractexp)
-        if name not in ("UserError", "sites"):
-            assert "`UserError`" in getattr(tractexp, name).__doc__
+        if name == "UserError":
+            continue
+        told = inspect.unwrap(getattr(tractexp, name))
+        sections = re.findall(r"^    (\w+)\n    -+$", told.__doc__, re.M)
+        assert sections[:3] == ["Parameters", "Returns", "Raises"], name
+        parameters = told.__doc__.partition("Returns\n")[0]
+        for argument in inspect.signature(told).parameters:
+            assert re.search(rf"(?m)^    .*\b{argument}\b", parameters), f"{name}: {argument}"
 
 
 def test_type_checkers_see_the_names_that_a_program_gets():

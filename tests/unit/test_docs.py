@@ -2,6 +2,7 @@
 described.
 """
 
+import ast
 import re
 from pathlib import Path
 
@@ -43,3 +44,13 @@ def test_a_page_of_method_is_read_at_one_sitting(page):
     """At most 900 words: what a method needs beyond that is a catalogue, a study or a docstring."""
     text = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     assert len(text.split()) <= 900
+
+
+def test_what_computes_a_number_is_where_the_page_says():
+    page = (ROOT / "docs" / "numbers.md").read_text(encoding="utf-8")
+    places = re.findall(r"`(tractexp/[\w/]+\.py)`((?: `\w+`(?:, `\w+`)*)?)", page)
+    assert len(places) > 25
+    for path, names in places:
+        tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+        defined = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+        assert {*re.findall(r"`(\w+)`", names)} <= defined, f"{path}: {names}"

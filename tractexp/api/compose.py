@@ -148,21 +148,53 @@ def compose(
     """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor
     beside a static load.
 
-    `motor` and `static` are names ("double_cage"; "none" for without), or mappings of `name` and
-    the plugin's settings; a list of motors is several groups side by side (["stator_flux",
-    "double_cage"]). They replace those of `model`, and one left out is that of the paper's model.
-    `effects` names what is added to the equations. `bounds` {name: [lower, upper]} and `fixed`
-    {name: value}, in the parameters' own units, are added to the choice's; `per_event` names
-    parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per sample,
-    as many as needed by default; `integration` "printed" is Eq. (4) of the paper as it stands; with
-    `domain` "waves" the same equations draw sampled currents, and what phasors neglect is kept.
-    `window` is that over which the recorder averages phasors: seconds, the name of an estimator, or
-    "recorded", as the records say. With `priors` a fit holds the motor to what machines usually
-    are, where its records do not tell; with `shown_effects` it has the effects that its records
-    show.
+    Parameters
+    ----------
+    model : name, path, LoadModel or None
+        What the other arguments change; None: the model of `conf/config.yaml`.
+    motor, static : name, or mapping of `name` and the plugin's settings
+        They replace those of `model`, and one left out is that of the paper's model; "none" is
+        without. A list of motors is several groups side by side (["stator_flux", "double_cage"]).
+    effects : names
+        What is added to the equations.
+    bounds : {name: [lower, upper]}
+        In the parameters' own units, added to those of the choice.
+    fixed : {name: value}
+        Parameters that are not searched, added to those of the choice.
+    substeps : int
+        Runge-Kutta steps per sample; None: as many as needed.
+    per_event : names
+        Parameters with a value of their own in each event.
+    integration : "classical" or "printed"
+        "printed" is Eq. (4) of the paper as it stands.
+    domain : "phasors" or "waves"
+        With "waves" the same equations draw sampled currents, and what phasors neglect is kept.
+    window : float [s], name or "recorded"
+        That over which the recorder averages phasors: its length, the name of an estimator, or
+        what the records say.
+    priors : bool
+        Whether a fit holds the motor to what machines usually are, where its records do not tell.
+    shown_effects : bool
+        Whether a fit has the effects that its records show.
 
-    Raises `UserError` for an unknown name or an effect that does not fit the equations; the values
-    are checked where the model is used.
+    Returns
+    -------
+    LoadModel
+        `parameters` {name: default, bounds, unit, about}, `node`, its configuration, and as a
+        notebook's last line its equations.
+
+    Raises
+    ------
+    UserError
+        For an unknown name or an effect that does not fit the equations; values are checked where
+        the model is used.
+
+    Examples
+    --------
+    >>> import tractexp
+    >>> load = tractexp.compose(motor="double_cage", static="zip", fixed={"a_Z": 0.4})
+    >>> load.fixed["a_Z"], "T_prime" in load.parameters
+    (0.4, True)
     """
     composed = model_of(model, domain)
     chosen_parts = {"motor": motor, "static": static}

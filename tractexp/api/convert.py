@@ -50,18 +50,44 @@ def convert(
     folder: str | Path = ".",
     **settings: Any,
 ) -> Converted:
-    """Write files that can be read, or events that were read, as Parquet, CSV or COMTRADE into
-    `folder`.
+    """Write files that can be read, or events that were read, as Parquet, CSV or COMTRADE.
 
-    `to` is "parquet" (the default), "csv" (tables of a row per sample, with a sidecar in JSON that
-    says everything else), "comtrade" (.cfg and .dat), "cff" or the name of a plugin. `what` is
-    "recording", all channels of a file as they were recorded (the default, where it holds
-    waveforms), or "events", the record of each dip; for COMTRADE those are the waveforms about each
-    dip, or U, P, Q in kV, MW, Mvar where there are none. `settings` are those of the reader, as for
-    `tractexp.read`.
+    Reading what was written gives the same: the bits of numbers, the integers of a recorder.
 
-    Reading what was written gives the same: the bits of numbers, the integers of a recorder. Raises
-    `UserError` for what cannot be read, and where a source would be overwritten.
+    Parameters
+    ----------
+    *sources : paths or events
+        Whatever `tractexp.read` takes.
+    to : name
+        "parquet" (the default), "csv" (tables of a row per sample, with a sidecar in JSON that says
+        everything else), "comtrade" (.cfg and .dat), "cff" or the name of a plugin.
+    what : "recording" or "events"
+        "recording" is all channels of a file as they were recorded (the default, where it holds
+        waveforms), "events" the record of each dip; for COMTRADE those are the waveforms about each
+        dip, or U, P, Q in kV, MW, Mvar where there are none.
+    folder : path
+        Where the files go.
+    **settings
+        Those of the reader, as for `tractexp.read`.
+
+    Returns
+    -------
+    Converted
+        A table of the files, and what each holds.
+
+    Raises
+    ------
+    UserError
+        For what cannot be read, and where a source would be overwritten.
+
+    Examples
+    --------
+    >>> import tempfile, tractexp
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = tractexp.convert(*tractexp.read("tibet_50pct"), to="csv", folder=folder)
+    ...     (again,) = tractexp.read(f"{folder}/tibet_50pct.csv")
+    >>> bool((again.record.P == tractexp.read("tibet_50pct")[0].record.P).all())
+    True
     """
     if not sources:
         raise UserError("nothing to read: give a file, or events as tractexp.read gives them")

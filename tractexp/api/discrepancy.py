@@ -369,18 +369,41 @@ def investigate(
     """Find what a load model lacks: where it disagrees with the records, which effect explains
     that, and how sure.
 
-    `records` are events of `tractexp.read`, or what it reads; all are fitted together. What is
-    found is judged on those of `validate`. `model` is the base model, as in `tractexp.identify`,
-    with `bounds`, `fixed`, `substeps` and `domain`: with "waves" the sampled currents are
-    investigated. Only `effects` are tested, by default all there are. `false_alarms` (0.001 to 0.5)
-    is the probability of naming anything where nothing is missing; `criteria` {name: value} are the
-    other thresholds of the decisions, listed in `tractexp.discrepancy.criteria`. The same `seed`
-    gives the same bits. `progress`: None shows the stage, False does not; a callable is told each
-    stage.
+    Nothing is searched, so that there is no objective, optimizer or budget.
 
-    Nothing is searched, so that there is no objective, optimizer or budget. Raises `UserError` for
-    wrong names or values, for events that do not belong together, and for a model with `per_event`:
-    the events share its parameters.
+    Parameters
+    ----------
+    records : events, or whatever `tractexp.read` reads
+        The dips to fit, all together.
+    model : as in `tractexp.identify`
+        The base model.
+    validate : as `records`
+        Dips on which is judged what is found.
+    effects : names
+        Only these are tested; none: all there are.
+    false_alarms : float, 0.001 to 0.5
+        The probability of naming anything where nothing is missing.
+    criteria : {name: value}
+        The other thresholds of the decisions, listed in `tractexp.discrepancy.criteria`.
+    bounds, fixed, substeps, domain : as in `tractexp.identify`
+        Of the base model; with "waves" the sampled currents are investigated.
+    seed : int
+        The same seed gives the same bits.
+    progress : None, False or callable
+        None shows the stage, False does not; a callable is told each stage.
+
+    Returns
+    -------
+    Investigation
+        `verdict` (`none`, `candidate`, `named`, `tied` or `unexplained`), `names` of the effects
+        added, `reason`, `gap` before and after, tables `where` and `candidates`, `extended_model`
+        and `fit`.
+
+    Raises
+    ------
+    UserError
+        For wrong names or values, for events that do not belong together, and for a model with
+        `per_event`: the events share its parameters.
     """
     from tractexp.discrepancy.criteria import Criteria
 

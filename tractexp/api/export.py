@@ -70,16 +70,40 @@ def export(
     doubtful: bool = False,
     playback: bool = True,  # play a dip through the file, in its simulator where that is installed
 ) -> Exported:
-    """Turn an identification into the file of another simulator's format ("andes", "psse_dyr",
-    "modelica", ...).
+    """Turn an identification into the file of another simulator's format.
 
-    The load is on `bus`; 1 pu of the record's file stands for `power` [MVA] and `voltage` [kV, line
-    to line], by default what the record says, else 100 and 110. `base` "own" writes values on the
-    base of the fit, "file" on that of the record's file, where it was another. With `playback` a
-    dip is played through the file (in ANDES where that is installed, else by our own simulator from
-    the file's numbers), and the notes say how well it follows the fit.
-    Raises `UserError` where the format cannot represent a part of the model, and unless `doubtful`
-    for a model that does not describe the load it was fitted to, or is no physical load.
+    Parameters
+    ----------
+    fit : Identification
+        Made by `tractexp.identify`, or loaded.
+    format : name
+        "andes", "psse_dyr", "modelica", ... or the name of a plugin.
+    bus : int
+        Number of the bus the load is on.
+    power : float [MVA]
+        What 1 pu of the record's file stands for; None: what the record says, else 100.
+    voltage : float [kV, line to line]
+        The same of the voltage; None: what the record says, else 110.
+    base : "own" or "file"
+        Whether values are on the base of the fit, or on that of the record's file, where it was
+        another.
+    doubtful : bool
+        Whether a model is exported that does not describe the load, or is no physical one.
+    playback : bool
+        Whether a dip is played through the file (in ANDES where that is installed, else by our own
+        simulator from the file's numbers); the notes say how well it follows the fit.
+
+    Returns
+    -------
+    Exported
+        `text` of the file, `notes` on what it leaves out, and `agreement` of the playback, a share
+        of the power; `write(path)`.
+
+    Raises
+    ------
+    UserError
+        Where the format cannot represent a part of the model, and unless `doubtful` for a model
+        that does not describe the load it was fitted to, or is no physical load.
     """
     from tractexp.exchange.format import Identified
     from tractexp.exchange.playback import play_back_export

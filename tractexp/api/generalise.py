@@ -116,15 +116,35 @@ def generalise(
     seed: int = 0,
     progress: Any = None,
 ) -> Generalised:
-    """Fit a model to `records` by each optimizer under `seeds` seeds from `seed` on, and judge it
-    on `validate`.
+    """Fit a model by each optimizer under several seeds, and judge it on dips that were not fitted.
 
-    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names
-    to call them by to such; all have the same limits. Everything else is as in `tractexp.identify`.
-    `progress`: None shows how far each search is, False does not; a callable is told what is read,
-    and which search begins.
+    Parameters
+    ----------
+    records : events, or whatever `tractexp.read` reads
+        The dips to fit, all together.
+    model : as in `tractexp.identify`
+    validate : as `records`
+        The dips to judge on: a milder one to interpolate, a deeper one to extrapolate.
+    optimizers : one as in `tractexp.identify`, a list, or {label: optimizer}
+        All have the same limits.
+    seeds : int
+        Searches of each optimizer: `seed` and the ones after it.
+    bounds, fixed, per_event, substeps, objective, budget, time_limit, target, seed
+        As in `tractexp.identify`.
+    progress : None, False or callable
+        None shows how far each search is, False does not; a callable is told what is read, and
+        which search begins.
 
-    Raises `UserError` for wrong names or values, and where no dip is held out.
+    Returns
+    -------
+    Generalised
+        `errors` of each search on each dip, and their `medians` by optimizer: the relative errors
+        of Eq. (20) and the mean residuals [pu] of Eq. (21).
+
+    Raises
+    ------
+    UserError
+        For wrong names or values, and where no dip is held out.
     """
     check_range("task.seeds", seeds, 1)
     setup = Setup.from_arguments(

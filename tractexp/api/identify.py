@@ -478,24 +478,71 @@ def identify(
     """Fit the free parameters of a load model to recorded dips, and judge the fit on these and on
     others held out.
 
-    `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of
-    `validate` are only judged. `model` is a choice of `conf/model`, the path of such a YAML file,
-    or what `tractexp.compose` or an investigation (`found.extended_model`) made; `bounds`, `fixed`,
-    `per_event`, `substeps`, `domain` and `priors` are as in `tractexp.compose`: with
-    `domain="waves"` the records' sampled currents are fitted, not the power that phasors show.
+    Parameters
+    ----------
+    records : events, or whatever `tractexp.read` reads
+        The dips to fit, all together.
+    model : name, path, LoadModel or None
+        A choice of `conf/model`, the path of such a YAML file, or what `tractexp.compose` or an
+        investigation (`found.extended_model`) made; None: that of `conf/config.yaml`.
+    validate : as `records`
+        Dips that are only judged.
+    bounds : {name: (lower, upper)}
+        In the parameter's own unit, in place of those declared.
+    fixed : {name: value}
+        Parameters that are not searched.
+    per_event : names
+        Parameters with a value of their own in each event.
+    substeps : int
+        Runge-Kutta steps per sample; None: as many as needed.
+    domain : "phasors" or "waves"
+        With "waves" the records' sampled currents are fitted, not the power that phasors show.
+    priors : bool
+        Whether a motor is held to what machines usually are where more than noise is left.
+    objective, optimizer : name, mapping or None
+        `{"name": "pso", "population": 100}` has settings; None: those of `conf/config.yaml`.
+    budget : int
+        The search ends after so many simulations,
+    time_limit : float [s]
+        after so long,
+    target : float [pu²]
+        at this objective, or by itself.
+    seed : int
+        The same seed gives the same bits.
+    check_intervals : bool
+        Whether wide intervals are confirmed by profile likelihood, and structures that most loads
+        may have are fitted as well, to tell by how much they would move each parameter.
+    progress : None, False or callable
+        None shows how far the search is, False does not; a callable is told what is read and done,
+        a sentence at a time.
 
-    `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso",
-    "population": 100}`. A model, an objective or an optimizer left out is that of
-    `conf/config.yaml`, as on the command line. The search ends after `budget` simulations,
-    `time_limit` [s], at the objective `target` [pu²], or by itself. The same `seed` gives the same
-    bits. `check_intervals` confirms wide intervals by profile likelihood, and fits the structures
-    that most loads may have as well, to tell by how much they would move each parameter.
-    `progress`: None shows how far the search is, False does not; a callable is told what is read
-    and done, a sentence at a time.
+    Returns
+    -------
+    Identification
+        `parameters` {name: estimate with `value`, `interval`, `standard_error`, `verdict`, `unit`},
+        `grade` and `headline`, `model_error`, `predict(event)`, `report()` and `advice`.
 
-    Raises `UserError` for wrong names or values, records that lack what the model reads, and where
-    nothing tried can be simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt
-    whose `result` holds what was found so far.
+    Raises
+    ------
+    UserError
+        For wrong names or values, records that lack what the model reads, and where nothing tried
+        can be simulated.
+    tractexp.errors.Stopped
+        On Ctrl-C: a KeyboardInterrupt whose `result` holds what was found so far.
+
+    Examples
+    --------
+    >>> import tractexp
+    >>> fit = tractexp.identify(
+    ...     "tibet_50pct",
+    ...     optimizer="multistart_least_squares",
+    ...     check_intervals=False,
+    ...     progress=False,
+    ... )
+    >>> sorted(fit.parameters)
+    ['C', 'M', 'T_m', 'T_prime', 'X_prime', 'p_v', 'q_v']
+    >>> fit.parameters["T_prime"].unit
+    's'
     """
     setup = FitSpec.from_arguments(
         records,

@@ -106,14 +106,30 @@ def linear_network(
     """Fit the best linear network of few poles from the voltage to the current of recorded dips:
     how good can it get?
 
-    `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of
-    `validate` are only judged, and tell the number of `poles`, up to four, where that is not given;
-    without them an information criterion does. With `domain="waves"` space vectors of sampled
-    currents follow those of the voltages, and the zero sequence has a path of its own; else P and Q
-    follow U. `progress`: a callable is told what is read, a sentence at a time.
+    Parameters
+    ----------
+    records : events, or whatever `tractexp.read` reads
+        The dips to fit, all together.
+    validate : as `records`
+        Dips that are only judged, and that tell the number of poles where it is not given; without
+        them an information criterion does.
+    domain : "phasors" or "waves"
+        With "waves" space vectors of sampled currents follow those of the voltages, and the zero
+        sequence has a path of its own; else P and Q follow U. None: that of `conf/config.yaml`.
+    poles : int
+        None: as many as predict best, up to four.
+    progress : callable
+        Is told what is read, a sentence at a time.
 
-    Raises `UserError` for wrong values, and for records of too few samples or whose voltage does
-    not move.
+    Returns
+    -------
+    NetworkFit
+        `poles`, `fits` of each event, `headline`, and `predict(event)`.
+
+    Raises
+    ------
+    UserError
+        For wrong values, and for records of too few samples or whose voltage does not move.
     """
     domain = domain or defaults()[DOMAIN]
     check_choice("domain", domain, sorted(choices()[DOMAIN]))

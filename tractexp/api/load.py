@@ -11,12 +11,26 @@ from tractexp.outcome import MARK, Outcome, read_saved_result
 
 @public
 def load(path: str | Path) -> Outcome:
-    """The result that `save` wrote, or the `Identification` of a `result.json` of the command line,
-    or of its folder.
+    """Read a saved result back.
 
-    The latter holds no records: it predicts, simulates and exports, with the error and the grade
-    that the run told, but cannot be judged again. The folder of an investigation gives the model
-    that it ended with. Raises `UserError` where the file is missing, damaged or of no kind known.
+    What a `result.json` of the command line gives holds no records: it predicts, simulates and
+    exports, with the error and the grade that the run told, but cannot be judged again.
+
+    Parameters
+    ----------
+    path : path
+        A file that `save` wrote, a `result.json`, or the folder of a run; the folder of an
+        investigation gives the model that it ended with.
+
+    Returns
+    -------
+    Outcome
+        What was saved, or the `Identification` of a `result.json`.
+
+    Raises
+    ------
+    UserError
+        Where the file is missing, damaged or of no kind known.
     """
     if Path(path).is_dir() or _bare(path):
         from tractexp.api.identify import Identification

@@ -231,13 +231,36 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
     """Look at files without saying which channels they have: what they hold, which loads they show,
     what happened.
 
-    A source is the path of any file that `tractexp.read` takes, an event or a record, or a frame
-    with the columns t, U, P, Q. `settings` are those of the reader; where `voltages` and `currents`
-    are given, that load is looked at instead of those proposed. Loads count P and Q as positive
-    when consumed; voltages are primary kV line to line, depth, jump and U2 are those of
-    `tractexp.recording.Happening`.
+    Loads count P and Q as positive when consumed; voltages are primary kV line to line, depth, jump
+    and U2 are those of `tractexp.recording.Happening`.
 
-    Raises `UserError` for what cannot be read, naming file, place and value.
+    Parameters
+    ----------
+    *sources : path, event, Record, frame or a list of these
+        Any file that `tractexp.read` takes, or a frame with the columns t, U, P, Q.
+    progress : None, False or callable
+        None shows the stage where it takes long, False does not.
+    **settings
+        Those of the reader; where `voltages` and `currents` are given, that load is looked at
+        instead of those proposed.
+
+    Returns
+    -------
+    Look
+        Tables `files`, `feeders`, `channels` and `events`, the `commands` that fit, and the arrays
+        of `phasors(k)` and `waveforms(k)` of the k-th load.
+
+    Raises
+    ------
+    UserError
+        For what cannot be read; it names file, place and value.
+
+    Examples
+    --------
+    >>> import tractexp
+    >>> seen = tractexp.look(tractexp.read("tibet_50pct"), progress=False)
+    >>> len(seen.events.rows)
+    1
     """
     flat = [
         one

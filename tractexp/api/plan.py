@@ -108,20 +108,56 @@ def plan(
 
     How deep must a dip be for `parameter` (H stands for M) to be known with half of its 95 %
     interval `within` a share of the value? The dip is that of the deepest of `records`, unless
-    `depth` (of the voltage before), `duration` [s], `rate` [1/s] or `noise` (standard deviation, as
-    a share of P before the event; white) are given. With `domain` "waves" the voltage's phase jumps
-    by `jump` [degrees] in it, its negative sequence is `unbalance` times its depth (0: balanced, 1:
-    a fault between two phases), and the noise is that of the sampled currents, as a share of P
-    before the event, too. `values` are what is planned at: "fit", the estimate of that record;
-    "default", the model's; an identification; or the path of a `result.json`. Of several records
-    those that tell most together are chosen, until another one narrows the intervals by less than
-    the share `least`, at most `events` of them. The model is as in `tractexp.identify`.
+    settings of it are given. Of several records those that tell most together are chosen. With
+    `rivals` nothing of this is asked: the event is chosen that most surely leaves one of them.
 
-    With `rivals` nothing of this is asked: they are effects that the model may lack (`["a", "b"]`,
-    `"b+c"` two at once, or the path of a `discrepancy.json` that ended tied), and the event is
-    chosen that most surely leaves one of them. `progress` is as in `tractexp.investigate`.
+    Parameters
+    ----------
+    records : events, or whatever `tractexp.read` reads
+    model, bounds, fixed, substeps : as in `tractexp.identify`
+    parameter : name
+        How deep a dip is needed for this one.
+    within : float
+        Half of the 95 % interval, as a share of the value.
+    depth : float, 0 to 1
+        Of the voltage before; None: as recorded, and so the next ones.
+    duration : float [s]
+        Of the dip.
+    rate : float [1/s]
+        Samples per second.
+    noise : float
+        Standard deviation as a share of P before the event, white; in waves that of the sampled
+        currents.
+    jump : float [degrees]
+        Of the voltage's phase in the dip, with `domain` "waves".
+    unbalance : float
+        Negative sequence over the depth, with `domain` "waves" (0: balanced, 1: a fault between two
+        phases).
+    domain : "phasors" or "waves"
+        None: that of `conf/config.yaml`.
+    values : "fit", "default", Identification or path
+        What is planned at: the estimate of that record, the model's defaults, an identification, or
+        a `result.json`.
+    least : float
+        Another event of an archive must narrow the intervals by this share.
+    events : int
+        At most so many are chosen.
+    rivals : names, or path
+        Effects that the model may lack (`["a", "b"]`, `"b+c"` two at once), or a `discrepancy.json`
+        that ended tied.
+    progress : None, False or callable
+        As in `tractexp.investigate`.
 
-    Raises `UserError` for wrong names or values, and for a model with `per_event`.
+    Returns
+    -------
+    Forecasts or Recommended
+        `depth_needed`, None where no dip will do, `forecast` of each parameter and `best_events`;
+        with `rivals` the `sentence` that says what to record, and its `probability`.
+
+    Raises
+    ------
+    UserError
+        For wrong names or values, and for a model with `per_event`.
     """
     rivals = rivals if isinstance(rivals, str) else [*rivals]
     if not rivals:

@@ -102,10 +102,30 @@ def posterior(
     """Sample the posterior of an identification's free parameters under a flat prior within their
     bounds.
 
-    `walkers` go `steps` steps each (at least 4 and 100), of which the first 30 % are thrown away;
-    `seed` is by default that of the identification. `progress`: None shows how far it is, False
-    does not. Raises `UserError` without the extra [posterior], for fewer walkers than twice the
-    coordinates, and for an identification of which only a `result.json` is known.
+    Parameters
+    ----------
+    fit : Identification
+        Made by `tractexp.identify`, or loaded from what it saved.
+    walkers : int, at least 4
+        Chains that move together, more than twice the coordinates.
+    steps : int, at least 100
+        Of each walker; the first 30 % are thrown away.
+    seed : int
+        None: that of the identification.
+    progress : None, False or callable
+        None shows how far it is, False does not.
+
+    Returns
+    -------
+    Sampled
+        `draws` {name: values in the parameter's unit}, intervals, the autocorrelation of the chains
+        and whether they have converged.
+
+    Raises
+    ------
+    UserError
+        Without the extra [posterior], for fewer walkers than twice the coordinates, and for an
+        identification of which only a `result.json` is known.
     """
     from tractexp.identification.posterior import sample
 

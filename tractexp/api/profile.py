@@ -99,9 +99,25 @@ def profile(
 ) -> Profiled:
     """Find the best fit for each value of each free parameter of an identification in turn.
 
-    `points` (3 to 1000) is how many values are tried on either side of the optimum at most.
-    `progress`: None shows how far it is, False does not. Raises `UserError` for an identification
-    of which only a `result.json` is known.
+    Parameters
+    ----------
+    fit : Identification
+        Made by `tractexp.identify`, or loaded from what it saved.
+    points : int, 3 to 1000
+        How many values are tried on either side of the optimum at most.
+    progress : None, False or callable
+        None shows how far it is, False does not.
+
+    Returns
+    -------
+    Profiled
+        `profiles` {name: {`values` in the parameter's unit, `deviance`, `interval`, ...}}, with the
+        intervals of these profiles and those by curvature side by side in `table()`.
+
+    Raises
+    ------
+    UserError
+        For an identification of which only a `result.json` is known.
     """
     from tractexp.identification.profile import profiles
 

@@ -101,21 +101,50 @@ def read(
 ) -> Dips:
     """Read records of voltage dips, check them and find the dip in each.
 
-    A source is the path of a CSV file (columns t, U, P, Q and, where recorded, f, U2, U_angle) or a
-    COMTRADE file (.cfg), a pandas or polars frame or a mapping with those columns, a shipped name
-    ("tibet_50pct"), or a `Record`. Arrays (N,) can be given directly as `t` [s], `U`, `P`, `Q`,
-    `U2` [pu], `f` [Hz] and `U_angle` [rad, in a frame that turns at nominal frequency, wrapped or
-    not], and are called `name`. Loads count P and Q as positive when consumed. P
-    and Q may have gaps (nan).
+    Parameters
+    ----------
+    *sources : path, frame, mapping, name or Record
+        A table (columns t, U, P, Q and, where recorded, f, U2, U_angle), a COMTRADE file (.cfg) or
+        another file that a reader takes, a pandas or polars frame or a mapping with those columns,
+        or a shipped name ("tibet_50pct").
+    t : (N,) [s]
+        Arrays given directly: the times, evenly spaced.
+    U, P, Q, U2 : (N,) [pu]
+        Positive-sequence voltage, active and reactive power, negative-sequence voltage. Loads count
+        P and Q as positive when consumed; P and Q may have gaps (nan).
+    f : (N,) [Hz]
+        The frequency.
+    U_angle : (N,) [rad]
+        Angle of the voltage in a frame that turns at nominal frequency, wrapped or not.
+    name : str
+        What the arrays are called.
+    **settings
+        Those of the reader: `base_voltage` [kV, line to line] and `base_power` [MVA] where a table
+        is not per unit, `frequency` [Hz, nominal]; for COMTRADE `voltages` and `currents` (three
+        channels each, names or numbers from 0), `train` (dips by number from 1), `reverse_current`,
+        `skew`, `encoding`, `pre` and `post` [s].
 
-    `settings` are those of the reader: `base_voltage` [kV, line to line] and `base_power` [MVA]
-    where a table is not per unit, `frequency` [Hz, nominal]; for COMTRADE `voltages` and `currents`
-    (three channels each, names or numbers from 0), `train` (dips by number from 1),
-    `reverse_current`, `skew`, `encoding`, `pre` and `post` [s].
+    Returns
+    -------
+    Dips
+        A list of events, each a record with its dip: `event.record` has the arrays, `event.depth`,
+        `t_start`, `t_end`, `U0`, `P0`, `Q0` what was found. Of a COMTRADE file every dip that can
+        be used, in order of time.
 
-    All dips of a COMTRADE file that can be used are given, in order of time. Raises `UserError`,
-    naming the file, the place and the value, for what is no record, holds no dip or has settings
-    that its reader does not know.
+    Raises
+    ------
+    UserError
+        For what is no record, holds no dip or has settings that its reader does not know; it names
+        the file, the place and the value.
+
+    Examples
+    --------
+    >>> import tractexp
+    >>> (event,) = tractexp.read("tibet_50pct")
+    >>> print(f"{event.depth:.2f} of {event.U0:.2f} pu")
+    0.50 of 1.00 pu
+    >>> event.record.P.shape == event.record.t.shape
+    True
     """
     arrays = {"t": t, "U": U, "P": P, "Q": Q, "f": f, "U2": U2, "U_angle": U_angle}
     columns = {key: values for key, values in arrays.items() if values is not None}

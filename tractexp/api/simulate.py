@@ -146,20 +146,50 @@ def simulate(
 ) -> Simulation:
     """Calculate the power a load draws in recorded events, or in a dip made by hand.
 
-    `model` is an identification, whose values are taken, or a model as `tractexp.identify` takes
-    it, for which `values` {name: value} gives all; they also replace single values of an
-    identification. Either `records`, events of `tractexp.read` or what it reads, or a dip to
-    `depth` (0 to 1) of the voltage before: from `start` [s] it falls within `fall` [s], and
-    `duration` [s] later it recovers within `recovery` [s]; `length` [s] at `rate` [1/s]. `U0`,
-    `P0`, `Q0` [pu] stand before such a dip: by default those of the identification, else 1, 1 and
-    0.5.
+    A dip made by hand falls to `depth` from `start` on, within `fall`, and recovers `duration`
+    after that, within `recovery`. Powers, given and calculated, are on the base of the records'
+    file. `values` are on the identification's own base where there is one, as its parameters are;
+    without one nothing is rebased, and they are on that of the records.
 
-    Powers, given and calculated, are on the base of the records' file. `values` are on the
-    identification's own base where there is one, as its parameters are; without one nothing is
-    rebased, and they are on that of the records.
+    Parameters
+    ----------
+    model : Identification, or as in `tractexp.identify`
+        Of an identification the parameters are taken, too.
+    values : {name: value}
+        Every parameter of a model, in its own unit; single ones of an identification.
+    records : events, or whatever `tractexp.read` reads
+        Events whose recorded voltage is played, in place of a dip made by hand.
+    depth : float, 0 to 1
+        Of the voltage before.
+    duration : float [s]
+        From the start of the fall to the start of the recovery.
+    fall, recovery : float [s]
+        How long they take.
+    start, length : float [s]
+        When the fall starts, and how long all of it is.
+    rate : float [1/s]
+        Samples per second.
+    U0, P0, Q0 : float [pu]
+        Before such a dip; None: those of the identification, else 1, 1 and 0.5.
 
-    Raises `UserError` for unknown names, values that are missing, and where there is no steady
-    state.
+    Returns
+    -------
+    Simulation
+        `responses`, one an event, with `t` [s], `U`, `P` and `Q` (N,) [pu] and `to_frame()`; those
+        of a single one are attributes of the simulation, too.
+
+    Raises
+    ------
+    UserError
+        For unknown names, values that are missing, and where there is no steady state.
+
+    Examples
+    --------
+    >>> import tractexp
+    >>> load = tractexp.compose(motor="none", static="constant_impedance")
+    >>> played = tractexp.simulate(load, {}, depth=0.5, Q0=0.3)
+    >>> round(float(played.P.min()), 3), round(float(played.Q.min()), 3)
+    (0.25, 0.075)
     """
     dip = Dip(0.0 if depth is None else depth, duration, fall, recovery, start, length, rate)
     dip.check()

@@ -141,11 +141,34 @@ def survey(
     """Look at every file below a folder that can be read; what cannot be read is a row with the
     reason.
 
-    `cores` (all) processes look; `keep` is a folder where the rows of each file are stored as they
-    come, so that the next survey with it looks only at files that are new or changed. `informative`
-    asks for so many events that tell most about `model` together (D-optimal), at `values` as
-    `tractexp.plan` takes them. The model is as in `tractexp.identify`. Raises `UserError` for a
-    folder that is not there or holds no file that can be read.
+    Parameters
+    ----------
+    folder : path
+        Of the archive.
+    informative : int
+        So many events are chosen that tell most about `model` together (D-optimal); None: none.
+    model, bounds, fixed, substeps : as in `tractexp.identify`
+        The model whose parameters the chosen events shall tell.
+    values : as in `tractexp.plan`
+        The parameters at which they are chosen.
+    cores : int
+        Processes that look; None: all cores.
+    keep : path
+        A folder where the rows of each file are stored as they come, so that the next survey with
+        it looks only at files that are new or changed.
+    progress : None, False or callable
+        None shows how many files are done, False does not.
+
+    Returns
+    -------
+    Surveyed
+        `rows`, one for each event of each file; those `informative`, and the `command` that fits
+        them; `unread` files with the reason.
+
+    Raises
+    ------
+    UserError
+        For a folder that is not there or holds no file that can be read.
     """
     check_range("task.informative", informative, 1)
     check_range("task.cores", cores, 1)

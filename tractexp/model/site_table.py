@@ -15,6 +15,22 @@ def sites(model: Any) -> Table:
 
     Every registered effect is tried on the model, which takes seconds the first time and is
     remembered then.
+
+    Parameters
+    ----------
+    model : LoadModel or Model
+        As `tractexp.compose` makes one.
+
+    Returns
+    -------
+    Table
+        A row for each site: its name, the part that owns it, kind, unit, what it is, the expression
+        there, and the effects.
+
+    Raises
+    ------
+    UserError
+        For anything that is no model.
     """
     model = getattr(model, "model", model)  # what compose() returns carries it
     if not isinstance(model, Model):

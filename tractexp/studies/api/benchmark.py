@@ -120,13 +120,39 @@ def benchmark(
     """Run optimizers on the noiseless functions of BBOB; the same seed gives the same runs on any
     number of cores.
 
-    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names
-    to call them by to such. Each run may make `multiplier` evaluations per dimension; `targets` are
-    distances to the optimum; `cores` None means all. `progress`: None shows how many runs have
-    ended, False does not; a callable is told of each.
+    Parameters
+    ----------
+    optimizers : one as in `tractexp.identify`, a list, or {label: optimizer}
+    functions : ints, 1 to 24
+        Of the suite.
+    instances : ints
+        Shifts and rotations of each function.
+    dimensions : ints, 2 to 100
+    multiplier : int
+        Evaluations that each run may make per dimension.
+    targets : floats
+        Distances to the optimum whose running times are told.
+    seed : int
+    cores : int
+        Processes; None: all.
+    progress : None, False or callable
+        None shows how many runs have ended, False does not; a callable is told of each.
 
-    Raises `UserError` for wrong names or values, an optimizer that needs residuals, and without the
-    extra [benchmark].
+    Returns
+    -------
+    BenchmarkResult
+        Expected running times and the distribution of the targets reached; `sentences` and
+        `report()`.
+
+    Raises
+    ------
+    UserError
+        For wrong names or values, an optimizer that needs residuals, and without the extra
+        [benchmark].
+
+    Notes
+    -----
+    Source: Hansen and others 2021, COCO: a platform for comparing continuous optimizers.
     """
     from tractexp.studies.bbob.runs import BbobPlan, package, perform
 

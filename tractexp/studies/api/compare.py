@@ -164,19 +164,50 @@ def compare(
     cores: int | None = None,
     progress: Any = None,
 ) -> ComparisonResult:
-    """Compare the variants in a sweep's folder (None: the newest under outputs/sweeps), or what a
-    `filter` finds, or what `tractexp.search` found.
+    """Compare the variants in a sweep's folder, or what a `filter` finds, or what `tractexp.search`
+    found.
 
-    The filter is MLflow's, over the store at `uri` (None: the current folder's) and one
-    `experiment` (None: all). `data` keeps the runs on one choice of data; runs on several are
-    compared on each, and over all. So are those that differ in the limits of a search named in
-    `apart`, such as "budget". With `bbob` the variants are run on so many instances of the
-    functions of BBOB as well, on `cores` processes (None: all). `targets` are those of running
-    times, in multiples of the floor; objectives within the share `ties` of it count as equal;
-    `floor` [pu²] is what the noise leaves (None: what least squares reach from the ends of the runs
-    and from many starts, or the best of all runs where their records cannot be read any more). With
-    a `reference` only its pairs are tested. `progress`: None shows how far that is, False does not;
-    a callable is told. Raises `UserError` where no runs are found, or their models differ.
+    Runs on several choices of data are compared on each, and over all.
+
+    Parameters
+    ----------
+    sweep : path or Searches
+        None: the newest folder under outputs/sweeps.
+    filter : str
+        MLflow's, over its store.
+    uri : str
+        The store; None: that of the current folder.
+    experiment : str
+        None: all of them.
+    data : name
+        Only runs on this choice.
+    targets : floats
+        Those of running times, in multiples of the floor.
+    ties : float
+        Objectives within this share of the floor count as equal.
+    floor : float [pu²]
+        What the noise leaves; None: what least squares reach from the ends of the runs and from
+        many starts, or the best of all runs where their records cannot be read any more.
+    reference : label
+        Only its pairs are tested; None: all.
+    apart : names
+        Limits of a search, such as "budget": runs that differ in them are compared on each.
+    bbob : int
+        The variants are run on so many instances of the functions of BBOB as well.
+    cores : int
+        Processes; None: all.
+    progress : None, False or callable
+        None shows how far that is, False does not; a callable is told.
+
+    Returns
+    -------
+    ComparisonResult
+        `answer` in one sentence, `sentences`, and `report()`.
+
+    Raises
+    ------
+    UserError
+        Where no runs are found, or their models differ.
     """
     check(sweep, filter, targets, ties, floor, apart, bbob)
     searches = sweep if isinstance(sweep, Searches) else None

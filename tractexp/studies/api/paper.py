@@ -151,15 +151,35 @@ def paper(
     seed: int = 0,
     progress: Any = None,
 ) -> PaperResult:
-    """Measure what the paper claims, on `records` fitted and on those of `validate`.
+    """Measure what the paper claims, on dips that are fitted and on others held out.
 
-    `parts` are tables and figures ("table2", "figure9", "equations"; none: all). Each of the
-    paper's optimizers searches under `seeds` seeds, on `workers` processes (None: one for each
-    core). Everything else is as in `tractexp.identify`. `progress`: None shows the stage, False
-    does not; a callable is told each stage.
+    Parameters
+    ----------
+    records, model, validate : as in `tractexp.identify`
+    parts : names
+        Tables and figures ("table2", "figure9", "equations"); none: all.
+    seeds : int
+        Each of the paper's optimizers searches under so many.
+    workers : int
+        Processes; None: one for each core.
+    bounds, fixed, per_event, substeps, objective, budget, time_limit, target, seed
+        As in `tractexp.identify`.
+    progress : None, False or callable
+        None shows the stage, False does not; a callable is told each stage.
 
-    Raises `UserError` for wrong names or values, and where a part needs a held-out dip that is not
-    there.
+    Returns
+    -------
+    PaperResult
+        `claims`, each with its `text`, what was `measured` and the `verdict`.
+
+    Raises
+    ------
+    UserError
+        For wrong names or values, and where a part needs a held-out dip that is not there.
+
+    Notes
+    -----
+    Source: Wu, Fan and Zou 2022.
     """
     started = time.perf_counter()
     check(parts, seeds, workers)

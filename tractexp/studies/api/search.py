@@ -82,18 +82,38 @@ def search(
     cores: int | None = None,
     progress: Any = None,
 ) -> Searches:
-    """Fit a model to `records` by each optimizer under `seeds` seeds from `seed` on, for
-    `tractexp.compare` to judge.
+    """Fit a model by each optimizer under several seeds, for `tractexp.compare` to judge.
 
-    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names
-    to call them by to such; a plugin of your own enters by its name. `switches` are settings of
-    optimizers that are true or false: every combination of those that an optimizer has is a variant
-    of it, whose effects the comparison tells. All have the same limits. A search that fails is a
-    row with the reason. What was searched before by the same code on the same records is read back.
-    Everything else is as in `tractexp.identify`; `cores` None means all. `progress`: None shows how
-    many searches have ended, False does not; a callable is told what is read, and of each group.
+    A search that fails is a row with the reason. What was searched before by the same code on the
+    same records is read back.
 
-    Raises `UserError` for wrong names or values.
+    Parameters
+    ----------
+    records, model : as in `tractexp.identify`
+    optimizers : one as in `tractexp.identify`, a list, or {label: optimizer}
+        A plugin of your own enters by its name. All have the same limits.
+    switches : names
+        Settings of optimizers that are true or false: every combination of those that an optimizer
+        has is a variant of it, whose effects the comparison tells.
+    seeds : int
+        Searches of each: `seed` and the ones after it.
+    bounds, fixed, per_event, substeps, objective, budget, time_limit, target, seed
+        As in `tractexp.identify`.
+    cores : int
+        Processes; None: all.
+    progress : None, False or callable
+        None shows how many searches have ended, False does not; a callable is told what is read,
+        and of each group.
+
+    Returns
+    -------
+    Searches
+        A row for each search; what `tractexp.compare` takes.
+
+    Raises
+    ------
+    UserError
+        For wrong names or values.
     """
     check_range("seeds", seeds, 1)
     check_range("cores", cores, 1)
