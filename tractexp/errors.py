@@ -56,6 +56,7 @@ class Section:
     name: str
 
     def __getattr__(self, key: str) -> str:
+        """The setting of that name in this section, as the user writes it."""
         if key.startswith("_"):
             raise AttributeError(key)
         return setting(f"{self.name}.{key}")
@@ -82,6 +83,7 @@ class Stopped(KeyboardInterrupt):
     """
 
     def __init__(self, message: str = "", code: int = 130, state: Any = None, result: Any = None):
+        """An end with its exit code, what the search had reached and the result so far."""
         super().__init__(message)
         self.code, self.state, self.result = code, state, result
 
@@ -113,6 +115,7 @@ def _measure_likeness(name: str, other: str) -> float:
 
 
 def _sort_words(name: str) -> str:
+    """A name with its words in alphabetical order."""
     return "_".join(sorted(name.split("_")))
 
 

@@ -337,6 +337,7 @@ class Transcript(io.TextIOBase):
     """
 
     def __init__(self, path: Path):
+        """Write to a file where it can be opened; elsewhere what is written is lost in silence."""
         super().__init__()
         try:
             self._file: IO[str] | None = path.open("w", encoding="utf-8", buffering=1)
@@ -344,17 +345,20 @@ class Transcript(io.TextIOBase):
             self._file = None
 
     def write(self, text: str) -> int:
+        """Write a text and return its length; a full disk is no error of the run."""
         with contextlib.suppress(OSError):
             if self._file is not None:
                 self._file.write(text)
         return len(text)
 
     def flush(self) -> None:
+        """Hand what was written to the system."""
         with contextlib.suppress(OSError):
             if self._file is not None:
                 self._file.flush()
 
     def close(self) -> None:
+        """Close the file; closing twice does nothing."""
         with contextlib.suppress(OSError):
             if self._file is not None:
                 self._file.close()
@@ -408,6 +412,7 @@ def read_claim(path: Path) -> str:
 
 
 def _read_claimant(file: IO[bytes]) -> str:
+    """Who holds a lock, as its file says."""
     return file.read(200).decode(errors="replace") or "another process"
 
 
@@ -450,6 +455,7 @@ def new_folder(path: Path) -> Path:
 
 
 def _try_lock(file: IO[bytes]) -> bool:
+    """Whether this process got the lock of an open file."""
     try:
         if os.name == "nt":
             import msvcrt
@@ -499,6 +505,7 @@ def leftovers(folder: Path) -> list[Path]:
 
 @contextlib.contextmanager
 def _as_user_error(path: Path) -> Iterator[None]:
+    """Within it, what the system refuses is a `UserError` that names the path."""
     try:
         yield
     except OSError as error:
@@ -521,6 +528,9 @@ def _make_part_file(path: Path) -> Iterator[Path]:
 
 
 def _fill(temporary: Path, data: bytes, lasting: bool, private: bool) -> None:
+    """Write a temporary file whole: to the disk where it must be `lasting`, closed to others where
+    it is `private`.
+    """
     with temporary.open("wb") as file:
         file.write(data)
         file.flush()
@@ -569,6 +579,7 @@ def plain(content: Any) -> Any:
 
 
 def _umask() -> int:
+    """The rights that this process takes from new files."""
     now = os.umask(0)
     os.umask(now)
     return now

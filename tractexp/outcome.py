@@ -40,9 +40,11 @@ class Tabulated:
         return self.table().to_frame()
 
     def __repr__(self) -> str:
+        """What the command line prints."""
         return str(self.summary())
 
     def _repr_html_(self) -> str:
+        """What a notebook shows."""
         return self.summary().fragment
 
 
@@ -69,10 +71,12 @@ class Plain:
 
 
 def _list_saved_fields(cls: Any) -> list[Field[Any]]:
+    """The fields of a dataclass that `save` writes: those whose types can be read back."""
     return [f for f in fields(cls) if not isinstance(f.type, str)]
 
 
 def _form(of: Field[Any]) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
+    """(write, read): how a field's value becomes plain data, and a value again."""
     kind: Any = of.type
     if isinstance(kind, type) and issubclass(kind, Plain):
         return kind.to_dict, kind.from_dict
@@ -80,6 +84,7 @@ def _form(of: Field[Any]) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
 
 
 def _as_it_is(value: Any) -> Any:
+    """The value, a mapping of any kind as a dictionary."""
     return dict(value) if isinstance(value, Mapping) else value
 
 
@@ -93,6 +98,7 @@ class Outcome(Plain, Tabulated):
     kinds: ClassVar[dict[str, type["Outcome"]]] = {}
 
     def __init_subclass__(cls, **settings: Any) -> None:
+        """Register a kind of result by its name."""
         super().__init_subclass__(**settings)
         if "kind" in vars(cls):
             Outcome.kinds[cls.kind] = cls

@@ -37,6 +37,7 @@ class Parameter:
         return self.null
 
     def __set_name__(self, owner: type, name: str) -> None:
+        """Take the attribute's name, and its symbol where none is given."""
         if not self.name:  # one of several classes' has its name already
             object.__setattr__(self, "name", name)
             object.__setattr__(self, "symbol", self.symbol or name)
@@ -99,13 +100,16 @@ class Box:
 
     @property
     def dimension(self) -> int:
+        """How many coordinates there are, d."""
         return len(self.lower)
 
     @property
     def width(self) -> np.ndarray:
+        """The width (d,) of each coordinate's range."""
         return self.upper - self.lower
 
     def clip(self, x: np.ndarray) -> np.ndarray:
+        """Points (n, d) moved to the nearest of the box."""
         return np.clip(x, self.lower, self.upper)
 
     def uniform(self, rng: np.random.Generator, n: int) -> np.ndarray:

@@ -233,6 +233,9 @@ def register_all() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, 
 
 
 def _package(point: "EntryPoint") -> ModuleType:
+    """The package of an entry point. Raises `UserError` for one that cannot be imported, or is a
+    single file.
+    """
     what = f"the plugin package '{point.value}' (entry point '{point.name}')"
     with _import_error(what):
         package = point.load()
@@ -245,6 +248,7 @@ def _package(point: "EntryPoint") -> ModuleType:
 
 
 def _module(name: str) -> ModuleType:
+    """The module of a plugin. Raises `UserError` with the reason where it cannot be imported."""
     with _import_error(f"the plugin module '{name}'"):
         return importlib.import_module(name)
 

@@ -34,6 +34,7 @@ def make_silent_counter(total: int) -> Counting:
 
 @functools.cache
 def console() -> Any:
+    """Where progress is printed: a terminal's or a notebook's own width, a fixed one in logs."""
     from rich.console import Console
 
     lively = Console(highlight=False, soft_wrap=True)
@@ -211,9 +212,11 @@ class Pace:
     """
 
     def __init__(self, first: float | None = None):
+        """Begin to count; the first line is due after `first` seconds."""
         self.started, self.due = time.perf_counter(), FIRST_LINE if first is None else first
 
     def __call__(self) -> float:
+        """Seconds spent where a line is due, else 0."""
         spent = time.perf_counter() - self.started
         if spent < self.due:
             return 0.0
@@ -222,6 +225,7 @@ class Pace:
 
 
 def _lively() -> bool:
+    """Whether lines can be overwritten: in a terminal or a notebook."""
     return console().is_terminal or console().is_jupyter
 
 

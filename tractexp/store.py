@@ -53,6 +53,7 @@ class Store:
     """
 
     def __init__(self, kind: str, limit: int | None = None, folder: Path | None = None):
+        """A store of one kind of entries, of which at most `limit` are kept, in its own folder."""
         self.kind, self.limit, self.folder, self._written = kind, limit, folder, 0
 
     def path(self, key: str) -> Path:
@@ -113,6 +114,7 @@ class Store:
         self.write(key, packed.getvalue())
 
     def _forget(self, folder: Path, limit: int) -> None:
+        """Remove the entries that were written first, and an eighth more."""
         entries = list(folder.glob(f"*{ENDING}"))
         if len(entries) > limit:
             times = {}
@@ -149,6 +151,7 @@ def _sound(path: Path) -> bytes | None:
 
 
 def _sum(path: Path, content: bytes) -> bytes:
+    """The SHA-256 of an entry's name and content."""
     return hashlib.sha256(path.name.encode() + b"\0" + content).digest()
 
 
@@ -166,6 +169,9 @@ def key(*things: Any) -> str:
 
 
 def _content(thing: Any) -> bytes:
+    """Everything that tells a thing from another as bytes: arrays with type and shape, fields and
+    items in order.
+    """
     if isinstance(thing, np.ndarray):
         return f"{thing.dtype.str} {thing.shape} ".encode() + np.ascontiguousarray(thing).tobytes()
     if dataclasses.is_dataclass(thing):

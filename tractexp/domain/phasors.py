@@ -26,6 +26,8 @@ FINEST_STEP = 5e-4  # s, longest Runge-Kutta step of a forecast
 
 
 class PhasorDomain(Domain):
+    """P and Q that phasors show, driven by the size of the positive-sequence voltage."""
+
     name = PHASORS
     setting = ""
     compared = "P and Q"
@@ -40,26 +42,34 @@ class PhasorDomain(Domain):
     dips = DipGrid((0.1, 0.2, 0.4, 0.8), 0.04, 0.3, 2.5)
 
     def event(self, event: Event) -> Event:
+        """The event itself."""
         return event
 
     def excitation(
         self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
     ) -> Excitation:
+        """U, f and U2 of an event as inputs, P and Q as measurements, each with its weight."""
         return excitation.phasors(event, model, weights)
 
     def smooth_event(self, event: Event) -> SmoothedEvent:
+        """The event with its voltage smoothed where it is smooth, and what that leaves of its
+        noise.
+        """
         return smooth_voltage(event)
 
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
+        """The stretch before the dip in which each event is at rest, as slices of the drive."""
         first = [int(drive.first[e]) for e in range(drive.events)]
         return [
             slice(a + e.steady.start, a + e.steady.stop) for a, e in zip(first, events, strict=True)
         ]
 
     def longest_step(self, events: Sequence[Event], substeps: np.ndarray) -> float:
+        """The step [s] below which no phasor moves; the same for all events."""
         return FINEST_STEP
 
     def values(self, drive: Drive) -> int:
+        """How many numbers are measured, gaps included."""
         return drive.measurements.size
 
     def noise(
@@ -75,15 +85,19 @@ class PhasorDomain(Domain):
         return estimate(residual, valid, quiet, walk, shapes)
 
     def input_errors(self, problem: "Problem", values: np.ndarray) -> None:
+        """None: of phasors the noise of the voltage is a mode of the noise."""
         return None
 
     def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
+        """Calculated P and Q (2, N) beside those recorded."""
         return Playback.of_power(event, outputs[0], outputs[1])
 
     def ports(self, event: Event) -> tuple[Port, ...]:
+        """The one port of an event: U and P - jQ."""
         return (power_port(event),)
 
     def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
+        """P and Q (2, N) of a network's response to an event."""
         (i,) = responses
         return np.stack([event.P0 + i.real, event.Q0 - i.imag])
 
@@ -99,15 +113,19 @@ class PhasorDomain(Domain):
         return why and f"fit the sampled waveforms, by domain=waves: the dip of {record.name} {why}"
 
     def slowest(self, frequency: float) -> float:
+        """The least frequency [Hz] that is proposed for a ringing."""
         return 5.0
 
     def rates(self, frequency: float) -> tuple[float, ...]:
+        """The rates [Hz] of recorders that a plan forecasts."""
         return (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
     def shape(self, event: Event) -> dict[str, float]:
+        """{}: a dip of phasors has neither jump nor unbalance."""
         return {}
 
     def about_noise(self, faults: Sequence[str], judged: bool) -> str:
+        """How the noise was estimated, for the page."""
         return (
             "It is estimated where nothing happens, from what the fit leaves there, and so contains"
             " what smoothing"

@@ -31,6 +31,8 @@ PLAYED = 64  # samples per cycle at least, of a voltage that is played
 
 
 class WaveDomain(Domain):
+    """Currents of space vectors and of the zero sequence, driven by the sampled voltages."""
+
     name = WAVES
     setting = "domain=waves "
     compared = "the currents"
@@ -46,11 +48,13 @@ class WaveDomain(Domain):
     dips = DipGrid((0.04, 0.08, 0.16, 0.32), 0.002, 0.1, 0.62)
 
     def event(self, event: Event) -> WaveEvent:
+        """The event with its sampled waveforms. Raises `UserError` for a record of phasors."""
         return in_waves(event)
 
     def excitation(
         self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
     ) -> WaveformDrive:
+        """The sampled voltages of an event as inputs, its currents as measurements."""
         return excitation.waveforms(cast(WaveEvent, event))
 
     def smooth_event(self, event: Event) -> SmoothedEvent:
@@ -58,9 +62,11 @@ class WaveDomain(Domain):
         return SmoothedEvent(event, np.empty((0, event.record.samples)))
 
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
+        """[]: before the dip the currents are periodic, not at rest."""
         return []
 
     def longest_step(self, events: Sequence[Event], substeps: np.ndarray) -> float:
+        """The shortest step [s] of the Runge-Kutta method over all events."""
         return min(e.record.step / n for e, n in zip(events, substeps, strict=True))
 
     def values(self, drive: Drive) -> int:
@@ -84,15 +90,21 @@ class WaveDomain(Domain):
         )
 
     def input_errors(self, problem: "Problem", values: np.ndarray) -> np.ndarray:
+        """What errors of the voltage make of the currents, as modes of the noise."""
         return wave_errors.input_errors(problem, values)
 
     def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
+        """Calculated currents (C, N) beside those recorded, and the power of both."""
         return Playback.of_currents(cast(WaveEvent, event), outputs)
 
     def ports(self, event: Event) -> tuple[Port, ...]:
+        """The ports of an event: the space vector, and the zero sequence where there is one."""
         return current_ports(cast(WaveEvent, event))
 
     def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
+        """Currents (3, N) of a network's responses: alpha, beta and zero, with what is periodic
+        before the dip.
+        """
         event, (vector, *zero) = cast(WaveEvent, event), responses
         i = vector * event.turn
         return periodic_course(event, event.currents) + np.stack(
@@ -100,12 +112,15 @@ class WaveDomain(Domain):
         )
 
     def better(self, event: Event) -> str:
+        """ "": no domain tells more."""
         return ""
 
     def slowest(self, frequency: float) -> float:
+        """The least frequency [Hz] that is proposed for a ringing."""
         return COARSEST * frequency
 
     def rates(self, frequency: float) -> tuple[float, ...]:
+        """The rates [Hz] of recorders that a plan forecasts, in whole samples a cycle."""
         return tuple(n * frequency for n in (16, 32, 64, 128, 200))
 
     def shape(self, event: Event) -> dict[str, float]:
@@ -122,6 +137,7 @@ class WaveDomain(Domain):
         }
 
     def describe_shape(self, shape: "DipShape") -> str:
+        """ ", the phase jumping by 10 degrees, negative sequence 50% of the depth"."""
         return (
             f", the phase jumping by {shape.jump:.0f} degrees, negative sequence"
             f" {shape.unbalance:.0%} of the depth"
@@ -129,9 +145,11 @@ class WaveDomain(Domain):
 
     @property
     def edges(self) -> str:
+        """How steep the edges of a planned dip are, and that it has no zero sequence."""
         return f"{super().edges}, without zero sequence"
 
     def about_noise(self, faults: Sequence[str], judged: bool) -> str:
+        """How the noise was estimated, for the page, and which faults of the measurement were free."""
         origin = (
             "It is estimated before the dip and at the end of the record, from what the fit leaves"
             " there: harmonics"

@@ -100,6 +100,7 @@ class DescentEnds:
 
     @property
     def lowest(self) -> float:
+        """The least deviance that a descent ended at; inf without one."""
         return float(self.descent.deviance.min(initial=np.inf))
 
     @property

@@ -44,6 +44,7 @@ class GradedModel:
 
     @property
     def uncertainty(self) -> Uncertainty:
+        """What is known of each free parameter: values, intervals and verdicts."""
         return self.estimation.uncertainty
 
     @property

@@ -175,6 +175,7 @@ def _samples(ports: Sequence[Port]) -> int:
 
 
 def _refuse(ports: Sequence[Port], names: str) -> None:
+    """Raise `UserError` for events of too few samples, or whose voltage does not move."""
     samples, needed = _samples(ports), SAMPLES * unknowns(0, ports[0])
     if samples < needed:
         raise UserError(

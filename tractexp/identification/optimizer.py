@@ -27,7 +27,9 @@ class Evaluate(Protocol):
     """
 
     @property
-    def budget(self) -> int | None: ...
+    def budget(self) -> int | None:
+        """The evaluations that the search may make; None: any number."""
+        ...
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, d) -> (evaluated points (n, d), objectives (n,)). Lower is
@@ -65,6 +67,7 @@ class Optimizer(Plugin):
         return getattr(self, "iterations", None)
 
     def check(self) -> None:
+        """Raise `UserError` for a space that is neither "unit" nor "raw"."""
         check_choice("optimizer.space", self.space, ("unit", "raw"))
 
     @abstractmethod
@@ -89,11 +92,15 @@ class Iterative(Optimizer):
     iterations: int | None = None
 
     def check(self) -> None:
+        """Raise `UserError` for fewer iterations than one, too."""
         super().check()
         if self.iterations is not None:
             check_range("optimizer.iterations", self.iterations, 1)
 
     def end(self, budget: int | None) -> int | None:
+        """The iterations that are set, else the usual number where there is no budget; None where
+        the budget ends the search.
+        """
         return self.iterations or (self.usual if budget is None else None)
 
     def laid_out(self, budget: int | None, first: float, each: float) -> tuple[int, Iterable[int]]:

@@ -218,6 +218,9 @@ class Needed:
     relative: np.ndarray  # (n,) half interval over value there
 
     def __str__(self) -> str:
+        """ "a dip of 40 % gives H within 5 %", or that none of this kind does, and what the best
+        gives.
+        """
         best = int(np.argmin(self.relative))
         if self.depth is None:
             return (

@@ -29,6 +29,7 @@ class Elite:
     """
 
     def __init__(self, box: Box):
+        """Keep none yet of the points of a box."""
         self.box = box
         self.x, self.f = np.empty((0, box.dimension)), np.empty(0)
 
@@ -47,13 +48,18 @@ class _Residuals:
     """Scaled residuals and their Jacobian at points of the unit cube, as SciPy asks for them."""
 
     def __init__(self, evaluate: Evaluate, box: Box, scale: float):
+        """Residuals of `evaluate` at points of the unit cube, times `scale`, of which the last are
+        kept.
+        """
         self.evaluate, self.box, self.scale = evaluate, box, scale
         self.unit, self.value = np.empty(0), np.empty(0)
 
     def _rows(self, unit: np.ndarray) -> np.ndarray:
+        """Residuals (n, m) at points (n, d) of the unit cube, scaled."""
         return self.evaluate.residuals(self.box.from_unit(unit))[1] * self.scale
 
     def __call__(self, unit: np.ndarray) -> np.ndarray:
+        """Residuals (m,) at a point (d,) of the unit cube, scaled."""
         # asked again, as for the Jacobian: no second simulation
         if not np.array_equal(unit, self.unit):
             self.unit, self.value = unit.copy(), self._rows(unit[None])[0]

@@ -35,6 +35,7 @@ class PosteriorSample:
 
     @property
     def has_converged(self) -> bool:
+        """Whether the chains are `ENOUGH` times as long as what they remember."""
         return self.steps >= ENOUGH * self.autocorrelation
 
 

@@ -63,6 +63,9 @@ class Profiles:
 
     @property
     def notes(self) -> list[str]:
+        """What happened on the way, in sentences: how often a better optimum restarted the
+        profiles.
+        """
         if not self.restarts:
             return []
         times = "once" if self.restarts == 1 else f"{self.restarts} times"
@@ -207,6 +210,7 @@ class _Drawing:
     """Profiles of some parameters (k,) about one optimum, as their lanes go on."""
 
     def __init__(self, uncertainty: Uncertainty, column: np.ndarray):
+        """Draw the profiles of the parameters `column` (k,) of an estimate; nothing is drawn yet."""
         self.uncertainty, self.column = uncertainty, column
         self.curves: list[LikelihoodProfile] = []
         self.region = Region(
@@ -216,6 +220,9 @@ class _Drawing:
         self.simulations = 0
 
     def begin(self, points: int, ended: Callable[[], None]) -> None:
+        """Draw every profile from the estimate, at most `points` on either side; `ended` is told of
+        each lane.
+        """
         k = len(self.column)
         lanes = Lanes(
             self.uncertainty, self.column, np.tile(self.uncertainty.unit, (k, 1)), np.zeros(k)
@@ -243,6 +250,7 @@ class _Drawing:
         return bool(where)
 
     def _join(self, lanes: Lanes, points: int) -> None:
+        """Draw lanes that begin elsewhere, and join each with the profile of its parameter."""
         self._run(lanes, points)
         self.curves = [
             _join_profiles(
@@ -252,6 +260,7 @@ class _Drawing:
         ]
 
     def _run(self, lanes: Lanes, points: int, ended: Callable[[], None] = lambda: None) -> None:
+        """Run lanes, and keep what they passed, the simulations they cost and a better optimum."""
         lanes.run(points, ended)
         self.simulations += lanes.simulations
         self.better = lanes.better

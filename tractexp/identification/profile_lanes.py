@@ -68,6 +68,7 @@ class Region:
     rise: np.ndarray
 
     def join_region(self, other: "Region") -> "Region":
+        """What both regions hold."""
         return Region(
             np.concatenate([self.unit, other.unit]), np.concatenate([self.rise, other.rise])
         )

@@ -43,6 +43,9 @@ class Projection:
 
     @classmethod
     def from_ports(cls, ports: Sequence[Port]) -> "Projection":
+        """The projection for some ports: currents less their steady response, and decays between
+        one in the longest time recorded and one in a sample [1/s].
+        """
         seconds = max((len(port.u) - port.start) * port.step for port in ports)
         current = _rows(ports, lambda port: port.i - port.steady_response)
         return cls(ports, current, 1 / seconds, 1 / max(port.step for port in ports))
@@ -57,6 +60,9 @@ class Projection:
 
     @property
     def grid(self) -> list[complex]:
+        """Poles [1/s] from which a search starts: decays in even ratios, each with every frequency
+        that the samples can show.
+        """
         decays = np.geomspace(self.slowest, FASTEST * self.rate, TRIED_DECAYS + 2)[1:-1].tolist()
         turns = (
             [0.0] if self.ports[0].series else [f for f in FREQUENCIES if f < HIGHEST * self.rate]

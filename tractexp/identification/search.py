@@ -86,6 +86,9 @@ class _Counter:
     """The batch objective handed to an optimizer, in that optimizer's own box."""
 
     def __init__(self, problem: Objective, unit: bool, limits: Limits):
+        """Count what a search asks of a problem, in the unit cube or in the parameters' own units,
+        within limits.
+        """
         self.problem, self.unit, self.limits = problem, unit, limits
         d = len(problem.lower)
         self.raw = Box(problem.lower, problem.upper)
@@ -97,10 +100,12 @@ class _Counter:
 
     @property
     def seconds(self) -> float:
+        """How long the search has taken [s]."""
         return time.perf_counter() - self.started
 
     @property
     def budget(self) -> int | None:
+        """The simulations that it may make; None: any number."""
         return self.limits.simulations
 
     def _admit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -124,6 +129,9 @@ class _Counter:
         return x, self.raw.from_unit(x) if self.unit else x, asked - len(x)
 
     def _note(self, x: np.ndarray, raw: np.ndarray, f: np.ndarray, cut: int) -> None:
+        """Count evaluated points `x` (n, d) with objectives `f` (n,), keep the best, and stop the
+        search at its target or where `cut` points found no room in the budget.
+        """
         self.simulations += len(f)
         self.refused += int(np.count_nonzero(f >= REFUSED))
         first = int(np.argmin(f))
@@ -137,6 +145,9 @@ class _Counter:
             raise _Stop(f"stopped at the budget of {self.limits.simulations} simulations")
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n, d) clipped into the box and their objectives (n,); what is not finite counts
+        as unknown.
+        """
         x, raw, cut = self._admit(x)
         f = self.problem.objective(raw)
         f = np.where(np.isfinite(f), f, UNKNOWN)
@@ -144,6 +155,9 @@ class _Counter:
         return x, f
 
     def residuals(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n, d) clipped into the box and their residuals (n, m), nan where one cannot be
+        simulated.
+        """
         x, raw, cut = self._admit(x)
         r = self.problem.residuals(raw)
         f = np.einsum("nm,nm->n", r, r)
@@ -241,6 +255,9 @@ def search(
 def _result(
     counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str
 ) -> SearchResult:
+    """What a search found: the best of all its evaluations, and its history, one row (simulations,
+    best, values, seconds) an iteration.
+    """
     rows = rows or [(counter.simulations, counter.best, counter.best_values, counter.seconds)]
     simulations, best, values, seconds = zip(*rows, strict=True)
     history = History(np.array(simulations), np.array(best), np.array(values), np.array(seconds))

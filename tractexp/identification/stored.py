@@ -72,6 +72,7 @@ def check_numbers(where: str, numbers: Any) -> None:
 
 
 def _leaves(where: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """(place, value) of everything within a value that is neither mapping nor list."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
             yield from _leaves(f"{where}.{key}", inner)
@@ -134,6 +135,9 @@ def signals(given: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
 
 def _signal(name: str, values: Any) -> np.ndarray:
+    """A signal (N,) of a stored result. Raises `UserError` for what is no number, no row, or not
+    finite, naming the sample.
+    """
     try:
         result = np.asarray(values, dtype=float)
     except (TypeError, ValueError, OverflowError) as error:

@@ -143,6 +143,7 @@ class Uncertainty:
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The free parameters, in the problem's order."""
         return self.information.names
 
     @property

@@ -41,6 +41,7 @@ class ParameterVerdict:
         return replace(self, word=word, detail="; ".join(filter(None, (self.detail, also))))
 
     def __str__(self) -> str:
+        """ "weakly identified: trades against C", or the word alone."""
         return ": ".join(filter(None, (self.word, self.detail)))
 
 
@@ -140,6 +141,7 @@ def _trade(information: Information, j: int, factor: float) -> list[str]:
 
 
 def _number(correlation: float) -> str:
+    """A correlation with two digits, with four where it is nearly one."""
     return f"{correlation:.2f}" if abs(correlation) < 0.995 else f"{correlation:.4f}"
 
 

@@ -71,10 +71,12 @@ class Catalogue:
     members: tuple[Candidate, ...] = ()
 
     def __getitem__(self, name: str) -> Candidate:
+        """The candidate of that name, an effect of the catalogue or another member of a family."""
         return self._candidates_by_name[name]
 
     @functools.cached_property
     def _candidates_by_name(self) -> dict[str, Candidate]:
+        """{name: candidate} of the catalogue's effects and of all members of their families."""
         return {c.name: c for c in (*self.candidates, *self.members)}
 
     def parameters(self, names: Sequence[str]) -> list[Parameter]:
@@ -103,6 +105,7 @@ class Catalogue:
 
     @functools.cached_property
     def effects(self) -> list[Effect]:
+        """The effects that can be tested on these records, in the catalogue's order."""
         return [c.effect for c in self.candidates]
 
     @functools.cached_property

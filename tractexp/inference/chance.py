@@ -115,6 +115,11 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
 def _draw_null_distribution(
     t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
 ) -> Chance:
+    """What draws of the noise give: the least p of each over all candidates, and its statistics.
+
+    With `plain` the draws are white and not estimated anew; else each draw (NULL_DRAWS, C, N)
+    estimates its own noise from its quiet stretches, as the records do.
+    """
     rng = np.random.default_rng(seed)
     if plain:
         return _chance(t, own.replace_residuals(_white(t, noise, rng)), noise)
@@ -148,6 +153,9 @@ def is_noise_exact(context: Context, noise: Noise) -> bool:
 
 
 def _chance(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
+    """The least p (b,) of projected draws and their statistics; a fault of the measurement counts
+    where the noise of the voltage is not loud.
+    """
     p = projection.least_p
     if noise.loudest_input_mode <= BLURRED:
         faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))

@@ -136,10 +136,12 @@ class Context:
 
     @property
     def domain(self) -> Domain:
+        """The domain that the load's equations are written for: phasors or waves."""
         return domain_of(self.load)
 
     @property
     def events(self) -> tuple[Event, ...]:
+        """The events that are fitted, their voltage smoothed."""
         return self.records.events
 
     @property
@@ -149,6 +151,7 @@ class Context:
 
     @property
     def drive(self) -> Drive:
+        """The inputs and measurements (C, N) of all fitted events, one after the other."""
         return self.problem.drive
 
     @functools.cached_property

@@ -108,11 +108,13 @@ def _results_in_order(calls: Sequence[Future[Any]]) -> Iterator[Any]:
 
 
 def _count_result(result: Result, ended: Callable[[], None]) -> Result:
+    """The result, after its end was counted."""
     ended()
     return result
 
 
 def _call(k: int) -> Any:
+    """What the function that is mapped at present gives for the k-th item; runs in a worker."""
     return _calls[-1](k)
 
 

@@ -15,12 +15,15 @@ class Parts:
     """How many parts of a step have ended, and how long the others take."""
 
     def __init__(self, total: int):
+        """Count from now on to `total` parts."""
         self.total, self.ended, self._begun = total, 0, time.perf_counter()
 
     def end(self) -> None:
+        """Count one part more as ended."""
         self.ended += 1
 
     def __str__(self) -> str:
+        """ "3 of 12", with the time that the rest will take where that is long."""
         rest = describe_remaining_time(time.perf_counter() - self._begun, self.ended / self.total)
         return f"{self.ended} of {self.total}{rest}"
 
@@ -29,6 +32,7 @@ class Effort:
     """Counts simulations and passes on what each step says."""
 
     def __init__(self, tell: Callable[[str], None] = lambda line: None):
+        """Count simulations from 0 and tell the stages to `tell`."""
         self.simulations, self._tell, self._all = 0, tell, list[Effort]((self,))
         self._step, self._said, self._parts = "", time.perf_counter(), list[Parts]()
 
@@ -77,6 +81,7 @@ class Effort:
         self.spend(sum(spent[len(known) :]))
 
     def spend(self, simulations: int) -> None:
+        """Count simulations that were made."""
         self.simulations += simulations
 
     @property

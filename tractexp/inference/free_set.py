@@ -83,6 +83,7 @@ class FreeSet:
 
     @property
     def dimension(self) -> int:
+        """How many numbers are free, D."""
         return len(self.null)
 
     @property
@@ -96,9 +97,11 @@ class FreeSet:
         return {name: k for k, name in enumerate(self.names)}
 
     def width(self, name: str) -> float:
+        """The width of a free number's range, in its own unit."""
         return float(self.box.width[self.column[name]])
 
     def to_unit(self, name: str, value: float) -> float:
+        """The coordinate in the unit cube of a value in its own unit."""
         k = self.column[name]
         return float((value - self.box.lower[k]) / self.box.width[k])
 

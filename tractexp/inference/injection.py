@@ -32,6 +32,7 @@ class Injection(Effect):
     name = PUSHES
 
     def __repr__(self) -> str:
+        """ "Injection()": all injections are alike, and are stored under this name."""
         return "Injection()"
 
     order = 2
@@ -49,6 +50,9 @@ class Injection(Effect):
     def edit(  # type: ignore[override]
         self, eq, push_flux_d, push_flux_q, push_speed, push_P, push_Q, window_on, window_off
     ):
+        """Add pushes to the balances of flux, speed, P and Q between two instants [s], each with an
+        edge of `EDGE_SECONDS`.
+        """
         from tractexp.model.equations import OWN, I, sympy
 
         ramp = lambda at: sympy.Max(0, sympy.Min(1, (eq.t - at) / EDGE_SECONDS))  # noqa: E731

@@ -39,6 +39,7 @@ class ParameterEstimate:
     ends: tuple[float, float] | None = None
 
     def __str__(self) -> str:
+        """ "T_prime 0.1234 ± 0.0012 s", with the digits that the error leaves."""
         unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
         return f"{self.parameter.name} {with_error(self.value, self.error)}{unit}"
 

@@ -34,6 +34,9 @@ def jumps(context: Context, unit: np.ndarray) -> np.ndarray | None:
 # of the two fits that are examined side by side; it holds their context
 @functools.lru_cache(maxsize=2)
 def _jumps(context: Context, key: bytes) -> np.ndarray:
+    """The shapes (k, C, N) of the jumps that the effects present at these coordinates make, for a
+    key of the coordinates' bytes; the caller caches them.
+    """
     at, unit = context.coordinates, np.frombuffer(key)
     there = at.present(unit)
     if not there:

@@ -54,6 +54,7 @@ class Family:
         return model.place_behind_recorder(base.recorder)
 
     def _effect(self, name: str) -> Effect:
+        """The effect of a name, or the pushes into all balances."""
         return Injection() if name == PUSHES else self.catalogue[name].effect
 
     @functools.cached_property
@@ -109,6 +110,10 @@ class Kernels:
         *,
         priors: bool = False,
     ):
+        """The kernels of a family of models on some events: with `bounds` {name: (lower, upper)}
+        and `fixed` {name: value} of the base model, `substeps` per sample (None: as many as
+        needed), and with `priors` on the motor.
+        """
         self.family, self.events, self.bounds, self.fixed = family, tuple(events), bounds, fixed
         self.bare = Problem(family.model, events, bounds, fixed, substeps, priors=priors)
         self.substeps = self.box_substeps = int(self.bare.step.substeps.max())
@@ -178,6 +183,7 @@ class Kernels:
         return self._fit_problems[key]
 
     def _problem(self, key: Key, substeps: int) -> Problem:
+        """The problem of the model with some effects, at so many substeps a sample."""
         model = self.family.build_model(key)
         bounds = {n: v for n, v in self.bounds.items() if n in model.names}
         fixed = {n: v for n, v in self.fixed.items() if n in model.names}

@@ -28,6 +28,7 @@ class Loss(Plugin):
     weight_Q: float = 1.0
 
     def check(self) -> None:
+        """Raise `UserError` for a negative weight, or where both are 0."""
         for name in ("weight_P", "weight_Q"):
             check_range(f"objective.{name}", getattr(self, name), 0.0)
         if self.weight_P == self.weight_Q == 0:

@@ -49,6 +49,7 @@ class ModelError:
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> "ModelError":
+        """The model's error of a `result.json`: `value`, `interval` and `of_S`, or `stalls`."""
         if stalls := content.get("stalls"):
             return cls.of_stall(stalls)
         low, high = content["interval"]
@@ -65,6 +66,7 @@ class ModelError:
         return cls(np.inf, (np.inf, np.inf), np.inf, np.inf, tuple(events))
 
     def __str__(self) -> str:
+        """ "3.1 % of its response (0.9 % of S)"."""
         return f"{in_percent(self.value)} of its response ({in_percent(self.of_S)} of S)"
 
 
@@ -135,6 +137,10 @@ def block_sums(played: Sequence[Playback], sharing: float = 0.0) -> list[np.ndar
 
 
 def _block_sums(played: Playback, length: float) -> np.ndarray:
+    """Sums (3, blocks) from the dip on, by blocks of `length` [s]: squared residual in S and
+    squared response less the noise's variance, and squared S; gaps are left out, and what cannot be
+    simulated is infinite.
+    """
     event, record = played.event, played.event.record
     S, S_0 = record.P + 1j * record.Q, event.P0 + 1j * event.Q0
     squares = np.stack(

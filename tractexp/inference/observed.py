@@ -45,10 +45,12 @@ class Observed:
 
     @property
     def events(self) -> tuple[Event, ...]:
+        """The events that are fitted."""
         return self.problem.events
 
     @property
     def drive(self) -> Drive:
+        """The inputs and measurements (C, N) of all events, one after the other."""
         return self.problem.drive
 
     def noise(

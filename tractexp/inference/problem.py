@@ -45,6 +45,7 @@ def narrow_bounds(
 
 
 def _check_name(name: str, by_name: Mapping[str, object], where: str) -> None:
+    """Raise `UserError` for a parameter that the model lacks; `where` is the setting that names it."""
     if name not in by_name:
         lack = f"this model has no parameter '{name}'{among(name, by_name, 'Parameters')}"
         raise UserError(f"{setting(where)}.{name}: {lack}")
@@ -356,6 +357,11 @@ class Problem:
         return np.all(np.isfinite(outputs), axis=(0, 2))
 
     def _step(self, substeps: int | None) -> Step:
+        """Substeps per sample of each event (E,), and the errors (E,) that a choice of them was
+        made by; of given ones nan.
+
+        Raises `UserError` for a number out of range.
+        """
         if substeps is not None:
             if not 1 <= substeps <= MOST_SUBSTEPS:
                 raise UserError(

@@ -30,6 +30,7 @@ class RecorderWindow(Measurement):
     said: bool = False
 
     def __repr__(self) -> str:
+        """ "RecorderWindow(0.02, p_class)": the length [s] and the estimator whose shape it has."""
         return f"RecorderWindow({self.window}{f', {self.shape.name}' if self.shape else ''})"
 
     @property
@@ -59,6 +60,9 @@ class RecorderWindow(Measurement):
         )
 
     def observe(self, power: np.ndarray, drive: Drive, values: dict[str, np.ndarray]) -> np.ndarray:
+        """Powers (2, n, N) as a recorder shows them: the current averaged over its window, times
+        the voltage recorded.
+        """
         shown = np.empty_like(power)
         for e in range(drive.events):
             part, weights = drive.part(e), self.weights(drive.event[e, -1])

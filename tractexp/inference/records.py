@@ -37,6 +37,7 @@ class Records:
 
     @functools.cached_property
     def events(self) -> tuple[Event, ...]:
+        """The events with their voltage smoothed."""
         return tuple(s.event for s in self.smoothed)
 
 

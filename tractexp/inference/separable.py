@@ -130,6 +130,9 @@ class Sensitivities:
         )
 
     def _own_basis(self, distinct: float = 0.0, least: float = 0.0) -> "SeparableBasis":
+        """Bases of the columns that each event has for itself, beside none that are shared;
+        directions below a share `distinct` of the largest, or below `least`, are left out.
+        """
         own = tuple(compute_basis(self.own(e).T, distinct, least) for e in range(len(self.rows)))
         return SeparableBasis(np.empty((0, self.columns.shape[1])), own, self.rows)
 

@@ -56,6 +56,7 @@ def text(lowered: Lowered, title: str, integration: str, width: int = VECTOR_LAN
 
 
 def _real(name: str) -> Symbol:
+    """A real symbol of that name."""
     return Symbol(name, real=True)
 
 
@@ -63,6 +64,9 @@ class _Emitter:
     """One kernel's text. Names of the IR's arguments are those of `ARRAYS` and `SIZES`."""
 
     def __init__(self, lowered: Lowered, integration: str, width: int):
+        """Write the kernel of lowered equations for lanes of `width` candidates, integrated by a
+        named method.
+        """
         self.lowered, self.half_way, self.width = lowered, HALF_WAY[integration], width
         self.given = [*lowered.parameters, _real("P0"), _real("Q0")]
         self.used = {
@@ -82,6 +86,7 @@ class _Emitter:
         self.functions: list[Function] = []
 
     def text(self, title: str) -> str:
+        """The whole module of LLVM IR, with the room that its callers must make."""
         room = Room(
             width=self.width,
             given=len(self.given),
@@ -131,6 +136,7 @@ class _Emitter:
     # All events
 
     def _run(self) -> str:
+        """The function that runs all events for all candidates."""
         self.f, self.lanes, self.scalars = self._function()
         f, scalars = self.f, self.scalars
         self.reachable = f.room("i64", 8)
@@ -179,9 +185,11 @@ class _Emitter:
         return self.f.offset_address("%work", self.f.integer("mul", g, len(self.rows) * self.width))
 
     def _row(self, group: str, name: object) -> str:
+        """The address of a symbol's row in the arrays of one candidate group."""
         return self.f.offset_address(group, self.rows[str(name)] * self.width)
 
     def _read(self, group: str, names: Iterable[Symbol]) -> dict[Symbol, str]:
+        """{symbol: its value in all lanes}, loaded from a group's rows."""
         return {s: self.lanes.load(self._row(group, s)) for s in names}
 
     # What is the same in all lanes, for many samples at once
@@ -309,6 +317,9 @@ class _Emitter:
         f.do(f"store i64 {f.fresh(f'or i64 {before}, {good}')}, ptr {self.reachable}, align 8")
 
     def _copy_candidates(self, e: str, first: str) -> None:
+        """Copy the parameters of as many candidates as there are lanes; the last one fills lanes
+        that are over.
+        """
         f, count = self.f, len(self.given)
         last = f.integer("sub", "%n", 1)
         source = f.offset_address("%candidates", f.integer("mul", f.integer("mul", e, count), "%n"))
@@ -400,9 +411,11 @@ class _Emitter:
         ]
 
     def _wide(self, address: str) -> str:
+        """The double at an address, in every lane."""
         return self.lanes.everywhere(self._double(address))
 
     def _double(self, address: str) -> str:
+        """The double at an address."""
         return self.f.fresh(f"load double, ptr {address}, align 8")
 
     def _step(
@@ -481,6 +494,7 @@ class _Emitter:
             )
 
     def _input(self, name: str) -> str:
+        """The address of an input's samples."""
         return self.f.offset_address(
             "%inputs", self.f.integer("mul", "%samples", INPUTS.index(name))
         )

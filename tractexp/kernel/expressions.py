@@ -36,6 +36,7 @@ class Expressions:
     """
 
     def __init__(self, numbers: Any, scope: Mapping[Symbol, Any]):
+        """Write expressions with `numbers`, whose symbols have the values of `scope`."""
         self.numbers, self.scope = numbers, dict(scope)
         self._values: dict[sympy.Basic, Any] = {}
 
@@ -52,6 +53,7 @@ class Expressions:
         return self._values[e]
 
     def _written(self, e: sympy.Basic) -> Any:
+        """The value of an expression that was not written yet."""
         n = self.numbers
         if isinstance(e, Symbol):
             return self.scope[e]
@@ -70,6 +72,7 @@ class Expressions:
         return self._function(e)
 
     def _function(self, e: sympy.Basic) -> Any:
+        """The value of a function: ours, one of LLVM's, or a step."""
         n = self.numbers
         if type(e) in OURS:
             return OURS[type(e)](n, *map(self, e.args))
@@ -143,6 +146,9 @@ class Expressions:
         return product
 
     def _power(self, base: sympy.Expr, exponent: sympy.Expr) -> Any:
+        """The value of a power: by products where the exponent is whole, by roots where it is a
+        half, else by exp and ln.
+        """
         n = self.numbers
         if base == sympy.E:
             return lanes.exp(n, self(exponent))
@@ -171,6 +177,7 @@ class Expressions:
     # Choices
 
     def _extreme(self, e: sympy.Max | sympy.Min) -> Any:
+        """The value of the largest or the smallest of several."""
         choose = self.numbers.larger if isinstance(e, sympy.Max) else self.numbers.smaller
         first, *others = sorted(e.args, key=sympy.default_sort_key)
         value = self(first)
@@ -191,6 +198,7 @@ class Expressions:
         return value
 
     def _condition(self, condition: Boolean | sympy.Basic) -> Any:
+        """The truth of a condition in every lane."""
         n = self.numbers
         if isinstance(condition, BooleanTrue | BooleanFalse):
             return n.truth(bool(condition))

@@ -13,6 +13,7 @@ class Function:
     """Lines of a function's body, and the intrinsics it calls."""
 
     def __init__(self) -> None:
+        """A function without instructions."""
         self.lines: list[str] = []
         self.allocations: list[str] = []
         self.intrinsics: dict[str, str] = {}
@@ -69,9 +70,11 @@ class Function:
     # Integers and addresses
 
     def integer(self, operation: str, a: object, b: object) -> str:
+        """The result of an operation on two integers of 64 bits."""
         return self.value(f"{operation} i64 {a}, {b}")
 
     def smaller(self, a: object, b: object) -> str:
+        """The smaller of two integers."""
         return self.value(f"select i1 {self.integer('icmp slt', a, b)}, i64 {a}, i64 {b}")
 
     def offset_address(self, address: str, index: object) -> str:
@@ -143,12 +146,15 @@ class Function:
         self._begin(end)
 
     def _begin(self, label: str) -> None:
+        """Begin a block of instructions."""
         self.lines.append(f"{label}:")
         self._block = label
 
     def _name(self, kind: str) -> str:
+        """A name that no other value has."""
         self._numbers += 1
         return f"%{kind}{self._numbers}"
 
     def _label(self) -> str:
+        """A label that no other block has."""
         return self._name("b")[1:]

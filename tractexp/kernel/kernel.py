@@ -48,10 +48,14 @@ class Kernel:
     """The kernel of a text of `emit`. Safe in threads: each call has a work space of its own."""
 
     def __init__(self, text: str):
+        """The kernel of a module's text, which says the room it needs."""
         self.text, self.room = text, Room.from_text(text)
 
     @functools.cached_property
     def _function(self) -> tuple[Any, Any, int]:
+        """The compiled function, what must live as long as it does, and the address of Newton's
+        method.
+        """
         code, newton = objects.load(self.text), objects.load(steady.text(self.room.width))
         return FUNCTION(code.address), (code, newton), newton.address
 
@@ -169,6 +173,7 @@ class Kernel:
 
 
 def _check(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype = NUMBERS) -> None:
+    """Raise ValueError for an array of another shape, order or type than the compiled code reads."""
     if array.shape == shape and array.flags.c_contiguous and array.dtype == kind:
         return
     order = "" if array.flags.c_contiguous else ", not C-contiguous"

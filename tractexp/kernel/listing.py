@@ -29,6 +29,7 @@ def equations(lowered: "Lowered") -> Iterator[str]:
 
 
 def _phase(when: str, names: Sequence[str], phase: "Phase") -> Iterator[str]:
+    """The lines of one phase: what is computed there, by name."""
     if not phase.expressions:
         return
     yield f"{when}:"
@@ -41,6 +42,7 @@ def _phase(when: str, names: Sequence[str], phase: "Phase") -> Iterator[str]:
 
 
 def _print_expression(expression: "sympy.Expr") -> str:
+    """An expression as text, or how many terms it has where that would be long."""
     nodes, waiting = 0, [expression]
     while waiting and nodes <= MOST_PRINTED_NODES:  # a small graph may be a tree of millions
         nodes += 1

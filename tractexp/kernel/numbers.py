@@ -20,6 +20,7 @@ class Numbers:
     """
 
     def __init__(self, function: Function, width: int):
+        """Numbers of a function's instructions: vectors of `width` doubles, or doubles."""
         self.f, self.width = function, width
         self.kind, self.integers, self.bits = (
             one if width == 1 else f"<{width} x {one}>" for one in ("double", "i64", "i1")
@@ -29,31 +30,39 @@ class Numbers:
     # Constants
 
     def constant(self, x: float) -> str:
+        """A number, to the bit."""
         exact = "0x" + struct.pack(">d", float(x)).hex().upper()
         return exact if self.width == 1 else f"splat (double {exact})"
 
     def whole(self, x: int) -> str:
+        """An integer in every lane."""
         return str(x) if self.width == 1 else f"splat (i64 {x})"
 
     def truth(self, holds: bool) -> str:
+        """A truth value in every lane."""
         bit = "true" if holds else "false"
         return bit if self.width == 1 else f"splat (i1 {bit})"
 
     # Arithmetic
 
     def add(self, a: str, b: str, flags: str = FAST) -> str:
+        """a + b."""
         return self._two("fadd", a, b, flags)
 
     def subtract(self, a: str, b: str, flags: str = FAST) -> str:
+        """a - b."""
         return self._two("fsub", a, b, flags)
 
     def multiply(self, a: str, b: str, flags: str = FAST) -> str:
+        """a b."""
         return self._two("fmul", a, b, flags)
 
     def divide(self, a: str, b: str, flags: str = FAST) -> str:
+        """a / b."""
         return self._two("fdiv", a, b, flags)
 
     def negative(self, a: str) -> str:
+        """-a."""
         return self.f.value(f"fneg {FAST} {self.kind} {a}")
 
     def multiply_add(self, a: str, b: str, c: str, flags: str = FAST) -> str:
@@ -68,6 +77,9 @@ class Numbers:
         return first
 
     def _two(self, name: str, a: str, b: str, flags: str) -> str:
+        """The result of an operation on two numbers; of those that commute the operands have one
+        order, so that equal results are found.
+        """
         if name in COMMUTES and b < a:
             a, b = b, a
         return self.f.value(f"{name} {flags} {self.kind} {a}, {b}")
@@ -75,6 +87,7 @@ class Numbers:
     # Comparison and choice
 
     def compare(self, how: str, a: str, b: str) -> str:
+        """Where a comparison holds, by LLVM's name of it."""
         return self.f.value(f"fcmp {how} {self.kind} {a}, {b}")
 
     def differ(self, a: str, b: str) -> str:
@@ -82,6 +95,7 @@ class Numbers:
         return self.f.value(f"icmp ne {self.integers} {a}, {b}")
 
     def select(self, condition: str, a: str, b: str) -> str:
+        """a where the condition holds, else b."""
         return self.f.value(f"select {self.bits} {condition}, {self.kind} {a}, {self.kind} {b}")
 
     def larger(self, a: str, b: str) -> str:
@@ -93,6 +107,7 @@ class Numbers:
         return self.select(self.compare("olt", a, b), a, b)
 
     def logic(self, operation: str, a: str, b: str) -> str:
+        """and, or, xor of truth values."""
         if b < a:
             a, b = b, a
         return self.f.value(f"{operation} {self.bits} {a}, {b}")
@@ -116,20 +131,25 @@ class Numbers:
         return self.f.value(f"call {FAST} {self.kind} @{full}({given})")
 
     def size(self, a: str) -> str:
+        """The absolute value."""
         return self.call("fabs", a)
 
     def root(self, a: str) -> str:
+        """The square root."""
         return self.call("sqrt", a)
 
     # The bits of doubles
 
     def as_bits(self, a: str) -> str:
+        """The 64 bits of each number."""
         return self.f.value(f"bitcast {self.kind} {a} to {self.integers}")
 
     def of_bits(self, a: str) -> str:
+        """The numbers of which these are the bits."""
         return self.f.value(f"bitcast {self.integers} {a} to {self.kind}")
 
     def integer(self, operation: str, a: str, b: str) -> str:
+        """An operation on integers, by LLVM's name of it."""
         return self.f.value(f"{operation} {self.integers} {a}, {b}")
 
     # Memory
@@ -145,6 +165,7 @@ class Numbers:
         )
 
     def lane(self, a: str, k: int) -> str:
+        """The number in the k-th lane."""
         return a if self.width == 1 else self.f.value(f"extractelement {self.kind} {a}, i64 {k}")
 
     def load(self, address: str, alignment: int | None = None) -> str:
@@ -152,6 +173,7 @@ class Numbers:
         return self.f.fresh(f"load {self.kind}, ptr {address}, align {alignment or 8 * self.width}")
 
     def store(self, a: str, address: str, alignment: int | None = None) -> None:
+        """Write numbers to an address; doubles one after the other are aligned to the whole vector."""
         self.f.do(f"store {self.kind} {a}, ptr {address}, align {alignment or 8 * self.width}")
 
     def ramp(self, first: str) -> str:
@@ -205,9 +227,11 @@ class Numbers:
 
     @property
     def _indices(self) -> str:
+        """The lanes' numbers from 0 on."""
         return f"<{', '.join(f'i64 {k}' for k in range(self.width))}>"
 
     def _splat(self, integer: str) -> str:
+        """An integer in every lane."""
         kind = self.integers
         first = self.f.value(f"insertelement {kind} poison, i64 {integer}, i64 0")
         return self.f.value(

@@ -22,6 +22,7 @@ class MachineCode:
     """A function of machine code, which stays in memory as long as this object."""
 
     def __init__(self, library: Any, name: str):
+        """The function of a name in a loaded library, which lives as long as this does."""
         self._library = library
         self.address: int = library[name]
 

@@ -33,7 +33,12 @@ def text(width: int) -> str:
 
 
 class _Newton:
+    """Newton's method for the steady state of all lanes, as LLVM IR."""
+
     def __init__(self, width: int):
+        """Begin the function for so many lanes: balances, moved balances and the Jacobian stand one
+        after the other in its work space.
+        """
         self.f = Function()
         self.n = Numbers(self.f, width)
         self.balance = "%work"
@@ -43,6 +48,7 @@ class _Newton:
         self.going = self.f.room("i64", 8)
 
     def text(self) -> str:
+        """The module's text: iterate until every lane's balances vanish or no step helps."""
         f, n = self.f, self.n
         n.store(n.constant(1.0), self.moved)
         f.do(f"store i64 1, ptr {self.going}, align 8")
@@ -58,14 +64,17 @@ class _Newton:
         return "\n".join([*f.intrinsics.values(), body])
 
     def offset_address(self, address: str, k: str) -> str:
+        """The address of the k-th number of all lanes."""
         return self.f.offset_address(address, self.f.integer("mul", k, self.n.width))
 
     def cell(self, row: str, column: str) -> str:
+        """The address of an entry of the Jacobian."""
         return self.offset_address(
             self.jacobian, self.f.integer("add", self.f.integer("mul", row, "%n"), column)
         )
 
     def rest(self, balances: str) -> None:
+        """Compute the balances at x into an address."""
         self.f.do(f"call void %rest(ptr %event, ptr %given, ptr %x, ptr {balances})")
 
     def differences(self) -> None:
@@ -112,12 +121,14 @@ class _Newton:
                 )
 
     def exchange(self, where: str, one: str, other: str) -> None:
+        """Exchange two numbers in the lanes where a condition holds."""
         n = self.n
         a, b = n.load(one), n.load(other)
         n.store(n.select(where, b, a), one)
         n.store(n.select(where, a, b), other)
 
     def reduce(self, place: str, factor: str, by: str) -> None:
+        """Subtract `factor` times one number from another, in place."""
         n = self.n
         n.store(n.subtract(n.load(place), n.multiply(factor, n.load(by))), place)
 

@@ -53,6 +53,7 @@ class Stencil:
 
     @functools.cached_property
     def _ir(self) -> tuple[str, int, int]:
+        """The module's text, the number of its rows and of its sums."""
         arrays = self.rows, self.shared, self.numbers, self.sums, self.shifts, self.onward
         settings = repr((self.expression.__qualname__, *arrays))
         description = text_in(
@@ -66,6 +67,7 @@ class Stencil:
 
     @functools.cached_property
     def _function(self) -> tuple[Any, Any]:
+        """The compiled function, and what must live as long as it does."""
         code = objects.load(self._ir[0])
         return FUNCTION(code.address), code
 
@@ -131,6 +133,7 @@ def _spread(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype
 
 
 def _check(name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
+    """Raise ValueError for an array of another shape or type than the compiled code reads."""
     if array.shape != shape:
         raise ValueError(f"a stencil's {name} has the shape {array.shape}, and must have {shape}")
     if array.dtype != NUMBERS or (array.size > 1 and array.strides[-1] != array.itemsize):

@@ -23,6 +23,7 @@ class Refused(UserError):
     """An effect does not fit a model, and why."""
 
     def __init__(self, effect: str, reason: str):
+        """An effect, and why it cannot be added, as the end of a sentence."""
         super().__init__(f"the effect '{effect}' cannot be added to this model: {reason}")
         self.effect, self.reason = effect, reason
 

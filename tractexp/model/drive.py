@@ -199,10 +199,12 @@ class Drive:
 
     @property
     def events(self) -> int:
+        """How many events there are, E."""
         return len(self.event)
 
     @property
     def samples(self) -> int:
+        """How many samples all events have together, N."""
         return self.inputs.shape[1]
 
     def part(self, event: int) -> slice:

@@ -69,6 +69,7 @@ class Equations:
     """
 
     def __init__(self, domain: str = PHASORS) -> None:
+        """Equations without motor, load or effect; the inputs are those of the domain."""
         self.waves = domain == WAVES
         inputs = ("U", "omega_s", "U_rate", "U2", "t")
         self.U, self.omega_s, self.U_rate, self.U2, self.t = map(_real, inputs)
@@ -132,6 +133,7 @@ class Equations:
         self._writer = OWN
 
     def __getattr__(self, name: str) -> NoReturn:
+        """Raise `Unknown` for a word that is not offered, with the nearest one."""
         if name.startswith("__"):
             raise AttributeError(name)
         words = [*(w for w in dir(self) if not w.startswith("_")), *sites.SITES]
@@ -141,6 +143,7 @@ class Equations:
         )
 
     def __setattr__(self, name: str, value: Any) -> None:
+        """Raise `Unknown`: what stands at a site is changed by `edit` alone."""
         if "_writer" in vars(self) and not name.startswith("_"):
             raise Unknown(
                 f"eq.{name} cannot be assigned; eq.edit(site, change) changes what stands at a site"
@@ -150,6 +153,7 @@ class Equations:
     # What is there
 
     def __contains__(self, what: Site | str) -> bool:
+        """Whether there is a site or quantity of that name."""
         name = what.name if isinstance(what, Site) else what
         return any(s.name == name for s in (*self._drawn, *self._symbols()))
 
@@ -169,6 +173,7 @@ class Equations:
         raise Unfit(f"its equations have no {name}{about}")
 
     def _symbols(self) -> list[Symbol]:
+        """Everything that has a name: quantities, states, memories and parameters."""
         return [*self.definitions, *self.states, *self.memories, *map(_real, self.parameters)]
 
     def expression(self, site: Site | str) -> sympy.Expr:
@@ -271,6 +276,7 @@ class Equations:
         return self._define(symbol_of(site.name), expression, latex or site.latex)
 
     def _define(self, symbol: Symbol, expression: sympy.Expr, latex: str) -> Symbol:
+        """Define a symbol by an expression. Raises `UserError` where the name is taken."""
         if symbol.name in self:
             owner = self._owner(symbol.name)
             raise UserError(
@@ -404,11 +410,13 @@ class Equations:
         return self._state(symbol, f"{first.latex}{suffix}", first.role)
 
     def _state(self, symbol: Symbol, latex: str, role: Literal["flux", "speed", "lag"]) -> Symbol:
+        """A new state, of the part that writes at present."""
         self.states[self._new(symbol)] = State(symbol, latex, role, self._writer)
         self.latex_names[symbol] = latex
         return symbol
 
     def _new(self, symbol: Symbol) -> Symbol:
+        """The symbol, known as the writer's. Raises `Unfit` where its name is taken."""
         check_name(symbol.name)
         if any(s.name == symbol.name for s in (*self.definitions, *self.states, *self.memories)):
             owner = self._owner(symbol.name)

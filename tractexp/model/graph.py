@@ -59,6 +59,7 @@ def halves(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
 
 
 def _product(factors: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sympy.Expr, sympy.Expr]:
+    """Real and imaginary part of a product of such pairs."""
     real, imaginary = sympy.Mul(*(a for a, b in factors if b == 0)), sympy.Integer(0)
     for a, b in ((a, b) for a, b in factors if b != 0):
         real, imaginary = real * a - imaginary * b, real * b + imaginary * a

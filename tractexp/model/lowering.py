@@ -38,6 +38,9 @@ class _Hoister:
     """Collects constants and signals while rewriting expressions."""
 
     def __init__(self, lane: set[Symbol], event: set[Symbol], inputs: set[Symbol]):
+        """Sort expressions by what they hold: `lane` symbols of a candidate, `event` ones of an
+        event, `inputs` of a sample.
+        """
         self.lane, self.event, self.inputs = lane, event, inputs
         self.constants: dict[sympy.Expr, Symbol] = {}
         self.signals: dict[sympy.Expr, Symbol] = {}
@@ -52,27 +55,33 @@ class _Hoister:
         return self._symbols[e]
 
     def is_constant(self, e: sympy.Expr) -> bool:
+        """Whether an expression is the same all along an event."""
         return self.symbols(e) <= self.lane | self.event
 
     def is_signal(self, e: sympy.Expr) -> bool:
+        """Whether an expression is the same for all candidates."""
         return self.symbols(e) <= self.inputs | self.event
 
     def constant(self, e: sympy.Expr) -> sympy.Expr:
+        """The symbol by which a constant is computed once per candidate."""
         if e.is_number or e in self.lane:
             return e
         return self.constants.setdefault(e, Symbol(f"_c{len(self.constants)}", real=True))
 
     def signal(self, e: sympy.Expr) -> sympy.Expr:
+        """The symbol by which a signal is computed once per sample."""
         if e.is_number or e in self.inputs or -e in self.inputs:
             return e
         return self.signals.setdefault(e, Symbol(f"_s{len(self.signals)}", real=True))
 
     def __call__(self, e: sympy.Expr) -> sympy.Expr:
+        """The expression with its constants and signals replaced by their symbols."""
         if e not in self._rewrites:
             self._rewrites[e] = self._rewritten(e)
         return self._rewrites[e]
 
     def _rewritten(self, e: sympy.Expr) -> sympy.Expr:
+        """The same of an expression that was not met before."""
         if not isinstance(e, sympy.Expr):  # pyright: ignore[reportUnnecessaryIsInstance] # a piece, or its condition
             return e.func(*map(self, arguments(e)))
         if self.is_constant(e):
@@ -88,6 +97,7 @@ class _Hoister:
         return e.func(*map(self, arguments(e)))
 
     def _group_arguments(self, e: sympy.Expr) -> sympy.Expr:
+        """A sum or product whose constant and whose sampled arguments are one symbol each."""
         constant = [a for a in arguments(e) if self.is_constant(a)]
         signal = [a for a in arguments(e) if a not in constant and self.is_signal(a)]
         rest = [self(a) for a in arguments(e) if a not in constant and a not in signal]
@@ -174,6 +184,9 @@ def _phase(
     expressions: list[sympy.Expr],
     steps: Mapping[Symbol, sympy.Expr] | None = None,
 ) -> Phase:
+    """What one phase computes: the steps that its expressions need, with constants and signals
+    taken out.
+    """
     signals = ()
     needed = _select_needed_steps(expressions, steps or {})
     targets, expressions = list(needed), [*needed.values(), *expressions]
@@ -211,6 +224,7 @@ def _in_order(
 
 
 def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
+    """Raise AssertionError for a symbol that nothing has computed before it is used."""
     defined = lane | {*lowered.inputs, *lowered.event, *lowered.states, *lowered.memories}
     for phase in (
         lowered.start,
@@ -231,4 +245,5 @@ def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
 
 
 def _symbol(name: str) -> Symbol:
+    """A real symbol of that name."""
     return Symbol(name, real=True)

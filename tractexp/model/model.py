@@ -68,6 +68,7 @@ class Errors:
 
     @property
     def is_refused(self) -> np.ndarray:
+        """Which candidates (n,) have no steady state, or diverge."""
         return (self.miss > 0) | ~np.isfinite(self.sums).all(axis=(0, 1))
 
 
@@ -131,12 +132,14 @@ class Model:
 
     @functools.cached_property
     def parameters(self) -> tuple[Parameter, ...]:
+        """Those of motor, static load and effects, in this order."""
         return tuple(
             p for part in (self.motor, self.static, *self.effects) for p in part.parameters
         )
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
+        """Their names."""
         return tuple(p.name for p in self.parameters)
 
     @property
@@ -171,6 +174,7 @@ class Model:
         )
 
     def _try_effect(self, effect: Effect) -> str:
+        """Whether an effect can be added, as JSON: the sites it edits, or why not."""
         from tractexp.model.declaration import Refused
 
         try:
@@ -196,6 +200,7 @@ class Model:
         return f"{what}_{self.domain}" if self.waves else what
 
     def _written(self) -> str:
+        """The text of its kernel."""
         from tractexp.kernel.emit import text
         from tractexp.model.lowering import lower
 
@@ -271,6 +276,9 @@ class Model:
     def _errors_of_responses(
         self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int
     ) -> Errors:
+        """Sums of squared errors (E, 2, n) from the responses themselves, for what the kernel
+        cannot sum.
+        """
         response = self.simulate(drive, values, substeps)
         with np.errstate(over="ignore", invalid="ignore"):  # of what diverges
             square = (response.outputs - drive.measurements[:, None]) ** 2 * drive.weights[:, None]
@@ -363,6 +371,7 @@ class Model:
         return evaluate_texts(stated["quantities"], substitutes)
 
     def _at_rest(self) -> str:
+        """Names of what stands in the steady state, as JSON."""
         from tractexp.model.printed import list_stated_quantities
 
         starts = [symbol.name for symbol in self.equations.real_starts()]

@@ -40,12 +40,15 @@ class Operations:
 
     @property
     def total(self) -> float:
+        """All of them together."""
         return sum(astuple(self))
 
     def __add__(self, other: "Operations") -> "Operations":
+        """Those of both."""
         return Operations(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
     def __mul__(self, times: float) -> "Operations":
+        """So many times these."""
         return Operations(*(times * each for each in astuple(self)))
 
 

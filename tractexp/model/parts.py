@@ -47,6 +47,9 @@ class Part(Plugin):
 
     @classmethod
     def check_class(cls, where: str) -> None:
+        """Raise `UserError` for names of parameters that cannot be, or a channel that no record
+        has.
+        """
         for parameter in cls.parameters:
             check_name(parameter.name, where)
         for channel in cls.reads:
@@ -86,6 +89,9 @@ class Motor(Part):
 
     @classmethod
     def check_class(cls, where: str) -> None:
+        """Raise `UserError` for methods of other arguments than `declare(eq)` and `usual` may have,
+        too.
+        """
         super().check_class(where)
         check_signature(cls, "declare", "eq", where)
         check_signature(cls, "usual", None, where, all_taken=False)
@@ -127,6 +133,7 @@ class Static(Part):
 
     @classmethod
     def check_class(cls, where: str) -> None:
+        """Raise `UserError` for a law of other arguments than u, f and parameters, too."""
         super().check_class(where)
         check_signature(cls, "law", "u", where, offered=("f",))
         if "f" in inspect.signature(cls.law).parameters and "f" not in cls.reads:
@@ -217,6 +224,9 @@ class Effect(Part):
 
     @classmethod
     def check_class(cls, where: str) -> None:
+        """Raise `UserError` for an edit of other arguments, or a place or kind that there is not,
+        too.
+        """
         super().check_class(where)
         check_signature(cls, "edit", "eq", where)
         for place in cls.places:

@@ -56,6 +56,7 @@ class _Printer(PythonCodePrinter):
     """Python that takes its numbers by name, so that no name is taken for another thing."""
 
     def _print_Symbol(self, expr: sympy.Symbol) -> str:
+        """A symbol as a look-up of its value."""
         return f"{VALUES}[{expr.name!r}]"
 
 

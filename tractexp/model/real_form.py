@@ -42,6 +42,7 @@ class RealForm:
     def __init__(
         self, definitions: Mapping[Symbol, sympy.Expr], states: Iterable[Symbol], *, by_name: bool
     ):
+        """Split complex expressions into real ones: definitions by their names or written out."""
         self.definitions, self.states, self.by_name = definitions, states, by_name
         self._split: dict[sympy.Expr, Halves] = {}
 

@@ -127,6 +127,7 @@ SITES = {site.name: site for site in list(globals().values()) if isinstance(site
 
 
 def __getattr__(name: str) -> NoReturn:
+    """Raise `Unknown` for a site that there is not, with the nearest one."""
     if name.startswith("_"):  # what Python itself looks for in a module
         raise AttributeError(name)
     raise Unknown(f"there is no 'sites.{name}'{among(name, SITES, 'Sites')}")

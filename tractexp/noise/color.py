@@ -36,10 +36,12 @@ class Autoregression:
 
     @property
     def order(self) -> int:
+        """How many samples before tell of the next one."""
         return len(self.deviation) - 1
 
     @property
     def white(self) -> bool:
+        """Whether none does."""
         return self.order == 0
 
     def scale_noise(self, factor: float) -> "Autoregression":

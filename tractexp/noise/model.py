@@ -51,6 +51,7 @@ class Noise:
 
     @property
     def channels(self) -> int:
+        """How many channels are compared."""
         return len(self.pairs[0])
 
     def pair(self, event: int) -> Pair:
@@ -210,6 +211,7 @@ class Noise:
 
     @property
     def _unmixing_matrix(self) -> np.ndarray:
+        """The matrix (C, C) that takes correlated channels apart."""
         return np.eye(self.channels) if self.mix is None else np.linalg.inv(self.mix)
 
     def covariance(self, event: int) -> np.ndarray:

@@ -59,6 +59,7 @@ def _until_gone(record: Record, first: int, S: complex, U: float) -> Record:
 
 
 def _cut_aftermath(record: Record, at: int, why: str) -> Record:
+    """The record up to the sample `at`, with a note that says why."""
     return _add_note(
         replace(record.part(slice(0, at)), digest=digest(record)), f"{why}: the record is cut there"
     )
@@ -83,4 +84,5 @@ def loss(record: Record, end: int, S: complex) -> list[str]:
 
 
 def _add_note(record: Record, note: str) -> Record:
+    """The record with a note, once."""
     return record if note in record.notes else replace(record, notes=(*record.notes, note))

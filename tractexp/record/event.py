@@ -46,6 +46,7 @@ class Event:
     swing: Swing | None = field(default=None, kw_only=True)  # of the load before the dip
 
     def __repr__(self) -> str:
+        """The event in one sentence."""
         return describe(self)
 
     def to_frame(self) -> Any:
@@ -80,10 +81,12 @@ class Event:
 
     @property
     def t_start(self) -> float:
+        """When the dip starts [s]."""
         return float(self.record.t[self.start])
 
     @property
     def t_end(self) -> float:
+        """When it ends [s]."""
         return float(self.record.t[self.end])
 
     @property

@@ -54,6 +54,7 @@ class Identity:
 
     @property
     def station(self) -> str:
+        """The station's name; "" where the file has none."""
         return self.source.get("station", "")
 
     @property
@@ -106,6 +107,7 @@ class Identity:
         return [UNKNOWN] if self.parts and not (self.voltage or self.power) else []
 
     def __str__(self) -> str:
+        """All that is known of the record, and what is not, in one line."""
         return "; ".join([*self.parts, *self.unknown])
 
 
@@ -147,6 +149,7 @@ def title_of(records: Iterable[Record]) -> str:
 
 
 def _sizes(base: Base, in_mva: bool) -> dict[str, Any]:
+    """The base for `result.json`: kV and MVA where they are known, else None."""
     voltage = None if base.voltage == 1.0 else base.voltage
     power = base.power if in_mva else None
     return {

@@ -111,6 +111,7 @@ def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
 
 
 def no_dip(record: Record) -> str:
+    """Why a record holds no dip, in a sentence with what its voltage does instead."""
     U, t = record.U, record.t
     reference, margin = float(np.median(U[:FEWEST_BEFORE])), margin_of(U)
     if reference <= 0:

@@ -89,6 +89,7 @@ class OwnBase:
         }
 
     def __str__(self) -> str:
+        """ "36 MVA", or per unit of the file where no MVA are known."""
         return f"{self.power:.4g} MVA" if self.in_mva else f"{self.power:.4g} pu of the file"
 
 

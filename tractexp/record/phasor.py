@@ -373,6 +373,7 @@ def _measure_frequency(phasors: Phasors, rate: float, least: float) -> np.ndarra
 
 
 def _blocks(n: int, block: int) -> Iterator[tuple[int, int]]:
+    """(first, end) of each block of n samples."""
     return ((a, min(a + block, n)) for a in range(0, n, block))
 
 

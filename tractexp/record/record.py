@@ -112,6 +112,7 @@ class Record:
     U_angle: np.ndarray | None = None
 
     def __repr__(self) -> str:
+        """Name, samples, channels, span and rate in one line."""
         span = f"{self.samples} samples of {', '.join(self.channels)}"
         return f"{self.name}: {span}, {self.t[0]:.3f} to {self.t[-1]:.3f} s, {self.rate:.0f} Hz"
 
@@ -125,6 +126,7 @@ class Record:
 
     @property
     def samples(self) -> int:
+        """How many samples it has, N."""
         return len(self.t)
 
     @property
@@ -310,6 +312,7 @@ class Record:
         return f"{what}: resampled linearly every {usual:.6g} s"
 
     def _place(self, i: int) -> str:
+        """ "sample 12 (t = 0.011 s)", for sentences."""
         return f"sample {i + 1} (t = {self.t[i]:g} s)"
 
     def _check_values(self, place: Callable[[int], str], still: bool = False) -> None:
@@ -350,6 +353,7 @@ class Record:
             )
 
     def _check_times(self, place: Callable[[int], str]) -> None:
+        """Raise `UserError` for times that are not even, or a record shorter than a cycle."""
         off = np.abs(self.t - np.linspace(self.t[0], self.t[-1], self.samples)) / self.step
         if off.max() > LARGEST_JITTER:
             i = int(np.argmax(off))
@@ -375,6 +379,9 @@ class Record:
             )
 
     def _check_per_unit(self) -> None:
+        """Raise `UserError` for a voltage or power that cannot be per unit, with the setting that
+        mends it.
+        """
         low, high = PLAUSIBLE_VOLTAGE
         U = float(np.median(self.U[:FEWEST_SAMPLES]))
         if not low <= U <= high:

@@ -142,9 +142,11 @@ class Course:
 
     @property
     def swings(self) -> bool:
+        """Whether the quantity swings, in place of drifting or stepping."""
         return self.change == "swings"
 
     def __str__(self) -> str:
+        """ "P drifts by 3 % of the apparent power"."""
         return (
             f"{self.name} {self.change} by {100 * self.span / self.size:.2g} % of the apparent"
             " power"

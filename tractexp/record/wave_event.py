@@ -66,6 +66,7 @@ class WaveEvent(Event):
 
     @property
     def first(self) -> int:
+        """The first sample that is compared: before it the model settles."""
         return self.lead
 
     @property
@@ -82,6 +83,7 @@ class WaveEvent(Event):
 
     @property
     def calm(self) -> np.ndarray:
+        """What neither fundamental nor harmonics explain before the dip, which is the noise."""
         return self.unexplained
 
     @property
@@ -167,6 +169,7 @@ class Periodic:
 
     @property
     def offsets(self) -> np.ndarray:
+        """The constant part of each channel."""
         return self.coefficients[0]
 
     @property
@@ -403,4 +406,5 @@ def _choose_compared_components(after: np.ndarray, before: np.ndarray, phases: i
 
 
 def _rms(x: np.ndarray) -> float:
+    """The root mean square of all values."""
     return float(np.sqrt(np.mean(x**2)))
