@@ -111,6 +111,7 @@ class Choice(Plain):
         return several
 
     def build(self, group: str) -> Any:
+        """The plugin with its settings."""
         return plugin.build(group, self.node)
 
 
@@ -124,5 +125,6 @@ def complete_settings(group: str, node: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _settings(group: str) -> list[str]:
+    """The settings of all plugins of a group."""
     classes = plugin.discover().get(group, {}).values()
     return [f.name for cls in classes for f in dataclasses.fields(cls)]  # type: ignore[arg-type]

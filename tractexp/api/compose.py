@@ -31,6 +31,7 @@ class Portable:
     """
 
     def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: what was computed from them is computed again."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # type: ignore[arg-type]
 
 
@@ -107,6 +108,7 @@ class LoadModel(Portable, Plain, Tabulated):
         return replace(self, effects=sorted({*self.effects, *shown}), shown=shown)
 
     def table(self) -> Table:
+        """Each parameter with its value or default, unit and bounds."""
         rows = [
             [
                 p.name,
@@ -120,11 +122,13 @@ class LoadModel(Portable, Plain, Tabulated):
         return Table(["parameter", "default", "unit", "bounds", "meaning"], rows, self.model.title)
 
     def _repr_html_(self) -> str:
+        """The table, and the equations below it."""
         return super()._repr_html_() + "".join(
             f"<p>$${quoting.html(line)}$$</p>" for line in self.model.latex()
         )
 
     def _repr_latex_(self) -> str:
+        """The equations."""
         return "\n\n".join(f"$${line}$$" for line in self.model.latex())
 
 

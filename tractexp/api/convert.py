@@ -36,9 +36,11 @@ class Converted(Tabulated):
     said: Sequence[str]
 
     def table(self) -> Table:
+        """The files."""
         return Table(["file"], [[str(path)] for path in self.files])
 
     def summary(self) -> Report:
+        """What each file holds."""
         return Report().text(*self.said).items([str(path) for path in self.files])
 
 
@@ -196,6 +198,7 @@ def _read_from(source: str) -> Iterator[Path]:
 
 
 def _describe_written_part(part: Recording | Record, path: Path) -> str:
+    """ "dip1.csv: 1000 samples of U, P, Q"."""
     if isinstance(part, Record):
         return f"{path.name}: {part.samples} samples of {', '.join([*part.channels, *part.more])}"
     status = f" and {len(part.status)} status channels" if part.status else ""
@@ -218,6 +221,7 @@ class Convert(Task, call=convert, given=("sources", "folder", "settings")):
     what: str | None = None
 
     def run(self, job: Job) -> None:
+        """Write the files into the run's folder, and print what each holds."""
         writer = writer_of(self.to)
         parts = parts_of(build("data", job.config["data"]), writer, self.what)
         show(written(parts, writer, job.folder).summary(), console())

@@ -81,9 +81,11 @@ class NoGap:
     """
 
     def __bool__(self) -> bool:
+        """False: there is no gap."""
         return False
 
     def __getattr__(self, name: str) -> Any:
+        """Raise `UserError` that says how to hold an event out."""
         if name.startswith("__"):
             raise AttributeError(name)
         raise UserError(
@@ -92,6 +94,7 @@ class NoGap:
         )
 
     def __repr__(self) -> str:
+        """That no event was held out."""
         return "no event was held out"
 
 
@@ -220,6 +223,7 @@ class Investigation(Written):
 
     @staticmethod
     def _sizes(effects: Sequence[str], parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        """The sizes of effects, each with its standard error and unit."""
         own = [
             p for name in effects for p in get("effect", name)().parameters if p.null is not None
         ]
@@ -296,11 +300,13 @@ class Investigation(Written):
         return discrepancy.gap(self.content)
 
     def summary(self) -> Report:
+        """The verdict with its reason, the gap and the parameters."""
         from tractexp.report import discrepancy
 
         return discrepancy.summary(self)
 
     def report(self) -> Report:
+        """The page: events before and after, where they disagree, candidates, what changed."""
         from tractexp.report import discrepancy
 
         return discrepancy.report(self.steps, self.content, self.result.identities)
@@ -345,6 +351,7 @@ class Investigation(Written):
 
 
 def _size(name: str, at: Mapping[str, Any], unit: str) -> str:
+    """ "k_f = 0.12 ± 0.01"."""
     error = float("nan") if at["standard_error"] is None else at["standard_error"]
     return f"{name} = {with_error(at['value'], error)}{'' if unit == '1' else f' {unit}'}"
 
@@ -430,6 +437,7 @@ def investigate(
 
 
 def _steps(question: Question, progress: Progress) -> "Steps":
+    """The investigation itself, step by step."""
     from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.investigate import investigate as findings_of
 
@@ -464,6 +472,7 @@ def _search_end(seed: int, problem: Problem) -> np.ndarray:
 
 
 def _build_investigation(question: Question, steps: "Steps") -> Investigation:
+    """What `discrepancy.json` and `result.json` hold of an investigation."""
     from tractexp.discrepancy.discrepancy_json import content
 
     return Investigation(
@@ -559,6 +568,7 @@ class Discrepancy(Task, call=investigate):
     instead = {"model.per_event": "its parameters are shared by all events, so leave it out"}
 
     def perform(self, job: Job, **instead: Any) -> Investigation:
+        """Investigate the run's events, and print each stage."""
         train, held = job.events_of_fit
         for line in describe_records(train, held, "hold out"):
             say(line)

@@ -47,9 +47,11 @@ class Exported(Outcome):
         return files.write(path, self.text)
 
     def table(self) -> Table:
+        """The notes."""
         return Table(["note"], [[note] for note in self.notes], f"{self.title}, as {self.format}")
 
     def summary(self) -> Report:
+        """The notes, then the file's text."""
         report = Report(f"{self.title}, as {self.format}").text(
             *(f"note: {note}" for note in self.notes), ""
         )
@@ -202,6 +204,7 @@ class Export(Task, call=export, given=("fit",)):
     format: str = ""  # andes, psse_dyr, modelica, or a format of an installed package
 
     def run(self, job: Job) -> None:
+        """Write the file of the run that `task.parameters` names into this run's folder."""
         if self.parameters is None:
             raise UserError(
                 f"{TASK.parameters} is not given; it is the path of a result.json, or the folder of"

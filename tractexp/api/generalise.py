@@ -75,6 +75,7 @@ class Generalised(Written):
         ]
 
     def table(self) -> Table:
+        """The median errors of each optimizer on each dip."""
         columns = ["event", "kind", "optimizer", *self.errors]
         return Table(
             columns,
@@ -84,9 +85,11 @@ class Generalised(Written):
         )
 
     def summary(self) -> Report:
+        """The table, and what its numbers are."""
         return Report().add(self.table()).text(CAPTION)
 
     def write_results(self, folder: Path) -> list[Path]:
+        """Write `generalise.json`: the residuals of every search, and what it identified."""
         content = {"residuals": self.residuals, "identified": self.identified}
         return [files.write_json(folder / "generalise.json", content)]
 
@@ -196,6 +199,7 @@ def _run_searches(
 def _judge_generalization(
     setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]"
 ) -> Generalised:
+    """The errors of all searches on the dips that none of them fitted."""
     from tractexp.identification.generalization import by_depth
 
     kinds = by_depth(setup.validate, setup.train)
@@ -254,6 +258,7 @@ def _curve(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str], k: int
 
 
 def _draw(curve: Mapping[str, Any], path: Path) -> Path:
+    """Draw one dip as measured and as calculated."""
     from tractexp.report import figures
 
     t, U, P, Q, *calculated = (np.array(curve[key], dtype=float) for key in ARRAYS)
@@ -286,10 +291,12 @@ class Generalise(Task, call=generalise):
     held_out: dict[str, list[str]] = field(default_factory=dict)
 
     def check(self) -> None:
+        """Raise `UserError` for an optimizer that there is not."""
         for name in self.optimizers:
             build("optimizer", {"name": name})
 
     def perform(self, job: Job, **instead: Any) -> Generalised:
+        """Compare the run's optimizer with those it is set against."""
         compared = {name: {"name": name} for name in self.optimizers} | {
             job.choices["optimizer"]: job.chosen
         }

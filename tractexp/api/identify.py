@@ -99,6 +99,7 @@ class Estimate:
         )
 
     def __repr__(self) -> str:
+        """ "M = 0.01 pu s2/rad, 95 % interval 0.009 .. 0.011: identified"."""
         span = (
             f", 95 % interval {self.interval[0]:.4g} .. {self.interval[1]:.4g}"
             if self.interval
@@ -111,9 +112,11 @@ class Estimates(dict[str, Estimate]):
     """Estimates by name, printed one a line."""
 
     def __repr__(self) -> str:
+        """A line for each parameter."""
         return "\n".join(map(repr, self.values()))
 
     def __missing__(self, name: str) -> Estimate:
+        """Raise KeyError with the nearest name."""
         raise KeyError(f"no parameter is called {name}{among(name, self, 'Parameters')}")
 
     def to_frame(self) -> Any:
@@ -196,6 +199,7 @@ class Identification(Written):
 
     @functools.cached_property
     def model(self) -> LoadModel:
+        """The model that was fitted."""
         return LoadModel(**self.result.model) if self.setup is None else self.setup.model
 
     @functools.cached_property
@@ -286,6 +290,9 @@ class Identification(Written):
 
     @staticmethod
     def _error(content: Mapping[str, Any]) -> ModelError:
+        """The model's error as a result stores it. Raises `UserError` for one of an earlier
+        version.
+        """
         if not content:
             raise UserError(
                 "this result.json has no model_error: it is of an earlier version; identify again"
@@ -342,11 +349,15 @@ class Identification(Written):
         return self.parameters.to_frame()
 
     def summary(self) -> Report:
+        """Estimate, intervals and grade."""
         from tractexp.report import identify
 
         return identify.summary(self)
 
     def report(self) -> Report:
+        """The page: measured and calculated power, the residual, parameters, how far to trust
+        them.
+        """
         from tractexp.report import identify
 
         return identify.report(self)
@@ -422,6 +433,7 @@ class Identification(Written):
         return f"; its {join_words(away)} {lie} outside the estimate's interval: {why}"
 
     def to_dict(self) -> dict[str, Any]:
+        """Call, result and search as plain data."""
         end = None if self.end is None else asdict(self.end)
         return {
             "setup": self.setup and self.setup.to_dict(),
@@ -431,6 +443,7 @@ class Identification(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """The identification that `to_dict` gave."""
         setup, end = content["setup"], content["found"]
         if end is not None:
             history = History(
@@ -446,6 +459,7 @@ class Identification(Written):
         )
 
     def write_results(self, folder: Path) -> list[Path]:
+        """Write `result.json` and `history.csv`."""
         from tractexp.identification.result import write_history
 
         return [
@@ -652,9 +666,13 @@ class Identify(Task, call=identify):
     predictor: bool | None = None
 
     def draws(self, job: Job) -> bool:
+        """Whether this run draws figures: as set, else in single runs."""
         return not job.of_many if self.figures is None else self.figures
 
     def collect_log(self, job: Job, result: Identification) -> dict[str, Any]:
+        """Estimates, errors and curves for MLflow, and the model as one that predicts where that is
+        set.
+        """
         from tractexp.api.logged import logged_fit
 
         predictor = not job.of_many if self.predictor is None else self.predictor

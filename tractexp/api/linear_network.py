@@ -61,6 +61,7 @@ class NetworkFit(Written):
 
     @property
     def poles(self) -> list[dict[str, float]]:
+        """[{decay [1/s], frequency [Hz], admittance [pu]}]."""
         return self.content["poles"]
 
     @property
@@ -79,16 +80,19 @@ class NetworkFit(Written):
         return response_of(_play(self.box, own.convert_event(one), "validate"), one, own)
 
     def table(self) -> Table:
+        """The poles."""
         from tractexp.report.linear_network import poles
 
         return poles(self)
 
     def summary(self) -> Report:
+        """The poles, and what the network leaves."""
         from tractexp.report import linear_network
 
         return linear_network.summary(self)
 
     def report(self) -> Report:
+        """The page: the curves of the network, and what each number of poles leaves."""
         from tractexp.report import linear_network
 
         return linear_network.report(self)
@@ -161,12 +165,14 @@ def _fit_networks(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
 
 
 def _play(box: "BlackBox", event: Event, role: str) -> "Fit":
+    """What a network gives for an event, as a fit of that role."""
     from tractexp.identification.result import Fit
 
     return Fit(role=role, **vars(box.play(box.domain.event(event))))
 
 
 def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
+    """The same for every event, those fitted first."""
     from tractexp.identification.result import TRAIN, VALIDATE
 
     return [
@@ -177,6 +183,7 @@ def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
 
 
 def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[str, Any]:
+    """What `linear_network.json` holds."""
     from tractexp.identification.result import model_errors
     from tractexp.identification.yardstick import network_in_words
     from tractexp.inference.model_error import ModelError
@@ -220,9 +227,11 @@ class LinearNetwork(Task, call=linear_network):
     instead = {"model": "a network has no equations: leave it out"}
 
     def perform(self, job: Job, **instead: Any) -> NetworkFit:
+        """Fit the network in the domain of the run's model."""
         return super().perform(job, domain=job.config["model"]["domain"], **instead)
 
     def collect_log(self, job: Job, result: NetworkFit) -> dict[str, Any]:
+        """The errors and the number of poles for MLflow."""
         error = result.content["model_error"]
         metrics = {"model_error": error["value"], "poles": len(result.poles)}
         if error["held_out"]:

@@ -38,21 +38,26 @@ class Listed(Tabulated):
     """Rows with names, shown as a table and given as a frame or as the mappings they are."""
 
     def __init__(self, rows: Sequence[Mapping[str, Any]], title: str = ""):
+        """Rows of one kind, {column: value} each."""
         self.rows, self.title = rows, title
 
     def __len__(self) -> int:
+        """How many rows there are."""
         return len(self.rows)
 
     def __iter__(self) -> Iterator[Mapping[str, Any]]:
+        """The rows."""
         return iter(self.rows)
 
     def table(self) -> Table:
+        """The rows with a list in one cell as text."""
         columns = list(self.rows[0]) if self.rows else []
         return Table(
             columns, [[_cell(row[name]) for name in columns] for row in self.rows], self.title
         )
 
     def to_frame(self) -> Any:
+        """The rows as a pandas frame; what is not known is nan."""
         import pandas
 
         frame = pandas.DataFrame(list(self.rows))
@@ -62,6 +67,7 @@ class Listed(Tabulated):
 
 
 def _cell(value: Any) -> Any:
+    """A value as a cell shows it: the items of a list in a line."""
     return "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
 
 
@@ -212,16 +218,19 @@ class Look(Written):
     everything = build_full_report  # its name in version 0.2
 
     def report(self) -> Report:
+        """The page: loads, what happened, channels and their quality."""
         from tractexp.report import look
 
         return look.report(self.views, self.content)
 
     def to_dict(self) -> dict[str, Any]:
+        """Sources, settings and content as plain data."""
         sources = [s if isinstance(s, str) else record_to_dict(s) for s in self.sources]
         return {"sources": sources, "settings": dict(self.settings), "content": dict(self.content)}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """The look that `to_dict` gave."""
         sources = [s if isinstance(s, str) else record_from_dict(s) for s in content["sources"]]
         return cls(sources, content["settings"], content["content"])
 
@@ -309,6 +318,7 @@ def _join_given(
 
 
 def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
+    """What a source shows; of a file the reader is chosen by what it holds."""
     if isinstance(source, Record):
         return View(source.name, {}, [sight_of(source)])
     if settings.get("join"):
@@ -430,6 +440,7 @@ def _content(view: View) -> dict[str, Any]:
 
 
 def _channel(view: View, number: int) -> dict[str, Any]:
+    """A channel's row: name, unit, phase, quality."""
     assert view.recording is not None
     channel, fitness = view.recording.channels[number], view.quality[number]
     share = fitness.noise / fitness.level if fitness.level > 0 else None
@@ -449,6 +460,7 @@ def _channel(view: View, number: int) -> dict[str, Any]:
 
 
 def _feeder(view: View, shown: Sight) -> dict[str, Any]:
+    """A load's row: its channels, power and what speaks for it."""
     feeder, powers = shown.feeder, view.powers(shown)
     names = [c.name for c in view.recording.channels] if view.recording else []
     row: dict[str, Any] = {
@@ -495,6 +507,7 @@ def hide_secondary(row: dict[str, Any], shown: Sight) -> dict[str, Any]:
 
 
 def _name(connection: Any) -> str:
+    """A connection's name."""
     return connection["name"] if isinstance(connection, Mapping) else str(connection)
 
 
@@ -556,6 +569,7 @@ def _sums(shown: Sight) -> dict[str, Any]:
 
 
 def _pick_item(items: Sequence[Any], k: int, what: str) -> Any:
+    """The k-th item. Raises `UserError` with how many there are."""
     if not -len(items) <= k < len(items):
         raise UserError(f"there is no {what} {k}; there are {len(items)}, counted from 0")
     return items[k]

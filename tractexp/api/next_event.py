@@ -52,9 +52,11 @@ class Recommended(Written):
         return Table(["event", "probability"], rows, "the ten surest events")
 
     def summary(self) -> Report:
+        """The surest events, and what to record."""
         return Report().add(self.table()).text(f"next: {self.sentence}")
 
     def report(self) -> Report:
+        """The page: the events tried, and how the rivals differ there."""
         from tractexp.report import next_event
 
         return next_event.report(self.event, title_of(e.record for e in self.setup.train))
@@ -100,6 +102,9 @@ def sets_of(rivals: Any) -> list[list[str]]:
 
 
 def _event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) -> "NextEvent":
+    """The event that tells rivals apart. Raises `UserError` for a model with `per_event`, or sets
+    that do not fit it.
+    """
     from tractexp.discrepancy.next_event.rivals import event_for
 
     m = setup.model

@@ -73,9 +73,11 @@ class Forecasts(Written):
         return shown.scan(self.content, DEPTH)
 
     def summary(self) -> Report:
+        """How deep a dip is needed, and the intervals."""
         return shown.summary(self.content)
 
     def report(self) -> Report:
+        """The page: each interval against depth, duration, rate and noise."""
         return shown.report(self.forecast, self.content)
 
 
@@ -324,6 +326,7 @@ def _scans(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
 
 
 def _describe_shape(shape: DipShape) -> str:
+    """The planned dip in words."""
     memory = f"forgotten within {1000 * shape.memory:.0f} ms" if shape.memory > 0 else "white"
     first, second = (
         f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q)
@@ -374,6 +377,7 @@ class Plan(Task, call=plan):
     """
 
     def collect_log(self, job: Job, result: Forecasts | Recommended) -> dict[str, Any]:
+        """The depth needed, or the probability that rivals part, for MLflow."""
         if isinstance(result, Recommended):
             name = f"plan to tell {len(result.rivals)} explanations apart"
             return {"name": name, "metrics": {"probability": result.probability}}

@@ -54,6 +54,7 @@ class Sampled(Written):
         return dict(zip(self.sample.names, self.sample.draws.T, strict=True))
 
     def table(self) -> Table:
+        """The intervals by curvature and by the posterior, side by side."""
         span, r = "{:.4g} .. {:.4g}".format, self.fit.result
         rows = [
             [name, f"{r.free[name]:.4g}", span(*r.intervals[name]), span(*interval)]
@@ -63,6 +64,7 @@ class Sampled(Written):
         return Table(columns, rows, "95 % intervals")
 
     def summary(self) -> Report:
+        """The intervals, and how well the chains have mixed."""
         c, s = self.content, self.settings
         effort = (
             f"{s['steps']} steps of {s['walkers']} walkers in {c['seconds']:.1f} s, acceptance"
@@ -77,11 +79,15 @@ class Sampled(Written):
         )
 
     def report(self) -> Report:
+        """The page: marginals and pairs."""
         from tractexp.report import posterior
 
         return posterior.report(self.fit.details.uncertainty, self.sample, self.fit.headline)
 
     def write_results(self, folder: Path) -> list[Path]:
+        """Write `posterior.json`, the draws in `posterior.npz`, and what an identification
+        writes.
+        """
         packed = io.BytesIO()
         np.savez_compressed(packed, **self.draws)  # type: ignore[arg-type]
         path = files.write_json(folder / "posterior.json", self.content)
@@ -153,6 +159,7 @@ class Posterior(Task, call=posterior):
     """
 
     def collect_log(self, job: Job, result: Sampled) -> dict[str, Any]:
+        """What an identification logs."""
         from tractexp.api.logged import logged_fit
 
         return logged_fit(job, result.fit)

@@ -57,6 +57,7 @@ class Profiled(Written):
         return self.content["profiles"]
 
     def table(self) -> Table:
+        """The intervals by curvature and by profile, side by side."""
         span = "{:.4g} .. {:.4g}".format
         likely = self.result.free
         rows = [
@@ -68,6 +69,7 @@ class Profiled(Written):
         )
 
     def summary(self) -> Report:
+        """The identification, the intervals and the verdicts."""
         c, notes = self.content, self.content["notes"]
         effort = (
             f"{len(self.profiles)} profiles: {c['simulations']} simulations in {c['seconds']:.2f} s"
@@ -81,11 +83,13 @@ class Profiled(Written):
         return report.text(effort)
 
     def report(self) -> Report:
+        """The page: a curve for each parameter."""
         from tractexp.report import profile
 
         return profile.report(self.curves, self.fit.headline)
 
     def write_results(self, folder: Path) -> list[Path]:
+        """Write `profile.json`, and what an identification writes with these intervals."""
         path = files.write_json(folder / "profile.json", self.content)
         return [path, *self.identification.write_results(folder)]
 
@@ -166,6 +170,7 @@ class Profile(Task, call=profile):
     """
 
     def collect_log(self, job: Job, result: Profiled) -> dict[str, Any]:
+        """What an identification logs, with these intervals."""
         from tractexp.api.logged import logged_fit
 
         return logged_fit(job, result.identification)

@@ -36,6 +36,7 @@ class Dips(Tabulated, list[Event]):
     """Events in a list that prints as a table."""
 
     def __getitem__(self, k: Any) -> Any:
+        """An event, or the dips of a slice."""
         return Dips(super().__getitem__(k)) if isinstance(k, slice) else super().__getitem__(k)
 
     def look(self) -> Any:
@@ -206,6 +207,7 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
 
 
 def _array(values: Any, where: str) -> np.ndarray:
+    """Values as numbers. Raises `UserError` with the first that is none."""
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
@@ -228,6 +230,7 @@ def _odd(values: Any) -> str:
 
 
 def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
+    """The records of a source. Raises `UserError` for what is none."""
     if isinstance(source, str | Path):
         yield from _file(str(source), settings)
     elif isinstance(source, Record | Event):

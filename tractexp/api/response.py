@@ -55,6 +55,7 @@ class Response:
         return [self.title, *(f"{v:.4f}" for v in ends), *errors]
 
     def __repr__(self) -> str:
+        """The event's name, and its errors where it was measured."""
         errors = (
             ", epsilon_p {}, epsilon_q {}".format(*map(epsilon, self.epsilon))
             if self.epsilon
@@ -64,6 +65,7 @@ class Response:
         return f"{self.title}: t, U, P, Q of {len(self.t)} samples{errors}"
 
     def _repr_html_(self) -> str:
+        """Measured and calculated power, drawn."""
         with tempfile.TemporaryDirectory() as folder:
             drawn = files.read_text(self.draw(Path(folder) / "response.svg"))
         return drawn[drawn.index("<svg") :]
@@ -103,6 +105,7 @@ class Response:
 
 
 def _csv(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
+    """Write columns of numbers with their names."""
     text = io.StringIO()
     rows = np.column_stack(list(columns.values()))
     np.savetxt(text, rows, fmt="%.9g", delimiter=",", header=",".join(columns), comments="")

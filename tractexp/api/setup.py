@@ -65,6 +65,7 @@ class Setup(Given):
 
     @functools.cached_property
     def problem(self) -> "Problem":
+        """The problem that is fitted, with the objective of this call."""
         return self.problem_of()
 
     def problem_of(self, train: Sequence[Event] | None = None) -> "Problem":

@@ -67,6 +67,7 @@ class Simulation(Written):
     responses: tuple[Response, ...]
 
     def __getattr__(self, name: str) -> Any:
+        """`t`, `U`, `P` and `Q` of the only event."""
         if name in ("t", "U", "P", "Q") and len(self.responses) == 1:
             return getattr(self.responses[0], name)
         raise AttributeError(
@@ -74,16 +75,19 @@ class Simulation(Written):
         )
 
     def table(self) -> Table:
+        """Lowest voltage, range of P and Q, and the errors of each event."""
         columns = ["event", "U min", "P min", "P max", "Q min", "Q max", "epsilon_p", "epsilon_q"]
         if any(one.epsilon_i is not None for one in self.responses):
             columns.append("epsilon_i")
         return Table(columns, [one.row for one in self.responses], self.model.model.title)
 
     def summary(self) -> Report:
+        """The parameters and the table."""
         rows = [[p.name, f"{self.values[p.name]:.6g}", p.unit] for p in self.model.model.parameters]
         return Report().add(Table(["parameter", "value", "unit"], rows), self.table())
 
     def to_dict(self) -> dict[str, Any]:
+        """Model, values and responses as plain data."""
         return {
             "model": asdict(self.model),
             "values": dict(self.values),
@@ -92,6 +96,8 @@ class Simulation(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """The simulation that `to_dict` gave."""
+
         def response(entry: Mapping[str, Any]) -> Response:
             arrays: Any = {key: np.array(entry[key], dtype=float) for key in ("t", "U", "P", "Q")}
             arrays["notes"] = tuple(entry["notes"])
@@ -124,6 +130,7 @@ class Simulation(Written):
 
 
 def _stem(number: int) -> str:
+    """The name of an event's files without ending."""
     return "response" if number == 1 else f"response_{number}"
 
 
@@ -281,19 +288,25 @@ class Simulate(Task, call=simulate):
     parameters: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def needless(self) -> tuple[str, ...]:
+        """The parts of the configuration that this run does not read."""
         return (*(LOAD if self.parameters else ()), *(("data",) if self.by_hand else ()))
 
     @property
     def by_hand(self) -> bool:
+        """Whether the dip is made by hand."""
         return getattr(self, "depth") is not None  # noqa: B009 # a setting that the call declares
 
     def perform(self, job: Job, **instead: Any) -> Simulation:
+        """Play the run's events, or the dip made by hand, through the model of
+        `task.parameters`.
+        """
         if self.parameters:
             instead["model"] = Identification(load(Path(self.parameters)))
         instead["records"] = () if self.by_hand else [*job.events.train, *job.events.validate]
         return super().perform(job, **instead)
 
     def collect_log(self, job: Job, result: Simulation) -> dict[str, Any]:
+        """The errors of each event for MLflow."""
         errors = {
             f"event_{k}_epsilon_{c}": error
             for k, one in enumerate(result.responses, start=1)

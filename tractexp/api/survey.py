@@ -99,18 +99,23 @@ class Surveyed(Written):
         return self.content["command"]
 
     def to_frame(self) -> Any:
+        """The rows as a pandas frame."""
         return self.rows.to_frame()
 
     def table(self) -> Table:
+        """How many events there are of each kind."""
         return shown.kinds(self.content)
 
     def summary(self) -> Report:
+        """What the files hold, and which events are worth fitting."""
         return shown.summary(self.content)
 
     def report(self) -> Report:
+        """The page: a row for each event."""
         return shown.report(self.content)
 
     def write_results(self, folder: Path) -> list[Path]:
+        """Write the rows as `survey.json`, `survey.csv` and `survey.parquet`."""
         frame = self.to_frame()
         return [
             files.write_json(folder / "survey.json", self.content),
@@ -120,6 +125,7 @@ class Surveyed(Written):
 
 
 def _cell(value: Any) -> Any:
+    """A text that no spreadsheet takes for a formula."""
     return quoting.cell(value) if isinstance(value, str) else value
 
 
@@ -255,6 +261,9 @@ class Survey(Task, call=survey, given=("folder", "keep")):
         return () if getattr(self, "informative") else ("model",)  # noqa: B009 # a setting that the call declares
 
     def perform(self, job: Job, **instead: Any) -> Surveyed:
+        """Survey the folder that `data.path` names. Raises `UserError` for a reader of single
+        files.
+        """
         node = job.config["data"]
         if not getattr(get("data", node["name"]), "folders", False):
             raise UserError(
@@ -275,6 +284,7 @@ class Survey(Task, call=survey, given=("folder", "keep")):
         return Surveyed({**result.content, "command": build_typed_command(data, *model)})
 
     def collect_log(self, job: Job, result: Surveyed) -> dict[str, Any]:
+        """How many files, events and events worth fitting there are, for MLflow."""
         rows = result.content["rows"]
         metrics = {
             "files": result.content["files"],

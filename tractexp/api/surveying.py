@@ -77,6 +77,7 @@ def _with_proposal(rows: Rows, path: Path) -> Rows:
 
 
 def _blank(file: str) -> dict[str, Any]:
+    """A row of a file of which nothing is known."""
     return dict.fromkeys(COLUMNS) | {"file": file, "worth": False, "why": ""}
 
 
@@ -115,15 +116,18 @@ def _without_events(view: View) -> dict[str, str]:
 
 
 def _quiet(view: View) -> str:
+    """What a file without an event says instead."""
     said = [*(said for s in view.sights for said in s.said), *_find_dead_phases(view)]
     return "; ".join(dict.fromkeys(said)) or "the voltage stays as it is"
 
 
 def _find_dead_phases(view: View) -> list[str]:
+    """The phases without voltage, in words."""
     return [*filter(None, (describe_dead_phases(s.dead_phases) for s in view.sights))]
 
 
 def _common(view: View) -> dict[str, Any]:
+    """What all rows of a file share: station, rate, begin."""
     recording = view.recording
     if recording is None:
         return {
@@ -134,6 +138,7 @@ def _common(view: View) -> dict[str, Any]:
 
 
 def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) -> dict[str, Any]:
+    """The row of an event."""
     fields = hide_secondary(event_row(seen, view.begun), shown)
     event = seen.event
     return {
@@ -212,4 +217,5 @@ def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
 
 
 def _states(paths: Sequence[Path]) -> list[Any]:
+    """Size and time of change of each file that is there."""
     return [[path.name, *files.state(path)] for path in paths if files.exists(path)]

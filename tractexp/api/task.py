@@ -127,6 +127,7 @@ class Task(Plugin):
 
     @classmethod
     def takes_records(cls) -> bool:
+        """Whether the call takes records of `data`."""
         arguments = inspect.signature(cls.function).parameters if cls.function else {}
         return any("data" in SOURCES[name].reads for name in arguments if name in SOURCES)
 
@@ -168,6 +169,7 @@ class Task(Plugin):
         self.log(job, result, paths)
 
     def log(self, job: "Job", result: Any, paths: list[Path]) -> None:
+        """Log what was found, and send it."""
         if (run := self.track(job, result, paths)) is not None:
             job.send(run)
 
@@ -282,6 +284,7 @@ class Job:
 
     @functools.cached_property
     def optimizer(self) -> Any:
+        """The run's optimizer."""
         return build("optimizer", self.config["optimizer"])
 
     @property
@@ -341,6 +344,7 @@ class Job:
 
     @property
     def seed(self) -> int:
+        """The run's seed."""
         return int(self.config["seed"])
 
     @property
@@ -397,6 +401,7 @@ class Job:
 
     @functools.cached_property
     def _logger(self) -> Any:
+        """The process that logs, where there is one."""
         from tractexp.tracking.process import logger
 
         return logger(self.store)

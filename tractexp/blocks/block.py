@@ -79,6 +79,7 @@ class Table:
     detail: Collection[int] = ()
 
     def __post_init__(self) -> None:
+        """Raise ValueError for a row of more or fewer cells than there are columns."""
         if wrong := next((row for row in self.rows if len(row) != len(self.columns)), None):
             raise ValueError(
                 f"a row of {len(wrong)} cells in a table of {len(self.columns)} columns: {wrong}"
@@ -100,9 +101,11 @@ class Table:
         )
 
     def __repr__(self) -> str:
+        """The table as a terminal shows it."""
         return str(Report().add(self))
 
     def _repr_html_(self) -> str:
+        """The table as a notebook shows it."""
         return Report().add(self).fragment
 
     def to_frame(self) -> Any:
@@ -183,30 +186,40 @@ class Report:
     """
 
     def __init__(self, title: str = "", lead: str = "", reload: int | None = None):
+        """An empty page with a title and a sentence below it; with `reload` [s] it loads itself
+        again.
+        """
         self.title, self.lead, self.reload = title, lead, reload
         self.blocks: list[Block] = []
 
     def add(self, *blocks: Block) -> "Report":
+        """Add blocks, and return the report."""
         self.blocks += blocks
         return self
 
     def heading(self, text: str, level: int = 2) -> "Report":
+        """Add a heading of that level."""
         return self.add(Heading(text, level))
 
     def text(self, *paragraphs: str) -> "Report":
+        """Add paragraphs, if there are any."""
         return self.add(Paragraphs(paragraphs)) if paragraphs else self
 
     def verdict(self, *paragraphs: str, kind: str = "plain") -> "Report":
+        """Add paragraphs in a frame of that kind."""
         check_choice("kind", kind, KINDS)
         return self.add(VerdictBlock(paragraphs, kind))
 
     def items(self, texts: Sequence[str]) -> "Report":
+        """Add a list, if it has items."""
         return self.add(Items(texts)) if texts else self
 
     def code(self, text: str) -> "Report":
+        """Add a text that is shown as it stands."""
         return self.add(CodeBlock(text))
 
     def equation(self, latex: str) -> "Report":
+        """Add an equation."""
         return self.add(Equation(latex))
 
     def table(
@@ -218,12 +231,15 @@ class Report:
         title: str = "",
         detail: Collection[int] = (),
     ) -> "Report":
+        """Add a table; columns by number in `words` wrap, those in `detail` are shown on demand."""
         return self.add(Table(columns, rows, title, caption, words, detail))
 
     def chart(self, chart: "Chart", caption: str = "") -> "Report":
+        """Add a chart with a caption."""
         return self.add(ChartBlock(chart, caption))
 
     def charts(self, charts: Sequence["Chart"], caption: str = "") -> "Report":
+        """Add charts side by side, with one caption."""
         self.add(Charts([ChartBlock(chart) for chart in charts]))
         return self.text(caption) if caption else self
 
@@ -261,6 +277,7 @@ class Report:
 
     @property
     def markdown(self) -> str:
+        """The blocks as Markdown."""
         from tractexp.blocks.markdown import markdown
 
         return markdown(self)
@@ -286,18 +303,21 @@ class Report:
         return plain(self)
 
     def __repr__(self) -> str:
+        """How many blocks there are, and what shows them."""
         return (
             f"a report of {len(self.blocks)} blocks; save(path) writes its page, print() shows what"
             " a terminal can"
         )
 
     def _repr_html_(self) -> str:
+        """The page in a frame, for a notebook."""
         from tractexp.blocks.html import frame
 
         return frame(self)
 
 
 def _plain(block: Block) -> dict[str, Any]:
+    """A block as plain data, without what only draws it."""
     fields = {
         f.name: getattr(block, f.name)
         for f in dataclasses.fields(block)

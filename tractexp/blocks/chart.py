@@ -111,6 +111,7 @@ class Chart:
     def _laid_out(
         labels: Sequence[str], heights: Sequence[float], log: bool
     ) -> dict[str, dict[str, Any]]:
+        """The vertical axes of panels of these heights, from top to bottom."""
         room = (1 - PANEL_GAP * (len(labels) - 1)) / sum(heights)
         top, axes = 1.0, {}
         for k, (label, share) in enumerate(zip(labels, heights, strict=True)):
@@ -513,6 +514,7 @@ class Chart:
         return {"data": data, "layout": layout, "cursor": self._cursor}
 
     def element(self, label: str) -> str:
+        """The chart as HTML, told to screen readers as `label`."""
         data = quoting.script(self.plain())
         kind = "readout arrows" if any("phasor" in trace for trace in self._data) else "readout"
         above = "" if self._cursor is None else f'<div class="{kind}"></div>'
@@ -526,6 +528,7 @@ class Chart:
     def _add(
         self, name: str, at: int, /, kind: str = "scatter", silent: bool = False, **more: Any
     ) -> "Chart":
+        """Add a trace to a panel; each name is once in the legend."""
         shown = bool(name) and name not in self._in_legend and not silent
         if shown:
             self._in_legend.add(name)
@@ -543,6 +546,7 @@ class Chart:
 
 
 def _short(name: str) -> str:
+    """A name that fits a tick."""
     return name if len(name) <= TICK else f"{name[: TICK - 1]}…"
 
 
@@ -553,6 +557,7 @@ def _above(names: Sequence[str]) -> dict[str, Any]:
 
 
 def _axis(letter: str, panel: int) -> str:
+    """Plotly's name of a panel's axis: x, x2, ..."""
     return letter + (str(panel + 1) if panel else "")
 
 
@@ -584,10 +589,12 @@ def _pack_numbers(values: np.ndarray, kind: str) -> dict[str, str]:
 
 
 def _list_values(values: Sequence[Any] | np.ndarray) -> list[Any]:
+    """Values for JSON: text is quoted, nan is a gap."""
     plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
     return [quoting.html(v) if isinstance(v, str) else None if v != v else v for v in plain]
 
 
 def _faint(color: str) -> str:
+    """A color that bands are filled with."""
     red, green, blue = (int(color[k : k + 2], 16) for k in (1, 3, 5))
     return f"rgba({red},{green},{blue},0.18)"

@@ -70,6 +70,7 @@ def fragment(report: Report) -> str:
 
 
 def _untypeset(element: str) -> str:
+    """An element whose dollar signs a notebook does not take for mathematics."""
     return (
         f'<div class="mathjax_ignore tex2jax_ignore">{element}</div>' if "$" in element else element
     )
@@ -130,6 +131,7 @@ def _element(block: blocks.Block, figures: "itertools.count[int]") -> str:
 
 
 def _below(caption: str) -> str:
+    """A caption below its figure; "" without one."""
     return f"<figcaption>{quoting.html(caption)}</figcaption>" if caption else ""
 
 

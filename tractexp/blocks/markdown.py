@@ -8,6 +8,7 @@ from tractexp.blocks import block as blocks
 
 
 def markdown(report: Report) -> str:
+    """A report as Markdown."""
     parts = [f"# {quoting.markdown(report.title)}"]
     if report.lead:
         parts.append(quoting.markdown(report.lead))
@@ -17,6 +18,7 @@ def markdown(report: Report) -> str:
 
 
 def _parts(block: blocks.Block) -> Iterator[str]:
+    """A block as paragraphs of Markdown."""
     match block:
         case blocks.Heading(text, level):
             yield f"{'#' * level} {quoting.markdown(text)}"

@@ -58,14 +58,14 @@ class PhasorDomain(Domain):
         return smooth_voltage(event)
 
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
-        """The stretch before the dip in which each event is at rest, as slices of the drive."""
+        """The samples of the drive before each dip, whose means are P0 and Q0."""
         first = [int(drive.first[e]) for e in range(drive.events)]
         return [
             slice(a + e.steady.start, a + e.steady.stop) for a, e in zip(first, events, strict=True)
         ]
 
     def longest_step(self, events: Sequence[Event], substeps: np.ndarray) -> float:
-        """The step [s] below which no phasor moves; the same for all events."""
+        """A step [s] that is fine enough for every dip of phasors."""
         return FINEST_STEP
 
     def values(self, drive: Drive) -> int:
@@ -113,11 +113,11 @@ class PhasorDomain(Domain):
         return why and f"fit the sampled waveforms, by domain=waves: the dip of {record.name} {why}"
 
     def slowest(self, frequency: float) -> float:
-        """The least frequency [Hz] that is proposed for a ringing."""
+        """The lowest sampling rate [Hz] of a planned dip."""
         return 5.0
 
     def rates(self, frequency: float) -> tuple[float, ...]:
-        """The rates [Hz] of recorders that a plan forecasts."""
+        """Sampling rates [Hz] that a plan tries, whatever the frequency of the grid."""
         return (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 
     def shape(self, event: Event) -> dict[str, float]:
@@ -125,7 +125,9 @@ class PhasorDomain(Domain):
         return {}
 
     def about_noise(self, faults: Sequence[str], judged: bool) -> str:
-        """How the noise was estimated, for the page."""
+        """Where the noise is estimated, and that faults of the measurement are free, in
+        sentences.
+        """
         return (
             "It is estimated where nothing happens, from what the fit leaves there, and so contains"
             " what smoothing"

@@ -62,11 +62,11 @@ class WaveDomain(Domain):
         return SmoothedEvent(event, np.empty((0, event.record.samples)))
 
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
-        """[]: before the dip the currents are periodic, not at rest."""
+        """[]: the power before the dip is not compared."""
         return []
 
     def longest_step(self, events: Sequence[Event], substeps: np.ndarray) -> float:
-        """The shortest step [s] of the Runge-Kutta method over all events."""
+        """The shortest step [s] that one of the events took: fine enough for dips like them."""
         return min(e.record.step / n for e, n in zip(events, substeps, strict=True))
 
     def values(self, drive: Drive) -> int:
@@ -116,11 +116,11 @@ class WaveDomain(Domain):
         return ""
 
     def slowest(self, frequency: float) -> float:
-        """The least frequency [Hz] that is proposed for a ringing."""
+        """The lowest sampling rate [Hz] of a planned dip."""
         return COARSEST * frequency
 
     def rates(self, frequency: float) -> tuple[float, ...]:
-        """The rates [Hz] of recorders that a plan forecasts, in whole samples a cycle."""
+        """Sampling rates [Hz] that a plan tries: whole numbers of samples a cycle."""
         return tuple(n * frequency for n in (16, 32, 64, 128, 200))
 
     def shape(self, event: Event) -> dict[str, float]:
@@ -149,7 +149,7 @@ class WaveDomain(Domain):
         return f"{super().edges}, without zero sequence"
 
     def about_noise(self, faults: Sequence[str], judged: bool) -> str:
-        """How the noise was estimated, for the page, and which faults of the measurement were free."""
+        """Where noise is estimated, and which faults of the measurement are free, in sentences."""
         origin = (
             "It is estimated before the dip and at the end of the record, from what the fit leaves"
             " there: harmonics"

@@ -114,4 +114,5 @@ class TCircuit:
 
 
 def _parallel(a: Number, b: Number) -> Number:
+    """Two impedances in parallel."""
     return a * b / (a + b)

@@ -186,6 +186,7 @@ class Format(Plugin):
 
     @classmethod
     def _list_represented(cls, kind: str) -> Collection[str] | None:
+        """The parts of a kind that the format has; None: all of them."""
         return {"motor": cls.motors, "static load": cls.statics, "effect": cls.effects}[kind]
 
     def _instead(self, kind: str, name: str) -> str:

@@ -60,6 +60,7 @@ class OperatingPoint:
         return self.P_motor / self.P if self.P else float("inf")
 
     def __str__(self) -> str:
+        """Powers, slip, inertia and starting current in a line."""
         p, q = self.units
         machine = [f"slip {100 * self.slip:.2g} %"]
         if self.H is not None:

@@ -149,6 +149,7 @@ def _simulate_restored_load(
 def _measure_agreement(
     by: str, fit: tuple[np.ndarray, np.ndarray], there: tuple[np.ndarray, np.ndarray]
 ) -> Agreement:
+    """How far P and Q of a playback are from those of the fit, and how far those move."""
     off = [float(np.abs(a - b).max()) for a, b in zip(fit, there, strict=True)]
     moved = [float(np.ptp(a)) for a in fit]
     return Agreement(by, (off[0], off[1]), (moved[0], moved[1]))

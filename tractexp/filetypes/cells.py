@@ -57,6 +57,7 @@ class BadCell(Exception):
     """
 
     def __init__(self, row: int, why: str) -> None:
+        """A cell's row, from 0, and why it cannot be read."""
         super().__init__(row, why)
         self.row, self.why = row, why
 

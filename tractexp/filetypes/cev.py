@@ -175,6 +175,9 @@ class _Opened:
 
 
 def _open_report(path: Path, encoding: str | None) -> _Opened:
+    """An event report with its text and encoding. Raises `UserError` for a file that is none, or
+    too large.
+    """
     path = Path(path)
     files.check_there(path)
     if files.size(path) > LARGEST:
@@ -254,6 +257,9 @@ def checksum(text: str) -> str:
 
 
 def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
+    """The report of a file's text: settings, names of columns, rows of numbers; rows whose checksum
+    fails are noted.
+    """
     body, _, rest = re.sub(r"[\x02\x03\x1a\0]", "", text).partition('"SETTINGS"')
     report = EventReport(settings=rest.partition("\n")[2].strip())
     names: list[str] | None = None
@@ -344,6 +350,9 @@ def _samples(
 
 
 def _value(path: Path, line: int, name: str, cell: str) -> float:
+    """The number of a cell; nan where the relay wrote none. Raises `UserError` for anything
+    else.
+    """
     value = number(cell) if cell.strip() else float("nan")
     if value is None and (name == "*" or not set(cell.strip()) - {"$", "*", "-"}):
         return float("nan")  # so the relay writes a missing value
@@ -375,12 +384,16 @@ def _rate(path: Path, report: EventReport) -> tuple[float, float]:
 
 
 def _is_named(report: EventReport, k: int) -> bool:
+    """Whether a column has a name."""
     return report.columns[k] not in ("", "*")
 
 
 def _channel(
     report: EventReport, k: int, values: np.ndarray, gain: float, remarks: Remarks
 ) -> Channel:
+    """The channel of a column: its quantity and unit from the name, its values times the
+    transformers' ratio.
+    """
     match = _COLUMN.fullmatch(report.columns[k])
     name, unit = (match[1], match[2] or "") if match else (report.columns[k], "")
     wave = _WAVE.fullmatch(name.upper())

@@ -73,10 +73,12 @@ def read_header(path: Path, encoding: str | None = None) -> Header:
 
 
 def _whole(path: Path) -> ByteRange:
+    """All bytes of a file."""
     return ByteRange(path, 0, files.size(path))
 
 
 def _read_pair(path: Path, encoding: str | None) -> Recording:
+    """The recording of a .cfg and the .dat beside it."""
     cfg, dat, note = _pair(path)
     remarks = Remarks(str(cfg))
     if note:
@@ -126,6 +128,7 @@ def _sections(path: Path) -> dict[str, ByteRange]:
 def _recording(
     path: Path, text: str, data: ByteRange, remarks: Remarks, extra: dict[str, Any], first: int = 1
 ) -> Recording:
+    """The recording of a configuration's text and its data; what was odd is in its notes."""
     header = parse(str(path), lines(text), remarks, first)
     samples = read(data, header, remarks)
     stretches = _stretches(data, header, samples, remarks)
@@ -157,6 +160,7 @@ def _recording(
 
 
 def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> Channel:
+    """An analog channel with its raw integers, at even times, missing ones marked."""
     analog, raw = header.analogs[k], samples.analogs[k]
     raw, missing = _find_missing_values(header.kind, analog, raw)
     return Channel(
@@ -265,6 +269,9 @@ def _read_stamped_times(
 
 
 def _trigger(header: Header, stretches: list[Stretch], remarks: Remarks) -> float | None:
+    """The trigger's time [s] after the first sample; None, with a remark, where it lies outside the
+    record.
+    """
     last = stretches[-1].segment
     if (
         header.trigger is None
@@ -302,6 +309,7 @@ def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[s
 
 
 def _find_existing_path(path: Path) -> Path:
+    """The path. Raises `UserError` with the nearest name of its folder where it is not there."""
     if not files.there(path):
         names = [item.name for item in files.list_folder(path.parent)]
         raise UserError(f"{path}: there is no such file{nearest(path.name, names)}")
@@ -335,6 +343,7 @@ def _pair(path: Path) -> tuple[Path, Path, str]:
 
 
 def _find_companion(path: Path, ending: str) -> Path | None:
+    """The file beside a path with another ending, in whatever letters; None where there is none."""
     for one in (ending, ending.upper(), ending.capitalize()):
         if files.there(path.with_suffix(one)):
             return path.with_suffix(one)
@@ -350,6 +359,7 @@ def _find_companion(path: Path, ending: str) -> Path | None:
 
 
 def _configuration(place: ByteRange) -> bytes:
+    """The bytes of a configuration. Raises `UserError` for one that is too large."""
     if place.size > LARGEST_CFG:
         raise UserError(
             f"{place.path}: {place.size} bytes are no COMTRADE configuration; the limit is"

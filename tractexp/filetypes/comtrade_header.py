@@ -83,6 +83,7 @@ class Header:
 
     @property
     def samples(self) -> int:
+        """How many samples the file holds, by its last rate."""
         return self.rates[-1][1]
 
 
@@ -90,6 +91,9 @@ class _Lines:
     """The remaining lines, with their numbers."""
 
     def __init__(self, where: str, lines: list[str], remarks: Remarks, first: int) -> None:
+        """The lines of a configuration, numbered from `first`; blank ones are passed over with a
+        remark.
+        """
         self.where, self.remarks = where, remarks
         lines = lines[: max((n for n, line in enumerate(lines, 1) if line), default=0)]
         self.rest = deque((n, line) for n, line in enumerate(lines, first) if line)
@@ -99,6 +103,9 @@ class _Lines:
                 remarks.add("a blank line is passed over", n)
 
     def take(self, what: str) -> tuple[int, str]:
+        """The next line with its number. Raises `UserError` with `what` was to come where there is
+        none.
+        """
         if not self.rest:
             raise UserError(
                 f"{self.where}: ends after line {self.last}, before {what}; the file is cut short"
@@ -106,9 +113,11 @@ class _Lines:
         return self.rest.popleft()
 
     def peek(self) -> str:
+        """The next line without taking it; "" at the end."""
         return self.rest[0][1] if self.rest else ""
 
     def refuse(self, line: int, words: str) -> UserError:
+        """The error that a line is."""
         return UserError(f"{self.where}: line {line}: {words}")
 
 
@@ -132,6 +141,7 @@ def parse(where: str, lines: list[str], remarks: Remarks, first: int = 1) -> Hea
 
 
 def _station(rows: _Lines, header: Header) -> None:
+    """Read station, device and revision, where the line is there."""
     if _COUNTS.fullmatch(rows.peek()):
         rows.remarks.add("the line of station and device is missing", rows.rest[0][0])
         return
@@ -152,6 +162,7 @@ def _station(rows: _Lines, header: Header) -> None:
 
 
 def _counts(rows: _Lines) -> tuple[int, int]:
+    """The numbers of analog and of status channels."""
     line, text = rows.take("the numbers of channels")
     match = _COUNTS.fullmatch(text)
     if match is None or match[3].upper() == match[5].upper():
@@ -184,6 +195,7 @@ def _counts(rows: _Lines) -> tuple[int, int]:
 
 
 def _analog(rows: _Lines, k: int, count: int) -> Analog:
+    """The k-th analog channel of so many."""
     line, text = rows.take(f"analog channel {k + 1} of {count}")
     fields = [part.strip() for part in text.split(",")]
     if len(fields) > 13 and not any(fields[13:]):
@@ -256,6 +268,7 @@ def _checked_ratio(rows: _Lines, line: int, channel: str, analog: Analog) -> Ana
 
 
 def _digital(rows: _Lines, k: int, count: int) -> Digital:
+    """The k-th status channel of so many."""
     line, text = rows.take(f"status channel {k + 1} of {count}")
     fields = [part.strip() for part in text.split(",")]
     while len(fields) > 5 and not fields[-1]:
@@ -370,11 +383,13 @@ def _rates(rows: _Lines, header: Header, count: int | None) -> None:
 
 
 def _is_rate(text: str) -> bool:
+    """Whether a line is a sampling rate with its last sample."""
     fields = text.strip(", ").split(",")
     return len(fields) == 2 and all(number(part) is not None for part in fields)
 
 
 def _dates(rows: _Lines, header: Header) -> None:
+    """Read when the first sample and the trigger were, where the lines are there."""
     entries: list[tuple[int, str]] = []
     while len(entries) < 2 and rows.rest and _LIKE_DATE.search(rows.peek()):
         entries.append(rows.take("the date of the first sample"))
@@ -403,6 +418,7 @@ _LIKE_DATE = re.compile(r"^[\s,]*$|\d.*[/:.,\-]|[/:,\-].*\d", re.ASCII)
 
 
 def _kind(rows: _Lines, header: Header) -> None:
+    """Read the type of the data file. Raises `UserError` for one that there is not."""
     line, text = rows.take("the type of the data file")
     header.kind, header.lines["kind"] = text.strip(", ").upper(), line
     if header.kind not in VALUE:

@@ -36,9 +36,11 @@ class ByteRange:
 
     @property
     def size(self) -> int:
+        """How many bytes it has."""
         return self.stop - self.first
 
     def content(self, length: int | None = None) -> bytes:
+        """Its bytes, or the first `length` of them."""
         with files.open_ordinary_file(self.path) as file:
             file.seek(self.first)
             return file.read(self.size if length is None else min(length, self.size))
@@ -102,6 +104,9 @@ def read(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
 
 
 def _binary(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
+    """The samples of a binary file, without a copy; bytes over and samples short are noted or
+    refused.
+    """
     one = row(header.kind, len(header.analogs), len(header.digitals))
     count_there = place.size // one.itemsize
     _enough(place, header, remarks, count_there, header.samples * one.itemsize, place.size, "bytes")
@@ -173,6 +178,7 @@ def _check_sample_numbers(place: ByteRange, header: Header, numbers: np.ndarray)
 
 
 def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
+    """The samples of an ASCII file, line by line."""
     width = 2 + len(header.analogs) + len(header.digitals)
     wanted = header.samples
     if place.size < 2 * width - 1:
@@ -227,6 +233,9 @@ def _blocks(place: ByteRange, width: int, remarks: Remarks) -> Iterator[np.ndarr
 def _cells(
     place: ByteRange, width: int, lines: list[bytes], first: int, last: bool, remarks: Remarks
 ) -> np.ndarray:
+    """Numbers (rows, width) of the lines of an ASCII file, of which the first is numbered
+    `first`.
+    """
     numbered = [
         (n, text) for n, line in enumerate(lines, first) if (text := line.strip(b" \t\x1a"))
     ]
@@ -263,6 +272,7 @@ def _cells(
 
 
 def _numbers(text: bytes, count: int) -> np.ndarray | None:
+    """The numbers of a line; None where it has another count, or what is no number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -273,6 +283,9 @@ def _numbers(text: bytes, count: int) -> np.ndarray | None:
 
 
 def _cell(place: ByteRange, line: int, k: int, cell: bytes) -> float:
+    """The number of a cell, nan where it is empty. Raises `UserError` with line and channel for
+    anything else.
+    """
     text = cell.decode("latin-1").strip()
     value = np.nan if not text or text.lower() == "nan" else number(text)
     if value is None or abs(value) > HUGE:

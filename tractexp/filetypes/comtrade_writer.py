@@ -64,6 +64,7 @@ def _kind(recording: Recording, first_kind: str, revision: int) -> str:
 
 
 def _fits(channel: Channel, kind: str) -> bool:
+    """Whether a type of file can hold every value of a channel as it is."""
     raw, lacking = np.asarray(channel.raw), _find_lacking_samples(channel)
     present = raw[~lacking]
     if kind == "ASCII":
@@ -84,6 +85,7 @@ def _fits(channel: Channel, kind: str) -> bool:
 
 
 def _is_unsigned(channel: Channel, kind: str) -> bool:
+    """Whether a channel's integers are stored without a sign."""
     return (
         kind == "BINARY"
         and channel.limits is not None
@@ -93,6 +95,7 @@ def _is_unsigned(channel: Channel, kind: str) -> bool:
 
 
 def _find_lacking_samples(channel: Channel) -> np.ndarray:
+    """Which samples (N,) of a channel are missing."""
     raw = np.asarray(channel.raw)
     lacking = np.isnan(raw) if raw.dtype.kind == "f" else np.zeros(len(raw), bool)
     return lacking if channel.missing is None else lacking | (raw == channel.missing)
@@ -146,6 +149,7 @@ def _times(recording: Recording) -> tuple[list[tuple[float, int]], np.ndarray, f
 def _lines(
     recording: Recording, kind: str, revision: int, rates: list[tuple[float, int]], timemult: float
 ) -> list[str]:
+    """The lines of a configuration."""
     count, states = len(recording.channels), len(recording.status)
     sides = recording.extra.get("sides", [])
     if len(sides) != count:
@@ -184,6 +188,7 @@ def _lines(
 
 
 def _side(channel: Channel, original: tuple[float, float, str]) -> tuple[float, float, str]:
+    """Primary and secondary of a channel's transformer, and the side that its values are on."""
     primary, secondary, side = original
     if channel.ratio == 1 and side != "S":
         return primary or 1.0, secondary or 1.0, "P"
@@ -208,14 +213,17 @@ def _dates(recording: Recording) -> tuple[str, str]:
 
 
 def _name(text: str) -> str:
+    """A name that fits a field of a configuration: no commas, no line ends."""
     return " ".join(text.replace(",", ";").splitlines()).strip()
 
 
 def _number(value: float) -> str:
+    """A number as short as it can be read back to the bit."""
     return str(int(value)) if value == int(value) and abs(value) < 1e15 else repr(float(value))
 
 
 def _binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
+    """The bytes of all samples, with their numbers and time stamps."""
     table = np.zeros(recording.samples, row(kind, len(recording.channels), len(recording.status)))
     table["n"] = _numbers(recording)
     good = (stamps >= 0) & (stamps < NONE)
@@ -240,12 +248,14 @@ def _binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
 
 
 def _numbers(recording: Recording) -> np.ndarray:
+    """The samples' own numbers, or 1, 2, ..."""
     own = recording.extra.get("numbers")
     count = recording.samples
     return np.asarray(own) if own is not None and len(own) == count else np.arange(1, count + 1)
 
 
 def _ascii(recording: Recording, stamps: np.ndarray) -> bytes:
+    """The lines of all samples; what is missing is an empty cell."""
     columns = [_cells(_numbers(recording)), _cells(stamps)]
     for channel in recording.channels:
         cells = _cells(np.asarray(channel.raw))
@@ -266,6 +276,9 @@ def _cells(values: np.ndarray) -> list[str]:
 
 
 def _combine_sections(recording: Recording, text: str, kind: str, data: bytes) -> bytes:
+    """One file with the sections of a configuration, of information, of a header and of the
+    data.
+    """
     parts = [b"--- file type: CFG ---\r\n", text.encode()]
     for name, key in (("INF", "information"), ("HDR", "header")):
         said = recording.extra.get(key, "")

@@ -78,6 +78,7 @@ def is_value(cell: Any) -> bool:
 
 
 def _text(cell: Any) -> str:
+    """A cell as text; "" where it is empty."""
     return "" if cell is None else str(cell).strip()
 
 
@@ -168,4 +169,5 @@ def _spread_merged_cells(above: list[str], names: Sequence[str]) -> list[str]:
 
 
 def _pad_texts(texts: Sequence[str], width: int) -> tuple[str, ...]:
+    """Texts and so many empty ones that they are `width`."""
     return (*texts, *("",) * (width - len(texts)))

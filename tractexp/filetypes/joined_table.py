@@ -57,6 +57,7 @@ class JoinedTable(TableFile):
         self.notes = (*self.aligned.notes, *said, *dict.fromkeys(notes))
 
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
+        """The wanted columns {number: kind} of all parts, at the times of the joined table."""
         read: dict[int, TableColumn] = {0: TableColumn(self.t)} if 0 in wanted else {}
         for k, part in enumerate(self.parts):
             own = {self.columns[n - 1][1]: n for n in wanted if n and self.columns[n - 1][0] == k}
@@ -72,6 +73,7 @@ class JoinedTable(TableFile):
         return read
 
     def cells(self, number: int) -> Sequence[Any]:
+        """The cells of a column as its part has them, within the times that all share."""
         if not number:
             return self.t.tolist()
         part, own = self.columns[number - 1]
@@ -79,10 +81,12 @@ class JoinedTable(TableFile):
         return self.parts[part].cells(own)[first : first + self.aligned.count]
 
     def place(self, row: int) -> str:
+        """Where a row stands in the first part."""
         return self.parts[0].place(row + self.aligned.first[0])
 
 
 def _cell(row: Sequence[object], number: int) -> object:
+    """A row's cell; "" where the row is shorter."""
     return row[number] if number < len(row) else ""
 
 
@@ -95,6 +99,9 @@ def _times(part: TableFile) -> tuple[TableTimes, set[int]]:
 
 
 def _describe_samples(part: TableFile, times: TableTimes) -> SampledFile:
+    """Rate, count and begin of a part. Raises `UserError` for too few rows, or times that do not
+    increase.
+    """
     if len(times.t) < 3:
         raise UserError(f"{part.source}: only {len(times.t)} rows; a part of an event needs more")
     steps = np.diff(times.t)

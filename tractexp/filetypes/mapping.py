@@ -48,6 +48,7 @@ class MappedColumn:
 
     @property
     def label(self) -> str:
+        """The column's name in quotes, with its unit."""
         return f"'{self.name}'" + (f" [{self.role.unit}]" if self.role.unit else "")
 
 
@@ -369,6 +370,7 @@ def _kind(
 
 
 def _has(keys: Iterable[str], letter: str) -> bool:
+    """Whether keys hold a quantity, as such or in all phases."""
     return letter in keys or all(letter + p in keys for p in PHASES)
 
 
@@ -386,6 +388,7 @@ def _set(keys: Iterable[str], letter: str, single: Sequence[str]) -> list[str]:
 
 
 def _powers(options: Mapping[str, Any]) -> list[str]:
+    """The keys of U, P and Q, and of what stands beside them; [] where one is missing."""
     U = _set(options, "U", ("U", "U1")) or _some(options, "U")
     P, Q = _set(options, "P", ("P",)), _set(options, "Q", ("Q",))
     if not (U and P and Q):
@@ -533,6 +536,7 @@ def _meant(table: TableFile, options: Mapping[str, list[MappedColumn]], key: str
 
 
 def _increases(table: TableFile, number: int) -> bool:
+    """Whether a column increases in every row of the sample, as times do."""
     cells = [row[number] for row in table.sample if number < len(row)]
     values = [
         float(str(cell).replace(",", "."))

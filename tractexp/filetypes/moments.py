@@ -67,6 +67,7 @@ def times_of(table: TableFile, mapping: Mapped, cells: Mapping[int, TableColumn]
 
 
 def _midnight(day: dt.date) -> dt.datetime:
+    """The first moment of a day."""
     return dt.datetime.combine(day, dt.time())
 
 

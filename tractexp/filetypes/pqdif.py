@@ -227,6 +227,7 @@ def _segments(
 
 
 def _moment(start: tuple[int, float], more: float, remarks: Remarks) -> datetime | None:
+    """The date of so many days since 1900 and seconds; None, with a remark, where it is none."""
     try:
         return ZERO + timedelta(days=start[0], seconds=start[1] + more)
     except OverflowError:

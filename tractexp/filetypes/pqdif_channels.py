@@ -162,6 +162,7 @@ class Observed:
     """
 
     def __init__(self, kinds: Sequence[bytes], remarks: Remarks) -> None:
+        """Nothing observed yet, of quantities of these kinds."""
         self.kinds, self.remarks = kinds, remarks
         self.definitions: list[ChannelDefinition] = []
         self.ratios: dict[int, float] = {}
@@ -169,6 +170,7 @@ class Observed:
         self.station, self.frequency, self.count, self.room = "", 0.0, 0, MOST_UNPACKED_VALUES
 
     def source(self, body: Collection) -> None:
+        """Take in a record that defines the channels."""
         name, channels = body.text(SOURCE_NAME), body.collection(CHANNELS)
         self.station, self.ratios, self.definitions = self.station or name, {}, []
         for each in channels.collections(CHANNEL) if channels else ():
@@ -192,6 +194,7 @@ class Observed:
             self.count += 1
 
     def settings(self, body: Collection) -> None:
+        """Take in a record of settings: the nominal frequency and the ratios of transformers."""
         self.frequency = body.number(FREQUENCY) or self.frequency
         listed, self.ratios = body.collection(CHANNEL_SETTINGS), {}
         if not body.number(USE_RATIO):
@@ -202,6 +205,7 @@ class Observed:
                 self.ratios[int(each.number(NUMBER, -1))] = primary / secondary
 
     def observation(self, body: Collection) -> None:
+        """Take in a record of samples."""
         start, listed = body.moment(START), body.collection(INSTANCES)
         if start is None or listed is None:
             self.remarks.add(
@@ -319,6 +323,9 @@ class Observed:
         return np.concatenate([[0.0], np.cumsum(rises)[:-1]]) if len(rises) else rises
 
     def _take(self, one: "_Series", count: float) -> None:
+        """Count values that are unpacked. Raises `UserError` where a small file stands for too
+        many.
+        """
         self.room -= count
         if self.room < 0:
             raise UserError(
@@ -337,10 +344,12 @@ class _Series:
 
     @property
     def raw(self) -> np.ndarray | None:
+        """The stored values; None where there are none."""
         return self.owner.vector(VALUES)
 
     @property
     def length(self) -> int:
+        """How many values are stored."""
         raw = self.raw
         return 0 if raw is None else len(raw)
 
@@ -353,6 +362,7 @@ class _Stored:
     """An instance of a channel as it is stored."""
 
     def __init__(self, instance: Collection) -> None:
+        """A channel's number and its series, as an observation stores them."""
         listed = instance.collection(SERIES)
         self.number = int(instance.number(NUMBER, -1))
         self.series = list(listed.collections(ONE_SERIES)) if listed else []
@@ -371,4 +381,5 @@ class _Stored:
 
 
 def _record(body: Collection) -> str:
+    """Which record of the file it is, for remarks."""
     return body.body.where.rpartition(": ")[2]

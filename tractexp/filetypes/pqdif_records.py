@@ -85,6 +85,7 @@ class Body:
         return np.frombuffer(self.data, dtype, count, at) if count else np.empty(0, dtype)
 
     def describe_damage(self, why: str) -> UserError:
+        """The error of a damaged file, with the place."""
         return UserError(
             f"{self.where}: {why}: the file is damaged; get it from the recorder again"
         )
@@ -116,6 +117,7 @@ class Collection:
                 yield Collection(self.body, link)
 
     def collection(self, name: bytes) -> "Collection | None":
+        """The first collection of that name; None without."""
         return next(self.collections(name), None)
 
     def vectors(self, name: bytes) -> Iterator[np.ndarray]:
@@ -126,6 +128,7 @@ class Collection:
                 yield self.body.part(link + 4, count, np.dtype(TYPES[type_]))
 
     def vector(self, name: bytes) -> np.ndarray | None:
+        """The first vector of that name; None without."""
         return next(self.vectors(name), None)
 
     def texts(self, name: bytes) -> list[str]:
@@ -138,6 +141,7 @@ class Collection:
         return [decode(each, self.body.where, self.body.encoding)[0].strip() for each in texts]
 
     def text(self, name: bytes) -> str:
+        """The first text of that name; "" without."""
         return next(iter(self.texts(name)), "")
 
     def scalar(self, name: bytes) -> Any:
@@ -282,6 +286,9 @@ def _compression(container: Collection, where: str) -> bool:
 
 
 def _decompress_body(content: bytes, room: int, where: str) -> bytes:
+    """The bytes of a compressed body. Raises `UserError` where it is damaged, or larger than
+    `room`.
+    """
     inflate = zlib.decompressobj()
     try:
         body = inflate.decompress(content, room + 1)

@@ -52,6 +52,9 @@ class Results(TableFile):
         )
 
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
+        """The wanted columns {number: kind}, each from the file that has it; the first file has the
+        time.
+        """
         cells: dict[int, TableColumn] = {}
         for part in self.parts:
             first = part is self.parts[0]  # whose time is that of all
@@ -73,10 +76,12 @@ class Results(TableFile):
         return cells
 
     def cells(self, number: int) -> Sequence[str]:
+        """The cells of a column, as its file has them."""
         part, own = self.columns[number - 1] if number else (self.parts[0], 0)
         return part.cells(own)
 
     def place(self, row: int) -> str:
+        """Where a row stands in the first file."""
         return self.parts[0].place(row)
 
 

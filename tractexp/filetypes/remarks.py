@@ -11,6 +11,7 @@ class Remarks:
     """
 
     def __init__(self, where: str) -> None:
+        """No remarks yet on a file."""
         self.where = where
         self._lines: dict[str, list[int]] = {}
 
@@ -26,6 +27,7 @@ class Remarks:
 
 
 def _places(lines: list[int]) -> str:
+    """ ", line 3" or ", lines 3, 4 and 7 more"."""
     if not lines:
         return ""
     if len(lines) == 1:

@@ -65,6 +65,9 @@ def _take_kind(kind: type[Any], content: Mapping[str, Any], key: str) -> Any:
 
 
 def _window(file: Any, content: Any) -> Window | None:
+    """The recorder's window; None where the sidecar has none. Raises `UserError` for another
+    form.
+    """
     if not isinstance(content, dict):
         return None
     try:

@@ -49,6 +49,7 @@ class TableForm:
     join: tuple[str, ...] = ()  # further files of the same event
 
     def check(self) -> None:
+        """Raise `UserError` for a decimal mark that is none, or a heading before line 1."""
         check_choice("data.decimal", self.decimal, ("", ".", ","))
         if self.header is not None and self.header < 1:
             raise UserError(f"{DATA.header}={self.header} is no line; lines are counted from 1")
@@ -109,6 +110,7 @@ class TableFile(ABC):
         return self.heading.names[number] or f"{number} (from 0)"
 
     def refuse(self, row: int, number: int, why: str) -> UserError:
+        """The error that a cell is, with its place and column."""
         return UserError(f"{self.source}: {self.place(row)}, column {self.label(number)}: {why}")
 
 
@@ -150,12 +152,17 @@ class Rows(TableFile):
         )
 
     def cells(self, number: int) -> Sequence[Any]:
+        """The cells of a column."""
         return self.columns(number)
 
     def place(self, row: int) -> str:
+        """ "row 12", as the program counts that shows the table."""
         return f"{self.word} {self.first + row}"
 
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
+        """The wanted columns {number: kind}. Raises `UserError` with the place of a cell that
+        cannot be read.
+        """
         columns = {}
         for number, kind in wanted.items():
             try:
@@ -245,6 +252,7 @@ def content(path: str, limit: int | None = None) -> bytes:
 
 
 def _parquet(path: str, data: bytes) -> TableFile:
+    """A Parquet file as a table. Raises `UserError` for one that is damaged or too large."""
     import pyarrow
     from pyarrow import parquet
 
@@ -297,6 +305,7 @@ def _sheet(path: str, data: bytes, form: TableForm) -> TableFile:
 
 
 def _sheet_of(path: str, book: Workbook, form: TableForm) -> TableFile:
+    """The sheet that is named, else the first that can be read as a table."""
     names = book.names
     if form.sheet is not None:
         return _rows_of(path, book, _sheet_name(path, names, form.sheet), form)
@@ -318,6 +327,7 @@ def _sheet_of(path: str, book: Workbook, form: TableForm) -> TableFile:
 
 
 def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
+    """The name of a sheet, given by its name or number. Raises `UserError` with those there are."""
     if str(sheet) in names:
         return str(sheet)
     if str(sheet).isdigit() and 1 <= int(sheet) <= len(names):
@@ -328,6 +338,7 @@ def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
 
 
 def _rows_of(path: str, book: Workbook, name: str, form: TableForm) -> Rows:
+    """A sheet as a table. Raises `UserError` where it cannot be read."""
     try:
         rows = book.rows(name)
     except BadWorkbook as bad:

@@ -131,9 +131,11 @@ class TextTable(TableFile):
         self.data = head + line_end if shorter else self.data
 
     def cells(self, number: int) -> list[str]:
+        """The cells of a column."""
         return [row[number] for _, row in self._rows(number)]
 
     def place(self, row: int) -> str:
+        """ "line 12" of the file; comments and blank lines count."""
         if self._lines is not None and row < len(self._lines):
             return f"line {self._lines[row]}"
         body = ((n, text) for n, text in enumerate(io.BytesIO(self.data), 1) if n >= self.line)
@@ -141,11 +143,15 @@ class TextTable(TableFile):
         return f"line {next((n for k, n in enumerate(rows) if k == row), row)}"
 
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
+        """The wanted columns {number: kind}: all at once where they are plain numbers, else cell by
+        cell.
+        """
         texts = [n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)]
         columns = None if texts or self.group else self._at_once(list(wanted))
         return self._cell_by_cell(wanted) if columns is None else columns
 
     def _is_clock(self, number: int) -> bool:
+        """Whether a column holds times of the day."""
         cell = self.sample[0][number]
         return is_time(cell) and not is_number(cell, self.decimal)
 
@@ -226,6 +232,7 @@ class TextTable(TableFile):
             self.notes += (f"line {short[0]}, the last one, is cut short and not used",)
 
     def _describe_ragged_line(self, line: int, cells: int) -> UserError:
+        """The error of a line with more or fewer cells than the others."""
         return UserError(
             f"{self.source}: line {line} has {count_noun(cells, 'cell')} where the others have"
             f" {self.width}; a "
@@ -298,6 +305,7 @@ def _decimals(cell: str, mark: str) -> int:
 
 
 def _is_value(cell: str) -> bool:
+    """Whether a cell is a number in some notation, or a time."""
     return is_number(cell) or is_number(cell, ",") or is_grouped(cell) or is_time(cell)
 
 

@@ -62,6 +62,7 @@ class Tabular:
 
     @property
     def _form(self) -> TableForm:
+        """How the table is written, as the settings say."""
         return TableForm(self.decimal, self.header, self.sheet, self.encoding)
 
     def table_of(
@@ -165,6 +166,9 @@ def _tune_nominal_frequency(result: Powers, declared: float, source: MappedColum
 
 
 def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
+    """U, P and Q of a table that has them, phases added up, with time, f and U2 where they are
+    there.
+    """
     _check_power_units(table, mapping)
     values, start, said = _read(table, mapping)
     columns, notes = {"t": values["t"]}, [*mapping.notes, *said]
@@ -261,6 +265,7 @@ def _by_power(columns: Mapping[str, np.ndarray], current: np.ndarray) -> bool | 
 
 
 def _absolute(mapping: Mapped, key: str) -> bool | None:
+    """Whether a column is in V, A, W or the like; None where it names no unit."""
     unit = mapping.columns[key].role.unit.strip().lower()
     return None if not unit else unit not in PER_UNIT
 
@@ -292,6 +297,7 @@ def _read(
 
 
 def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
+    """U, P and Q of a table of voltages and currents by size and angle."""
     values, start, note = _read(table, mapping)
     values, absolute = _in_units(table, mapping, values)
     keys = {

@@ -59,6 +59,9 @@ def from_rates(rates: Sequence[tuple[float, int]], t: np.ndarray | None = None) 
 
 
 def _build_declared_stretch(group: list[tuple[float, int, int]], start: float) -> Stretch:
+    """One stretch of samples at declared rates [(rate, first, stop)], resampled where they
+    differ.
+    """
     first, stop = group[0][1], group[-1][2]
     if len({rate for rate, _, _ in group}) == 1:
         return Stretch(Segment(first, stop, group[0][0], start), first, stop)
@@ -130,6 +133,7 @@ def _gap(edges: list[int], k: int) -> bool:
 
 
 def _build_stamped_stretch(t: np.ndarray, unit: float, first: int, stop: int) -> Stretch:
+    """One stretch of samples at stamped times, resampled where those are uneven."""
     own = t[first:stop]
     length = float(own[-1] - own[0])
     rate = (len(own) - 1) / length
@@ -183,15 +187,18 @@ def nearest(raw: np.ndarray, stretches: Sequence[Stretch]) -> np.ndarray:
 
 
 def _even(s: Stretch) -> np.ndarray:
+    """The even times [s] of a stretch."""
     return s.segment.start + np.arange(s.stop - s.first) / s.segment.rate
 
 
 def _closest(t: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The index of the closest time to each one that is wanted."""
     right = np.clip(np.searchsorted(t, wanted), 1, len(t) - 1)
     return np.where(wanted - t[right - 1] <= t[right] - wanted, right - 1, right)
 
 
 def _interpolate_stretch(raw: np.ndarray, s: Stretch, missing: float | None) -> np.ndarray:
+    """A stretch's values at even times, by cubic splines; what is missing stays so."""
     from scipy.interpolate import CubicSpline
 
     values = raw.astype(np.float64)

@@ -44,12 +44,15 @@ class Workbook:
             raise
 
     def __enter__(self) -> Self:
+        """The open workbook."""
         return self
 
     def __exit__(self, *_: object) -> None:
+        """Close it."""
         self.close()
 
     def close(self) -> None:
+        """End the process that reads it."""
         self._reader.kill()
         with contextlib.suppress(BrokenPipeError):  # what it has not read any more
             self._reader.communicate()
@@ -61,6 +64,7 @@ class Workbook:
         return self._answer(name)
 
     def _answer(self, question: object) -> Any:
+        """What the reading process answers. Raises `BadWorkbook` where it has ended."""
         stdin, stdout = self._reader.stdin, self._reader.stdout
         assert stdin is not None
         assert stdout is not None
@@ -112,10 +116,12 @@ def _serve(memory: int, seconds: int) -> None:
 
 
 def _question() -> Any:
+    """The next question, in the reading process."""
     return pickle.load(sys.stdin.buffer)
 
 
 def _give(answer: Any) -> None:
+    """Give an answer, in the reading process."""
     pickle.dump(answer, sys.stdout.buffer)
     sys.stdout.buffer.flush()
 

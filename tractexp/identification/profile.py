@@ -210,7 +210,9 @@ class _Drawing:
     """Profiles of some parameters (k,) about one optimum, as their lanes go on."""
 
     def __init__(self, uncertainty: Uncertainty, column: np.ndarray):
-        """Draw the profiles of the parameters `column` (k,) of an estimate; nothing is drawn yet."""
+        """Draw the profiles of the parameters `column` (k,) of an estimate; nothing is drawn
+        yet.
+        """
         self.uncertainty, self.column = uncertainty, column
         self.curves: list[LikelihoodProfile] = []
         self.region = Region(

@@ -67,7 +67,9 @@ def network_in_words(poles: int) -> str:
 
 
 def _sentence(ratio: float | None, model: float, poles: int, on: str) -> str:
-    """How the model's error stands beside that of the best network, on the events that `on` names."""
+    """How the model's error stands beside that of the best network, on the events that `on`
+    names.
+    """
     network = network_in_words(poles)
     if not np.isfinite(model):
         return f"{STALL} in the physical model {on}, beside {network}"

@@ -45,7 +45,9 @@ def narrow_bounds(
 
 
 def _check_name(name: str, by_name: Mapping[str, object], where: str) -> None:
-    """Raise `UserError` for a parameter that the model lacks; `where` is the setting that names it."""
+    """Raise `UserError` for a parameter that the model lacks; `where` is the setting that names
+    it.
+    """
     if name not in by_name:
         lack = f"this model has no parameter '{name}'{among(name, by_name, 'Parameters')}"
         raise UserError(f"{setting(where)}.{name}: {lack}")

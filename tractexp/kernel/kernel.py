@@ -173,7 +173,9 @@ class Kernel:
 
 
 def _check(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype = NUMBERS) -> None:
-    """Raise ValueError for an array of another shape, order or type than the compiled code reads."""
+    """Raise ValueError for an array of another shape, order or type than the compiled code
+    reads.
+    """
     if array.shape == shape and array.flags.c_contiguous and array.dtype == kind:
         return
     order = "" if array.flags.c_contiguous else ", not C-contiguous"

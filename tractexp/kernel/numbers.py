@@ -173,7 +173,9 @@ class Numbers:
         return self.f.fresh(f"load {self.kind}, ptr {address}, align {alignment or 8 * self.width}")
 
     def store(self, a: str, address: str, alignment: int | None = None) -> None:
-        """Write numbers to an address; doubles one after the other are aligned to the whole vector."""
+        """Write numbers to an address; doubles one after the other are aligned to the whole
+        vector.
+        """
         self.f.do(f"store {self.kind} {a}, ptr {address}, align {alignment or 8 * self.width}")
 
     def ramp(self, first: str) -> str:

@@ -200,7 +200,9 @@ def check_numbers(train: Sequence[int] | None, validate: Sequence[int] | None) -
 
 
 def _pick_dip(where: str, number: int, results: Mapping[int, Record | UserError]) -> Record:
-    """The record of a dip by its number from 1. Raises `UserError` with the dips that can be used."""
+    """The record of a dip by its number from 1. Raises `UserError` with the dips that can be
+    used.
+    """
     usable = ", ".join(
         f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s"
         for n, r in results.items()

@@ -41,6 +41,9 @@ def records(folder: Path, names: list[str], where: str) -> list[Record]:
 def _record(
     folder: Path, name: str, where: str, see: "functools._lru_cache_wrapper[View]"
 ) -> Record:
+    """The record of an event by its name, FILE#LOAD.DIP. Raises `UserError` with what the file has
+    instead.
+    """
     parts = NAMED.fullmatch(name)
     path, load, dip = folder / name, 1, None
     if not files.exists(path) and parts is not None:
@@ -67,6 +70,9 @@ def _record(
 
 
 def _select(shown: Sight, dip: int | None, where: str) -> LoadEvent:
+    """The event of a load by its number, or the only one that is worth fitting. Raises `UserError`
+    with the reason.
+    """
     matches = [s for s in shown.events if (s.worth if dip is None else s.dip == dip)]
     if not matches or matches[0].event is None:
         reasons = [f"dip {s.dip}: {s.why}" for s in shown.events if s.dip is not None] or [

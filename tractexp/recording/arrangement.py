@@ -78,6 +78,9 @@ class _OtherOrder(UserError):
     def __init__(
         self, why: str, remedy: str, voltages: Sequence[int], currents: Sequence[int]
     ) -> None:
+        """Why an order of channels cannot be right, what mends it, and the channels in the order
+        that may.
+        """
         super().__init__(f"{why}{remedy}")
         self.why, self.voltages, self.currents = why, tuple(voltages), tuple(currents)
 
@@ -249,6 +252,7 @@ def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
 
 
 def _zero(x: np.ndarray) -> np.ndarray:
+    """The size of the zero sequence of three channels (3, N)."""
     return np.abs(x.mean(axis=0))
 
 
@@ -386,6 +390,7 @@ def _find_reversed_phase(X: np.ndarray) -> int | None:
 
 
 def _describe_arrangement(voltages: Sequence[int] | None, currents: Sequence[int]) -> str:
+    """The settings that name these channels."""
     currents_text = f"{DATA.currents}=[{', '.join(map(str, currents))}]"
     return (
         currents_text
@@ -395,6 +400,7 @@ def _describe_arrangement(voltages: Sequence[int] | None, currents: Sequence[int
 
 
 def _name_channel(recording: Recording, number: int) -> str:
+    """ "channel 4 'Ia'"."""
     return f"channel {number} '{recording.channels[number].name}'"
 
 
@@ -443,6 +449,7 @@ def _is_balanced(live: _LivePhasors, permutation: tuple[int, ...]) -> bool:
 
 
 def _letters(places: Sequence[int]) -> str:
+    """ "A, C" of the places 0 and 2."""
     return ", ".join("ABC"[k] for k in places)
 
 
@@ -454,10 +461,12 @@ def _power(live: _LivePhasors, permutation: tuple[int, ...]) -> complex:
 
 
 def _angle(S: complex | np.complexfloating) -> float:
+    """The angle of a power [degrees]."""
     return float(np.degrees(np.angle(S)))
 
 
 def _mw(S: complex) -> str:
+    """ "P = 12 MW, Q = 3 Mvar"."""
     P, Q = (0.0 if abs(x) < 1e-6 * abs(S) else x for x in (S.real, S.imag))
     return f"P = {P:.3g} MW, Q = {Q:.3g} Mvar"
 
@@ -520,6 +529,7 @@ def _negative(
 
 
 def _refuse(feeder: Feeder, live: _LivePhasors, permutation: tuple[int, ...], why: str) -> None:
+    """Raise the error that proposes currents in another order."""
     proposal = tuple(feeder.currents[k] for k in permutation)
     raise _OtherOrder(
         f"{DATA.currents}={[*feeder.currents]}: {why}",

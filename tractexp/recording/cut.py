@@ -49,6 +49,7 @@ def cut_recording(recording: Recording, begin: float, end: float) -> Recording:
 
 
 def _part(channel: Any, parts: list[slice]) -> Any:
+    """A channel's samples within some stretches, one after the other."""
     raw = np.asarray(channel.raw)
     return replace(
         channel,

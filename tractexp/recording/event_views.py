@@ -36,6 +36,9 @@ def settings_of(path: str, *join: str) -> dict[str, Any]:
 
 
 def _settings_of_archive(archive: Path) -> dict[str, Any]:
+    """The settings that read what a packed archive holds. Raises `UserError` where it holds no
+    record.
+    """
     inside = [str(path) for path in find_packed(archive)]
     if not inside:
         names = [str(path.relative_to(archive)) for path in files.list_packed(archive)]

@@ -313,6 +313,7 @@ def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
 
 
 def _unit(x: np.ndarray) -> np.ndarray:
+    """Complex numbers of the same angles and of size 1; 1 where they are 0."""
     size = np.abs(x)
     return np.where(size > 0, x, 1) / np.where(size > 0, size, 1)
 
@@ -401,6 +402,7 @@ def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
 
 
 def _names(recording: Recording, numbers: Sequence[int]) -> str:
+    """ "4 'Ia', 5 'Ib'"."""
     return ", ".join(f"{i} '{recording.channels[i].name}'" for i in numbers)
 
 
@@ -478,6 +480,7 @@ def _named_alike(
 
 
 def _text(recording: Recording, group: Group) -> set[str]:
+    """The words that all channels of a group share, by which voltages and currents are matched."""
     channels = [recording.channels[i] for i in group.numbers]
     shared = set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
     if len(channels) == 1:  # a phase is a name of its own there: "Ia" goes with "Ua"
@@ -659,6 +662,7 @@ def _dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:
 
 
 def _never_turn(phasors: Snapshots, numbers: Sequence[int]) -> bool:
+    """Whether no part of a record shows these channels as phasors of the grid's frequency."""
     if len(numbers) < 3:
         return not any(phasors.pure(i) for i in numbers)
     X = np.nan_to_num(phasors.select_channels(numbers))

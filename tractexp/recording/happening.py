@@ -379,6 +379,7 @@ def _smooth(u: np.ndarray, k: int, trace: Trace) -> bool:
 
 
 def _even(t: np.ndarray) -> bool:
+    """Whether times (n,) [s] follow one another as those of a swing do."""
     steps = np.diff(t)
     low, high = SWING_PERIOD
     return bool(

@@ -63,5 +63,6 @@ def _describe_direction(shown: "Sight", share: float, drawing: Sequence[str]) ->
 
 
 def _replace_cause(event: "LoadEvent", cause: str) -> "LoadEvent":
+    """The event with another cause of its negative power."""
     before, mark, _ = event.why.partition(NEGATIVE)
     return replace(event, why=f"{before}{mark}{cause}") if mark else event

@@ -71,10 +71,12 @@ def _align(recordings: Sequence[Recording]) -> Alignment:
 
 
 def _shape(segment: Segment) -> tuple[float, ...]:
+    """What segments of files must share to be joined without moving a sample."""
     return segment.first, segment.stop, round(segment.rate, 3), round(segment.start, 6)
 
 
 def _describe_samples(recording: Recording) -> SampledFile:
+    """Rate, count and begin of a recording of one segment."""
     (segment,) = recording.segments
     begun = recording.start and recording.start + timedelta(seconds=segment.start)
     count = segment.stop - segment.first

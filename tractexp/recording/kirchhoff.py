@@ -84,6 +84,9 @@ def _closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
 def _describe_closure(
     feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, closes: float
 ) -> "list[Feeder]":
+    """The feeders, each told that the currents of all close, and which of them are counted
+    backward.
+    """
     marked = list(feeders)
     out = [feeders[k].name for k, s in zip(loaded, signs, strict=True) if s == 0]
     for k, sign in zip(loaded, signs, strict=True):

@@ -126,6 +126,7 @@ def find_residuals(channels: Sequence[Channel]) -> list[int]:
 
 
 def _is_hour(name: str, names: Collection[str]) -> bool:
+    """Whether 0, 4 and 8 in a name are the hours of a clock by which phases are called."""
     return "0" in name and all(name.replace("0", hour) in names for hour in "48")
 
 
@@ -173,6 +174,7 @@ def phase(channel: Channel, orders: Sequence[str] = ORDERS) -> str:
 
 @functools.lru_cache(maxsize=MOST_KNOWN_NAMES)
 def _read_phase(label: str, orders: tuple[str, ...]) -> str:
+    """The phases of a label, by one of these orders of letters; "" where it names none."""
     label = re.sub(r"phasen?|phase|fase|фaзa|[-_/ 相]", "", plain(label))
     label = re.sub(r"(?<=.)(?:n|g|e|pe|gnd)$", "", label)  # to ground, as a phase by itself is
     for text in (label, label.removeprefix("l"), label[1:] if label[:1] in QUANTITY else ""):
@@ -288,6 +290,9 @@ def _marks(text: str) -> tuple[tuple[str, str, bool, int, float], ...]:
 
 
 def _read_marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
+    """(name without its marks, letters, whether it is two phases, its place, how likely) of each
+    reading.
+    """
     for letters in ORDERS:
         for mark in pairs(text, letters):
             x, y = mark.places

@@ -33,6 +33,9 @@ class FeederWaves:
     def from_recording(
         cls, recording: Recording, feeder: Feeder, segment: Segment
     ) -> "FeederWaves":
+        """Voltages and currents of a feeder in one segment, as its connection adds up the
+        channels.
+        """
         connection = chosen("connection", feeder.connection)
         V, I = (
             connection.voltage(),
@@ -50,9 +53,11 @@ class FeederWaves:
 
     @property
     def shape(self) -> tuple[int, int]:
+        """(sums, samples)."""
         return len(self.sums), self.segment.stop - self.segment.first
 
     def __getitem__(self, at: tuple[slice, slice]) -> np.ndarray:
+        """A part of the sums, read from the file when it is asked for."""
         sums, (first, stop, _) = self.sums[at[0]], at[1].indices(self.shape[1])
         part = replace(
             self.segment, first=self.segment.first + first, stop=self.segment.first + stop

@@ -181,4 +181,5 @@ def _first_mark(text: str, letters: str) -> PhaseMark | None:
 
 
 def _ends(text: str, at: int) -> bool:
+    """Whether a mark ends at a place of a text."""
     return re.compile(END).match(text, at) is not None

@@ -204,10 +204,12 @@ class DirectVoltage:
 
     @property
     def alternates(self) -> bool:
+        """Whether it is an alternating voltage."""
         return not self.is_direct and self.alternating > DIRECT * abs(self.mean)
 
     @property
     def is_direct(self) -> bool:
+        """Whether it is a direct voltage."""
         return abs(self.mean) > DIRECT * max(self.alternating, self.greatest / 20)
 
     def describe(self, name: str, start: float = 0.0) -> str:

@@ -103,6 +103,7 @@ class WaveformReader(Reader):
         """
 
     def check(self) -> None:
+        """Raise `UserError` for settings that cannot be."""
         if not self.path:
             raise UserError(
                 f"{DATA.path} is missing: give the file, e.g. {DATA.path}=station{self.endings[0]}"
@@ -114,6 +115,7 @@ class WaveformReader(Reader):
         check_range("data.post", self.post, 0.1)
 
     def read(self) -> Events:
+        """The dips that are fitted and held out, as phasors, with what was noted on the way."""
         recording = self.open_recording()
         feeder = self.feeder(recording)
         dips = self.dips(
@@ -314,6 +316,7 @@ class WaveformReader(Reader):
     def _notes(
         self, recording: Recording, feeder: Feeder, dips: Sequence[FileDip]
     ) -> tuple[str, ...]:
+        """How phasors were made, how many dips there are, and what recording and feeder say."""
         kind = estimator_of(self.estimator).name.replace("_", "-")
         steps = [dip.result.step for dip in dips if isinstance(dip.result, Record)]
         every = f" every {1000 * steps[0]:.3g} ms" if steps else ""

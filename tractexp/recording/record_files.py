@@ -103,6 +103,7 @@ def _holds_numbers(line: bytes) -> bool:
 
 
 def _is_number(cell: bytes) -> bool:
+    """Whether a cell is a number."""
     try:
         float(cell)
     except ValueError:

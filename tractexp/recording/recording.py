@@ -198,6 +198,7 @@ class Recording:
 
     @property
     def samples(self) -> int:
+        """How many samples each channel has."""
         return len(self.channels[0].raw)
 
     def waveforms(self) -> list[Segment]:

@@ -56,6 +56,7 @@ class Snapshots:
         return self.remember(("pure", number), lambda: self._turns(number))
 
     def _turns(self, number: int) -> bool:
+        """Whether a channel is mostly a phasor where it is large."""
         k = self.numbers.index(number)
         size = np.abs(self.X[k])
         if not np.isfinite(size).any() or np.nanmax(size) == 0:
@@ -79,6 +80,7 @@ class Snapshots:
         return self.remembered[key]
 
     def _size(self, numbers: Sequence[int]) -> float:
+        """The size that channels keep for a while, which no short pulse has."""
         size = np.nan_to_num(np.abs(self.select_channels(numbers))).mean(axis=0)
         if not len(size):
             return 0.0
@@ -113,6 +115,9 @@ def snapshots(
 def _windows(
     recording: Recording, numbers: Sequence[int], segment: Segment, f: float
 ) -> tuple[np.ndarray, ...]:
+    """Phasors of whole cycles spread over a segment: start [s], phasor and rest of each channel;
+    measured once.
+    """
     n = round(segment.rate / f)
     count = (segment.stop - segment.first) // n
     firsts = np.unique(np.linspace(0, count - 1, min(count, MOST_WINDOWS)).astype(int)) * n

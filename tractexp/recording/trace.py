@@ -32,6 +32,7 @@ class Trace:
 
     @property
     def step(self) -> float:
+        """The time between two samples [s]."""
         return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
 
     def without_currents(self) -> "Trace":

@@ -65,6 +65,7 @@ def mark_other_sides(
 
 
 def _size(phasors: Snapshots, feeder: "Feeder") -> float:
+    """How large the currents of a feeder are."""
     return phasors.size(feeder.currents)
 
 

@@ -155,6 +155,7 @@ def _note(channels: Sequence[Channel], taken: Mapping[str, Sequence[int]]) -> li
 
 
 def _of_unit(channel: Channel, quantity: str, unit: str, number: float = 1.0) -> Channel:
+    """A channel of another quantity and unit, of which its own is `number`."""
     gain, offset = number * channel.gain, number * channel.offset
     return replace(channel, unit=unit, quantity=quantity, gain=gain, offset=offset, side="")
 

@@ -58,6 +58,7 @@ def plugins_of(package: str) -> list[type[Plugin]]:
 def _test(
     check: Callable[..., None], about: str | None, members: Sequence[type[Plugin]]
 ) -> Callable[..., None]:
+    """A test that runs one check on each plugin."""
     import pytest
 
     @pytest.mark.parametrize("cls", members, ids=lambda cls: cls.name)

@@ -57,6 +57,9 @@ def drive(*depths: float, domain: str = "", power: float = 1.0) -> Drive:
 
 
 def _waves(v: np.ndarray, v_zero: np.ndarray, theta: np.ndarray, rate: float) -> WaveformDrive:
+    """A drive of sampled voltages (N,) that turn by theta (N,) [rad], at the power that tests
+    share.
+    """
     turn, n = np.exp(1j * theta), round(rate / 100)
     slow = np.convolve(np.concatenate([np.full(n - 1, v[0]), v]), np.full(n, 1 / n), "valid")
     U0, still = abs(v[0]), np.zeros((3, len(v)))
@@ -66,5 +69,6 @@ def _waves(v: np.ndarray, v_zero: np.ndarray, theta: np.ndarray, rate: float) ->
 
 
 def _event(U: np.ndarray, step: float, speed: np.ndarray, U2: np.ndarray) -> Excitation:
+    """A drive of phasors at the power that tests share."""
     P, Q = np.full(len(U), P0), np.full(len(U), Q0)
     return Excitation(step, U, P, Q, U[0], P0, Q0, speed, speed[0], U2=U2, U20=U2[0])

@@ -58,6 +58,7 @@ def _moves(cls: type[Motor]) -> bool:
 
 
 def _all(group: str) -> list[type]:
+    """The plugins of a group, in order of name."""
     return [cls for _, cls in sorted(discover().get(group, {}).items())]
 
 
@@ -447,6 +448,7 @@ def is_taken_or_refused_by_every_model(cls: type[Effect]) -> None:
 
 
 def _reason(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
+    """Why an effect does not fit a motor and a static load; None where it does."""
     try:
         return _explain_refused_base(motor, static, cls)
     except UserError as error:

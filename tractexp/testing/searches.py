@@ -20,9 +20,11 @@ class Bowl:
     best: np.ndarray = np.array([0.3, 0.07, 14.0])
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
+        """The distance (n, d) of points from the minimum, in widths of the box."""
         return (values - self.best) / (self.upper - self.lower)
 
     def objective(self, values: np.ndarray) -> np.ndarray:
+        """The sum of their squares (n,)."""
         return (self.residuals(values) ** 2).sum(axis=1)
 
 
@@ -30,9 +32,11 @@ class Noted(Bowl):
     """The same, which also stores every batch."""
 
     def __init__(self) -> None:
+        """No batch was asked for yet."""
         self.batches: list[np.ndarray] = []
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
+        """As the bowl's; the points are kept."""
         self.batches.append(values)
         return super().residuals(values)
 
@@ -108,6 +112,7 @@ def finds_the_bottom_of_a_bowl(cls: type[Optimizer]) -> None:
 
 
 def _run(cls: type[Optimizer], problem: Bowl, seed: int, space: str = "unit") -> SearchResult:
+    """What an optimizer finds within the tests' budget."""
     return search(problem, cls(space=space), seed, Limits(BUDGET))
 
 
