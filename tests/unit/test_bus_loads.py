@@ -59,6 +59,20 @@ class TestBothSidesOfATransformer:
         assert [load["loaded"] for load in loads.values()] == [True, False]
         assert loads["I1"]["P"] == pytest.approx(20, rel=0.01)
 
+    @pytest.mark.parametrize("turn", [1, -1])
+    def test_the_only_two_currents_that_are_one_need_no_turn(self, tmp_path, turn):
+        one = currents(20, 8)
+        groups = ("CT1 I", one), ("CT2 I", turn * 110 / 20 * one)
+        loads, first, page = station(tmp_path, ("U ", voltages()), *groups)
+        assert [load["loaded"] for load in loads.values()] == [True, False]
+        assert "of CT1 is worth fitting" in first
+        assert "CT2: no load here: the same current as that of CT1 times 5.5" in page
+
+    def test_three_feeders_of_like_loads_are_three(self, tmp_path):
+        groups = [(f"CT{k} I", currents(10 * k, 4 * k)) for k in (1, 2, 4)]
+        loads, _, _ = station(tmp_path, ("U ", voltages()), *groups)
+        assert all(load["loaded"] for load in loads.values())
+
     def test_two_feeders_of_like_loads_are_two(self, tmp_path):
         groups = ("F1 I", currents(40, 16)), ("F2 I", currents(10, 4))
         loads, _, page = station(tmp_path, ("U ", voltages()), *groups)
@@ -115,3 +129,26 @@ def test_channels_that_make_no_sense_are_not_worth_fitting(tmp_path):
     loads, first, _ = station(tmp_path, ("U ", phasors), ("F1 I", currents(20, 8)))
     assert first.startswith("nothing is worth fitting")
     assert loads["F1"]["command"] == ""
+
+
+class TestCouplers:
+    feeders = {"F1": (20, 8, 1.5), "F2": (6, 1, 1.1), "F3": (12, 5, 1.9), "F4": (3, 2, 1.4)}
+
+    @pytest.mark.parametrize(
+        "name", ["Couplage", "Tronçonnement", "Bus section", "BUS-SEC", "B/C", "QBC", "СВ", "Tie"]
+    )
+    def test_names_of_other_languages_tell_a_coupler(self, tmp_path, name):
+        F1, F2, F3 = (currents(P, Q, exponent=a) for P, Q, a in [*self.feeders.values()][:3])
+        groups = ("T1 I", -(F1 + F2 + 2 * F3)), ("F1 I", F1), ("F2 I", F2), (f"{name} I", 2 * F3)
+        loads, first, _ = station(tmp_path, ("U ", voltages()), *groups)
+        assert [key for key, load in loads.items() if not load["loaded"]] == [name]
+        assert "of F1 is worth fitting" in first
+
+    def test_between_two_buses_it_carries_the_sum_of_one(self, tmp_path):
+        F1, F2, F3, F4 = (currents(P, Q, exponent=a) for P, Q, a in self.feeders.values())
+        T1, T2 = (-share * (F1 + F2 + F3 + F4) for share in (0.7, 0.3))
+        one = ("B1 T1 I", T1), ("B1 F1 I", F1), ("B1 F2 I", F2)
+        two = ("B2 T2 I", T2), ("B2 F3 I", F3), ("B2 F4 I", F4)
+        buses = ("U B1 ", voltages()), ("U B2 ", voltages())
+        loads, _, _ = station(tmp_path, *buses, *one, ("BAY5 I", -(T1 + F1 + F2)), *two)
+        assert [key for key, load in loads.items() if not load["loaded"]] == ["BAY5"]

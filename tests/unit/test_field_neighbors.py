@@ -184,3 +184,78 @@ def test_a_direct_voltage_without_a_current_is_said_to_be_one(tmp_path, name):
     _, first, _ = loads_of(path)
     assert "is direct: 1500 V in the mean with a ripple of 1.4% RMS" in first
     assert "(30.0%) at 1.000 s for 250 ms" in first
+
+
+def station(V, I):
+    rows = [(f"U{p}", "kV", x) for p, x in zip("ABC", V, strict=True)]
+    return rows + [(f"I{p}", "kA", x) for p, x in zip("ABC", I, strict=True)]
+
+
+@pytest.mark.parametrize("line", [False, True])
+def test_values_of_secondary_size_show_no_megawatts_whatever_the_file_says(tmp_path, line):
+    V, I = three()
+    marks = ("AB", "BC", "CA") if line else "ABC"
+    V = V - V[[1, 2, 0]] if line else V
+    rows = [(f"U{p}", "V", x / 1.1) for p, x in zip(marks, V, strict=True)]
+    rows += [(f"I{p}", "A", x / 0.12) for p, x in zip("ABC", I, strict=True)]
+    path = write(tmp_path, *rows)
+    [load], first, text = loads_of(path)
+    assert (load["U"], load["P"], load["Q"]) == (None, None, None)
+    assert "its values are secondary" in first
+    assert "by their size, whatever the file says" in text
+    [load], _, _ = loads_of(path, units={"U": "1.1 kV", "I": "120 A"})
+    assert (load["U"], load["P"], load["Q"]) == pytest.approx((110, 20, 8), rel=0.01)
+    [load], _, text = loads_of(path, units={"U": "V", "I": "A"})
+    assert load["U"] == pytest.approx(0.1, rel=0.01)
+    assert "whatever the file says" not in text
+
+
+def test_low_voltage_is_no_secondary(tmp_path):
+    V, I = three(S=0.1 + 0.03j, kilovolts=0.208)
+    [load], _, text = loads_of(write(tmp_path, *station(V, I)))
+    assert load["P"] == pytest.approx(0.1, rel=0.01)
+    assert "whatever the file says" not in text
+
+
+def test_an_open_pole_tells_the_phase_that_lies_at_nothing(tmp_path):
+    V, I = three()
+    open_phase = np.where((T >= 0.5) & (np.arange(3)[:, None] == 2), 0.02, 1.0) / DIP
+    V, I = V * open_phase, I * open_phase
+    seen = tractexp.look(write(tmp_path, *station(V, I)), progress=False)
+    [event] = [e for e in seen.events if e["kind"] == "open pole"]
+    assert event["phases"] == pytest.approx([1, 1, 0.02], abs=0.01)
+    assert event["depth"] == pytest.approx(0.327, abs=0.01)
+    assert event["P_before"] == pytest.approx(20, rel=0.01)
+    assert "phase c to 1.99" in str(seen.summary())
+
+
+def test_a_fall_that_does_not_return_lasts_to_the_end(tmp_path):
+    V, I = three()
+    V = V / DIP * np.where(T >= 0.5, 0.7, 1.0)
+    [event] = tractexp.look(write(tmp_path, *station(V, I)), progress=False).events
+    assert event["kind"] == "dip"
+    assert event["duration"] == pytest.approx(1.5, abs=0.05)
+    assert "the record ends before the voltage is back" in event["why"]
+
+
+def test_what_is_too_slow_for_waveforms_is_not_examined(tmp_path):
+    from tractexp.api.surveying import rows_of
+
+    V, I = three()
+    fast = 960  # samples; what follows is sampled at 200 Hz and holds the dip
+    slow = np.arange(fast, len(T), 8)
+    keep = [*range(fast), *slow]
+    channels = []
+    for name, unit, z in station(V, I):
+        x = (np.sqrt(2) * np.real(z * np.exp(2j * np.pi * 50 * T)))[keep]
+        gain = np.abs(x).max() / 30000
+        quantity = "voltage" if unit == "kV" else "current"
+        channels.append(
+            Channel(name, np.round(x / gain).astype(np.int16), unit, quantity, gain=gain)
+        )
+    segments = [Segment(0, fast, RATE, 0.0), Segment(fast, len(keep), RATE / 8, fast / RATE)]
+    made = Recording("made", channels, segments)
+    path = next(p for p in comtrade.write(made, tmp_path / "a.cfg") if p.suffix == ".cfg")
+    first = str(tractexp.look(path, progress=False).summary()).splitlines()[0]
+    assert first.startswith("not examined: 1.4 s from 0.600 s on at 200 Hz hold no waveforms")
+    assert [row["kind"] for row in rows_of(str(tmp_path), path.name)] == ["not examined"]

@@ -27,6 +27,7 @@ from tractexp.record.angle import unwrap_angle
 from tractexp.record.phasor import sequences
 from tractexp.recording.nominal_voltage import is_between_phases, off_nominal
 from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
+from tractexp.recording.unit import SECONDARY_LINES
 
 # the positive sequence of line voltages over that of phase voltages
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)
@@ -195,6 +196,7 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
         if absolute["U"]:
             notes += check_alternating(table.source, told.name, columns, kilovolts)
         notes += _to_lines(columns, told.role.line, first, current)
+        notes += _describe_secondary_size(columns) if absolute["U"] and not kilovolts else []
     return Powers(columns, absolute, (*table.notes, *notes), start=start)
 
 
@@ -250,6 +252,18 @@ def _to_lines(
     for name in {"U", "U2"} & set(columns):
         columns[name] = columns[name] * np.sqrt(3)
     return [f"{key} taken as a phase voltage{why}: times sqrt(3) it is line to line"]
+
+
+def _describe_secondary_size(columns: Mapping[str, np.ndarray]) -> list[str]:
+    """What is said of a line voltage [kV] that only secondaries of transformers have."""
+    level = float(np.nanmedian(columns["U"]))
+    if not SECONDARY_LINES[0] <= level <= SECONDARY_LINES[1]:
+        return []
+    return [
+        f"{1000 * level:.4g} V between phases is a transformer's secondary by its size: P and Q are"
+        f" then no MW; what one of the table's units is on the primary side: {DATA.units}={{U: '1.1"
+        " kV', P: '0.132 MW', Q: '0.132 Mvar'}"
+    ]
 
 
 def _by_power(columns: Mapping[str, np.ndarray], current: np.ndarray) -> bool | None:

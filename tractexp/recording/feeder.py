@@ -47,7 +47,10 @@ LEAST_SEQUENCE_SHARE = 0.75  # of the RMS: what three phases have of one sequenc
 PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
 # of another bus's residual: by less the currents do not follow a bus better
 LARGEST_RESIDUAL_SHARE = 0.5
-COUPLER = re.compile(r"coupler|bus[ _-]?tie|sectionali[sz]|kuppl|母联|分段|шсв|секцион|acoplador")
+COUPLER = re.compile(
+    r"coupl|bus[ _-]?(?:tie|sec)|sectionali[sz]|kuppl|traverse|tron[cç]on|母联|分段|шсв|секцион"
+    r"|acopl|congiuntore|parallelo sbarre|(?<![^\W\d_])(?:tie|q?b/?c|св)(?![^\W\d_])"
+)
 ALONE = "no current is recorded: there is no load to fit"
 ONE_PHASE = "one phase of a three-phase load, a part of its power"
 HALF = "half of an autotransformer feeder"

@@ -109,7 +109,8 @@ def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]
     outside = [
         e for e in excursions(trace, trigger) if not any(_part(trace, e, slip) for slip in slips)
     ]
-    spans = [(kind, part) for e in outside for kind, part in _kinds(trace, e)]
+    lasting = _extend_lasting_falls(trace, outside)
+    spans = [(kind, part) for e in lasting for kind, part in _kinds(trace, e)]
     spans += [("pole slip", slip) for slip in slips]
     spans += _open_alone(trace, spans)
     spans += [
@@ -127,6 +128,19 @@ def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
     bounds = [*((e.start, e.end) for _, e in spans), *((c.first + 1, c.stop) for c in changes)]
     return [_describe(trace, kind, e, bounds) for kind, e in _merge_ramps(spans)]
+
+
+def _extend_lasting_falls(trace: Trace, outside: Sequence[Excursion]) -> list[Excursion]:
+    """The same with falls that do not return up to what happens next, or to the end: they last so
+    long, and not only until they are level.
+    """
+    ends = [*(e.start for e in outside), len(trace.t)][1:]
+    return [
+        replace(e, end=max(e.end, end))
+        if e.new_level and not e.returned and e.worst < -LARGEST_SWITCHING_STEP
+        else e
+        for e, end in zip(outside, ends, strict=True)
+    ]
 
 
 def _merge_ramps(spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursion]]:
@@ -394,7 +408,10 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     first = max((b for _, b in bounds if b <= e.start), default=0)
     stop = min((a for a, _ in bounds if a >= e.end), default=len(trace.t))
     count = max(2, round(STEADY / trace.step))
-    before = _power(trace, max(first, e.start - count - 1), max(e.start - 1, first))
+    # of what follows another event at once, the state before is that before both
+    onset = min((a for a, b in bounds if b == e.start and a < e.start), default=e.start)
+    begin = max((b for _, b in bounds if b <= onset), default=0)
+    before = _power(trace, max(begin, onset - count - 1), max(onset - 1, begin))
     after = _power(trace, min(e.end + 1, stop), min(e.end + 1 + count // 2, stop))
     inside = slice(e.start, max(e.end, e.start + 1))
     # where a window holds two states, whose difference looks unbalanced
@@ -415,19 +432,19 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
         after,
         worth,
         why,
-        _measure_phases(trace, e, first),
+        _measure_phases(trace, e, begin, onset),
     )
 
 
-def _measure_phases(trace: Trace, e: Excursion, first: int) -> tuple[float, ...]:
-    """The voltage of each of three phases during an event over its median from `first` to it; ()
-    where not known.
+def _measure_phases(trace: Trace, e: Excursion, first: int, stop: int) -> tuple[float, ...]:
+    """The voltage of each of three phases during an event over its median from sample `first` up to
+    `stop`; () where not known.
     """
     if len(trace.phases) != 3:
         return ()
     inside, around = (
         trace.phases[:, e.start : max(e.end, e.start + 1)],
-        trace.phases[:, first : e.start],
+        trace.phases[:, first:stop],
     )
     if not around.shape[1]:  # it begins with the record: then by what follows
         around = trace.phases[:, e.end :] if e.end < len(trace.t) else inside
@@ -478,7 +495,7 @@ def _worth(
     lead = (e.start - first) * trace.step
     size = f"the voltage falls by {100 * depth:.3g} %"
     if len(trace.phases) == 3:
-        phases = _measure_phases(trace, e, first)
+        phases = _measure_phases(trace, e, first, e.start)
         size = (
             f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to"
             f" {100 * min(phases):.3g} %"

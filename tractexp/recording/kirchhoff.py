@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 CLOSED_SUM = "add up to"  # in the note of a sum that closes
 # the same where one is left out or turned round, of which some are near zero by accident
 CLOSES_CHANGED = 0.02
+LARGEST_TIE_DIFFERENCE = 0.1  # of a tie's current, by which it is off the sum of a bus
 CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
 
 
@@ -28,11 +29,11 @@ def closed_sums(phasors: Snapshots, feeders: "list[Feeder]") -> "list[Feeder]":
     level = max((phasors.size(feeders[k].currents) for k in three), default=0.0)
     loaded = [k for k in three if phasors.size(feeders[k].currents) > UNLOADED * level]
     if closed := _find_closed_sum(phasors, feeders, loaded):
-        return _describe_closure(feeders, loaded, *closed)
+        return _describe_closure(phasors, feeders, loaded, *closed)
     for bus in sorted({feeders[k].voltages for k in loaded}):
         own = [k for k in loaded if feeders[k].voltages == bus]
         if closed := _find_closed_sum(phasors, feeders, own):
-            feeders = _describe_closure(feeders, own, *closed)
+            feeders = _describe_closure(phasors, feeders, own, *closed)
     return feeders
 
 
@@ -81,8 +82,36 @@ def _closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
     return np.sqrt(sums / np.maximum(most, 1e-300))
 
 
+def _ties_buses(
+    phasors: Snapshots, feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, tie: int
+) -> bool:
+    """Whether feeder `tie`, without which the others of a station add up to nothing, is no load:
+    they are of its own bus, or its current is the sum of those of another one.
+    """
+    buses = {feeders[k].voltages for k in loaded if k != tie}
+    if len(buses) == 1:
+        return buses == {feeders[tie].voltages}
+    own = phasors.select_channels(feeders[tie].currents)
+    for bus in buses:
+        there = zip(loaded, signs, strict=True)
+        parts = [
+            s * phasors.select_channels(feeders[k].currents)
+            for k, s in there
+            if s and feeders[k].voltages == bus
+        ]
+        total = np.sum(parts, axis=0)
+        apart = min(np.nanmean(np.abs(own - total)), np.nanmean(np.abs(own + total)))
+        if apart < LARGEST_TIE_DIFFERENCE * np.nanmean(np.abs(own)):
+            return True
+    return False
+
+
 def _describe_closure(
-    feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, closes: float
+    phasors: Snapshots,
+    feeders: "list[Feeder]",
+    loaded: list[int],
+    signs: np.ndarray,
+    closes: float,
 ) -> "list[Feeder]":
     """The feeders, each told that the currents of all close, and which of them are counted
     backward.
@@ -100,8 +129,8 @@ def _describe_closure(
             )
         if sign < 0:
             said += " once this one's polarity is reversed"
-        others = {feeders[i].voltages for i in loaded if i != k}
-        coupler = sign == 0 and len(out) == 1 and others == {feeders[k].voltages}
+        alone = sign == 0 and len(out) == 1
+        coupler = alone and _ties_buses(phasors, feeders, loaded, signs, k)
         said += ", and no load of this one" if coupler else ""
         marked[k] = replace(
             marked[k],

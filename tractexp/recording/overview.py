@@ -33,6 +33,7 @@ from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
 
 TOO_SHORT = "fewer than four half cycles are measured: too few to tell what happened"
 LEAST_MEASURED_VOLTAGE = 0.5  # of the greatest voltage: at less the frequency is not measured
+LONGEST_UNSEEN = 0.1  # s of samples too slow for waveforms of which nothing is said
 LATEST_START = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
 
 
@@ -334,6 +335,9 @@ def sight(
     numbered = _number_events(changes, dips, reader.path, refused)
     said += [TOO_SHORT] if brief and all(brief) else []
     unexamined = "; ".join(said) if said and (not phasors or TOO_SHORT in said) else ""
+    if events and phasors and (slow := _describe_slow_segments(recording)):
+        unexamined = unexamined or ("" if changes else f"{slow}; the rest shows nothing")
+        said.append(f"{slow}: not examined")
     secondary = secondary_of(recording, feeder.channels)
     shown = replace(
         blank,
@@ -345,6 +349,17 @@ def sight(
         dead_phases=" and ".join("abc"[k] for k in dead),
     )
     return replace(shown, said=(*said, *_improbable(reader.path, shown)))
+
+
+def _describe_slow_segments(recording: Recording) -> str:
+    """Which parts of a recording are sampled too slowly for waveforms; "" where they are short."""
+    fast = recording.waveforms()
+    slow = [(s, (s.stop - s.first) / s.rate) for s in recording.segments if s not in fast]
+    return "; ".join(
+        f"{seconds:.3g} s from {s.start:.3f} s on at {s.rate:g} Hz hold no waveforms"
+        for s, seconds in slow
+        if seconds > LONGEST_UNSEEN
+    )
 
 
 def _improbable(where: str, shown: Sight) -> list[str]:

@@ -31,6 +31,9 @@ LARGEST_DISTRIBUTION = 60.0  # kV: where sizes do not decide, up to it the low s
 HIGH = r"hv|high|hs|os|prim|primary|ht|at|вн|高压|高侧"
 LOW = r"lv|low|us|sec|secondary|bt|mv|нн|сн|低压|低侧|中压"
 SIDE = re.compile(rf"(?<![^\W\d_])(?:({HIGH})|({LOW}))(?![^\W\d_])|(高压|高侧)|(低压|低侧|中压)")
+FEEDER = re.compile(
+    r"(?<![^\W\d_])[fl]\d|feeder|line|lign|linie|línea|linea|abgang|load|last|线|фидер|отход|вл"
+)
 KILOVOLTS = re.compile(r"(\d+(?:[.,]\d+)?) ?[kк][vв]")
 
 
@@ -53,7 +56,8 @@ def mark_other_sides(
         share = ratio if other == low else 1 / ratio
         said = (
             f"{SAME_CURRENT} as that of {marked[kept].name} times {share:.3g}, on the other side of"
-            " a transformer, whose voltage is not recorded"
+            " a transformer, whose voltage is not recorded (a load just like it is read by its own"
+            " channels)"
         )
         marked[other] = replace(marked[other], why=(*marked[other].why, said), loaded=False)
         said = (
@@ -75,8 +79,8 @@ def _find_same_currents(
     """Pairs (high, low side) of feeders at the same voltages whose currents are one at all times,
     but for a ratio and the turn of a vector group.
 
-    Where no name says the sides, only a turn of 30 degrees tells them from two feeders of like
-    loads.
+    Where no name says the sides, a turn of 30 degrees tells them from feeders of like loads, or a
+    turn of 180 degrees, or that there are no more than the two and no name calls them feeders.
     """
     buses: dict[tuple[int, ...], list[int]] = {}
     for k, f in enumerate(feeders):
@@ -93,9 +97,22 @@ def _find_same_currents(
             named = _find_sides(recording, feeders[high], feeders[low]) is not None
             alike = rest[a, b] < LARGEST_REST[named]
             alike &= abs(turned[a, b] - 30 * steps) < LARGEST_TURN[named]
-            if alike and UNLOADED * large < small < large / LEAST_RATIO and (named or steps % 2):
+            told = named or steps % 2 or _is_one_of_two(recording, feeders, bus, steps)
+            if alike and UNLOADED * large < small < large / LEAST_RATIO and told:
                 pairs.append((high, low))
     return pairs
+
+
+def _is_one_of_two(
+    recording: Recording, feeders: "Sequence[Feeder]", bus: np.ndarray, steps: int
+) -> bool:
+    """Whether the only two currents of a bus, turned by so many times 30 degrees, can be but one:
+    opposite, or not called feeders.
+    """
+    if len(bus) != 2 or steps % 6:
+        return False
+    texts = [recording.channels[feeders[k].currents[0]].name.lower() for k in bus]
+    return bool(steps) or not any(FEEDER.search(text) for text in texts)
 
 
 def _compare_currents(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import DATA, UserError, among
-from tractexp.recording.label import kind
+from tractexp.recording.label import groups, kind
 from tractexp.recording.recording import Channel, Recording, quantity_of, unit_of
 
 PLAIN = {"U": ("voltage", "V", "kV"), "I": ("current", "A", "kA")}  # by letter of the setting
@@ -21,7 +21,11 @@ PLAIN = {"U": ("voltage", "V", "kV"), "I": ("current", "A", "kA")}  # by letter 
 GREATEST = {"U": 1500.0, "I": 100.0}
 # kV RMS of a voltage transformer's secondary: 100 to 120 V, of lines or to ground
 SECONDARY = 0.04, 0.16
+SECONDARY_GROUND = 0.05, 0.072  # kV RMS: of 100 to 120 V, to ground
+SECONDARY_LINES = 0.09, 0.125  # kV RMS: the same between phases
+ALIVE = 0.2  # of the greatest voltage: what is less is dead, or a zero sequence
 LEAST_AMPERES = 1.0  # RMS: fewer beside voltages in V may as well be kA
+SECONDARY_VALUES = "these are secondary values"  # a note on them begins so
 _AMOUNT = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*(\D.*)", re.ASCII)
 
 
@@ -84,9 +88,29 @@ def in_units(
                 channels[i] = _of_unit(channels[i], quantity, small)
             taken |= {letter: bare}
         voltage = next((c.unit for c in (channels[i] for i in ours) if not in_doubt(c)), "")
-    channels = _mark_secondary(channels)
-    notes = (*recording.notes, *_note(channels, taken), *_secondary_note(channels))
+    by_size = not {"U", "I"} & {*units} and _have_secondary_size(channels)
+    by_size = by_size and not any(c.side for c in channels)
+    channels = [*map(_set_secondary, channels)] if by_size else _mark_secondary(channels)
+    told = any(note.startswith(SECONDARY_VALUES) for note in recording.notes)
+    secondary = [] if told else _secondary_note(channels, by_size)
+    notes = (*recording.notes, *_note(channels, taken), *secondary)
     return replace(recording, channels=channels, notes=notes)
+
+
+def _have_secondary_size(channels: Sequence[Channel]) -> bool:
+    """Whether all voltages that are alive are those of voltage transformers' secondaries, whatever
+    the file says: no network has 50 to 72 V to ground, nor 90 to 125 V between phases.
+    """
+    volts = {
+        i: c
+        for i, c in enumerate(channels)
+        if c.form == "waveform" and kind(c) == "voltage" and not in_doubt(c)
+    }
+    sizes = {i: c.factor * _size(c) for i, c in volts.items()}
+    alive = [i for i, size in sizes.items() if size > ALIVE * max(sizes.values())]
+    lines = {i for group in groups(volts) if group.pairs for i in group.numbers}
+    limits = {i: SECONDARY_LINES if i in lines else SECONDARY_GROUND for i in alive}
+    return bool(alive) and all(limits[i][0] <= sizes[i] <= limits[i][1] for i in alive)
 
 
 def _mark_secondary(channels: Sequence[Channel]) -> list[Channel]:
@@ -103,16 +127,20 @@ def _mark_secondary(channels: Sequence[Channel]) -> list[Channel]:
     ]
     larger, alike = any(size > high for size in sizes), any(low <= size <= high for size in sizes)
     return [
-        replace(c, side="S" if alike or c.side == "S" else "")
-        if not larger
-        else replace(c, side="")
+        _set_secondary(c) if not larger and (alike or c.side == "S") else replace(c, side="")
         for c in channels
     ]
 
 
-def _secondary_note(channels: Sequence[Channel]) -> list[str]:
-    """What is said of secondary values, and the setting that gives their ratio; [] where there are
-    none.
+def _set_secondary(channel: Channel) -> Channel:
+    """The channel as one of secondary values, but where its transformer's ratio is applied."""
+    stays = channel.quantity == "current" and channel.ratio != 1
+    return replace(channel, side="" if stays else "S")
+
+
+def _secondary_note(channels: Sequence[Channel], by_size: bool) -> list[str]:
+    """What is said of secondary values, which may be told by their size, and the setting that gives
+    their ratio; [] where there are none.
     """
     ours = [c for c in channels if c.side == "S" and c.quantity in ("voltage", "current")]
     if not ours:
@@ -128,9 +156,11 @@ def _secondary_note(channels: Sequence[Channel]) -> list[str]:
     sizes = " and ".join(
         f"{_size(c):.4g} {c.unit.strip()}" for c in letters.values() if c is not None
     )
+    told = "and the file gives no ratio of the transformers"
+    if by_size:
+        told = "by their size, whatever the file says"
     return [
-        f"these are secondary values ({sizes}), and the file gives no ratio of the transformers:"
-        " powers are not in MW; "
+        f"{SECONDARY_VALUES} ({sizes}), {told}: powers are not in MW; "
         f"say what one of the file's units is on the primary side, e.g. {DATA.units}={{{setting}}}"
     ]
 
