@@ -228,8 +228,8 @@ def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_
     ):
         words, _ = page(found, tmp_path)
         grade = found.final_grade.adequacy
-        told = f"{whose}{grade.grade.replace('_', ' ')}: {grade.sentence}."
-        assert words.index(told) < words.index("Next: ")
+        told = f"{whose}{grade.grade.replace('_', ' ')}: {grade.sentence}"
+        assert words.index(told) < words.index("; the next dip of 40 %") < words.index("Next: ")
     assert named.final_grade.adequacy.grade == "adequate" != unexplained.final_grade.adequacy.grade
 
 

@@ -492,7 +492,12 @@ def _estimate_extended_model(question: Question, steps: "Steps") -> Result:
     status = f"ended with the verdict {steps.verdict.word}"
     end = SearchResult(values, objective, effort.simulations, 0, 0, 0.0, status, history)
     result = conclude(problem, end, values, graded.fits, question.seed, model.node, "descent")
-    return replace(result, adequacy=graded.adequacy.to_dict(), shown_effects=dict(base.shown))
+    return replace(
+        result,
+        adequacy=graded.adequacy.to_dict(),
+        next_dip=graded.next_dip,
+        shown_effects=dict(base.shown),
+    )
 
 
 def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str]:

@@ -27,6 +27,7 @@ from tractexp.outcome import FORMS, Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell
 from tractexp.provenance import build_again_command
+from tractexp.record import OwnBase
 from tractexp.wording import epsilon, join_words
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from tractexp.identification.estimate import EstimationResult
     from tractexp.identification.result import Fit
     from tractexp.identification.uncertainty import Uncertainty
+    from tractexp.record import Event
 
 FIXED = "fixed"
 FORMS[Result] = (asdict, lambda content: Result.from_content(content, "the saved result"))
@@ -254,7 +256,8 @@ class Identification(Written):
         """What this identification is good for, and what speaks against it, in one sentence."""
         sentence = self.result.adequacy.get("sentence", "")
         doubt = self.operating_point.doubt if self.operating_point else ""
-        return f"{sentence}; {doubt}" if sentence and doubt else sentence
+        told = [sentence, self.result.next_dip.get("sentence", ""), doubt]
+        return "; ".join(filter(None, told)) if sentence else ""
 
     @functools.cached_property
     def operating_point(self) -> "OperatingPoint | None":
@@ -326,17 +329,42 @@ class Identification(Written):
 
         `event` is one that `tractexp.read` gave (or what it reads, holding one dip): its voltage,
         and the power before it. Otherwise `U` [pu] at uniform times `t` [s], (N,) each, with `f`
-        [Hz] where known; `P0` and `Q0` are by default those of the event identified on. Raises
-        `UserError` where the load has no steady state there.
+        [Hz] where known; `P0` and `Q0` are by default those of the event identified on. `band` of
+        the response is half of what P and Q [pu] stay within in 95 % of events. Raises `UserError`
+        where the load has no steady state there.
         """
         if (event is None) == (t is None or U is None):
             raise UserError("predict() needs either an event, or both t= and U=")
         if event is not None:
-            values = np.array([self.result.parameters[name] for name in self.model.model.names])
             (one,) = dips_of("event", event, least=1)[:1]
-            return respond_to(self.model.model, values, one, self.result.base)
+            return self._predict_event(one)
         P, Q = self.result.predict(t, U, f, P0, Q0)
-        return Response("prediction", np.asarray(t, dtype=float), np.asarray(U, dtype=float), P, Q)
+        band = self.result.find_band(t, U, f, P0, Q0)
+        t, U = np.asarray(t, dtype=float), np.asarray(U, dtype=float)
+        return Response("prediction", t, U, P, Q, band=band)
+
+    def _predict_event(self, event: "Event") -> Response:
+        from tractexp.identification.forecast import Forecast
+        from tractexp.identification.result import respond
+
+        model, base = self.model.model, self.result.base
+        values = np.array([self.result.parameters[name] for name in model.names])
+        response = respond_to(model, values, event, base)
+        forecast = Forecast.from_content(self.result.next_dip, model.names, values)
+        if forecast is None:
+            return response
+        own = base.convert_event(event)
+        fit = respond(model, values, own, "validate")
+        seen = fit.event
+
+        def calculate(values: np.ndarray) -> np.ndarray:
+            moved = respond(model, values, own, "validate")
+            return np.stack([moved.P, moved.Q])
+
+        drawn = complex(seen.P0, seen.Q0)
+        half = forecast.find_half_width(calculate, drawn, seen.record.t, seen.start, seen.f0)
+        P, Q = (OwnBase.from_record(event.record).ratio * half).tolist()
+        return replace(response, band=(P, Q))
 
     def table(self) -> Table:
         """Estimates with intervals and verdicts, the search's end only where it lies outside."""
@@ -632,6 +660,7 @@ def _conclude_identification(
         **fields,
         adequacy=adequacy.to_dict(),
         linear_network=beside,
+        next_dip=graded.next_dip,
         starts=starts,
         rival_structures=structures,
         advice=advice,

@@ -77,6 +77,9 @@ def _errors(fit: "Identification") -> dict[str, float]:
         metrics["model_error_held_out"] = held_out["value"]
     if (ratio := result.linear_network.get("ratio")) is not None:
         metrics["model_error_over_linear_network"] = ratio
+    for channel in "PQ":
+        if (within := result.next_dip.get(channel)) is not None:
+            metrics[f"next_dip_{channel}"] = within
     for k, event in enumerate(result.events, start=1):
         metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in result.epsilons}
     if "epsilon_i" in result.epsilons:

@@ -35,6 +35,8 @@ class Response:
     # of waveforms: t [s] and each phase's [pu]
     currents: Mapping[str, np.ndarray] = field(default_factory=dict)
     epsilon_i: float | None = None
+    # half the bands in which P and Q [pu] stay in 95 % of events, where the model promises some
+    band: tuple[float, float] | None = None
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
@@ -62,7 +64,12 @@ class Response:
             else ""
         )
         errors += "" if self.epsilon_i is None else f", epsilon_i {epsilon(self.epsilon_i)}"
-        return f"{self.title}: t, U, P, Q of {len(self.t)} samples{errors}"
+        band = (
+            ""
+            if self.band is None
+            else ", P within {:.3g} and Q within {:.3g} pu".format(*self.band)
+        )
+        return f"{self.title}: t, U, P, Q of {len(self.t)} samples{errors}{band}"
 
     def _repr_html_(self) -> str:
         """Measured and calculated power, drawn."""
@@ -101,7 +108,9 @@ class Response:
                 epsilon=self.epsilon,
                 notes=self.notes,
             )
-        return figures.response(path, self.t, self.U, columns, title=self.title, notes=self.notes)
+        return figures.response(
+            path, self.t, self.U, columns, title=self.title, notes=self.notes, band=self.band
+        )
 
 
 def _csv(path: Path, columns: Mapping[str, np.ndarray]) -> Path:

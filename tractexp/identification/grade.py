@@ -15,6 +15,7 @@ import numpy as np
 from tractexp.identification.adequacy import Adequacy, Grade, grade_errors
 from tractexp.identification.division import doubt_estimate
 from tractexp.identification.estimate import EstimationResult, estimate, estimate_without_search
+from tractexp.identification.forecast import forecast_next_dip
 from tractexp.identification.result import (
     Fit,
     active_bounds,
@@ -89,6 +90,11 @@ class GradedModel:
         of each.
         """
         return model_errors(self.fits)
+
+    @functools.cached_property
+    def next_dip(self) -> dict[str, Any]:
+        """What it promises of a dip that it has not seen, as `result.json` has it."""
+        return forecast_next_dip(self)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 `result.json`.
 """
 
+import functools
 import json
 import math
 import warnings
@@ -18,6 +19,7 @@ from tractexp.domain.playback import relative_error
 from tractexp.errors import MODEL, UserError
 from tractexp.identification import stored
 from tractexp.identification.adequacy import ACCEPTED
+from tractexp.identification.forecast import Forecast
 from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.identification.verdict import BOUND_DISTANCE
 from tractexp.inference.model_error import in_percent, model_error
@@ -146,6 +148,8 @@ class Result:
     model_error: dict[str, Any] = field(default_factory=dict)
     # the best one beside it: `yardstick`
     linear_network: dict[str, Any] = field(default_factory=dict)
+    # the band of P and Q for a dip that was not seen: `forecast_next_dip`
+    next_dip: dict[str, Any] = field(default_factory=dict)
     # name, model_error, parameters
     rival_structures: list[dict[str, Any]] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)  # what to do next, the most pressing first
@@ -291,27 +295,81 @@ class Result:
         the voltage is taken as balanced, and the power is instantaneous. Raises `UserError` for
         what is no finite number, and where there is no steady state.
         """
+        P, Q = self.base.ratio * self._drive(t, U, f, P0, Q0).power
+        return P, Q
+
+    def find_band(
+        self, t: Any, U: Any, f: Any = None, P0: float | None = None, Q0: float | None = None
+    ) -> tuple[float, float] | None:
+        """Half the bands of P and Q [pu] in which a load stays in 95 % of dips that was identified
+        so, of what `predict` gives for the same; None of a result of an earlier version.
+        """
+        driven = self._drive(t, U, f, P0, Q0)
+        forecast = Forecast.from_content(self.next_dip, driven.model.names, driven.values)
+        if forecast is None:
+            return None
+        half = forecast.find_half_width(
+            driven.calculate, driven.power_before, driven.t, driven.start, self.before["frequency"]
+        )
+        P, Q = (self.base.ratio * half).tolist()
+        return P, Q
+
+    def _drive(self, t: Any, U: Any, f: Any, P0: float | None, Q0: float | None) -> "Driven":
+        """The model at a voltage that is checked."""
         model = compose(*parts(self.model))
         drawn = {key: value for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
         stored.check_numbers("predict()", drawn)
         signals = stored.signals({"t": t, "U": U, "f": f})
         t, U, f = signals["t"], signals["U"], signals.get("f")
         dips = find_dips(t, U)
-        steady = slice(0, max(dips[0][0], 1) if dips else None)
+        start = max(dips[0][0], 1) if dips else None
         nominal = 2 * np.pi * self.before["frequency"]
         omega_s = None if f is None else 2 * np.pi * f - nominal
-        ratio = self.base.ratio
-        powers = {key: value / ratio for key, value in drawn.items()}
-        before = self.before | powers | {"U0": float(U[steady].mean())}
+        powers = {key: value / self.base.ratio for key, value in drawn.items()}
+        before = self.before | powers | {"U0": float(U[:start].mean())}
         values = np.array([self.parameters[name] for name in model.names])
-        omega_s0 = 0.0 if omega_s is None else float(omega_s[steady].mean())
-        P, Q = domain_of(model).play(model, values, t, U, before, omega_s, omega_s0)
-        if not (np.isfinite(P).all() and np.isfinite(Q).all()):
+        driven = Driven(model, values, t, U, before, start or 0, omega_s)
+        if not np.isfinite(driven.power).all():
             raise UserError(
                 "the response to this voltage grows beyond all bounds: the parameters suit no such"
                 " event"
             )
-        return ratio * P, ratio * Q
+        return driven
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """A model at values (d,), driven by a voltage U (N,) [pu] at times t (N,) [s] that dips first
+    at sample `start`.
+
+    `before` are U0, P0, Q0 [pu] and the frequency [Hz]. omega_s (N,) [rad/s] is the deviation of
+    the frequency, None where unknown. All is on the model's own base.
+    """
+
+    model: Model
+    values: np.ndarray
+    t: np.ndarray
+    U: np.ndarray
+    before: Mapping[str, float]
+    start: int
+    omega_s: np.ndarray | None
+
+    @functools.cached_property
+    def power(self) -> np.ndarray:
+        """P and Q (2, N) [pu]."""
+        return self.calculate(self.values)
+
+    @property
+    def power_before(self) -> complex:
+        """S before the dip [pu]."""
+        return complex(self.before["P0"], self.before["Q0"])
+
+    def calculate(self, values: np.ndarray) -> np.ndarray:
+        """P and Q (2, N) [pu] at other values (d,)."""
+        omega_s0 = 0.0 if self.omega_s is None else float(self.omega_s[: self.start or None].mean())
+        play = domain_of(self.model).play
+        power = play(self.model, values, self.t, self.U, self.before, self.omega_s, omega_s0)
+        return np.stack(power)
 
 
 def write_history(path: Path, history: History) -> Path:

@@ -180,8 +180,9 @@ def _describe_grade(findings: Findings) -> str:
     which = "extended" if findings.names else "base"
     graded = findings.final_grade
     grade, doubt = graded.adequacy, f"; {graded.doubt}" if graded.doubt else ""
-    word = grade.grade.replace("_", " ")
-    return f"The {which} model is graded {word}: {grade.sentence}{doubt}."
+    word, promised = grade.grade.replace("_", " "), graded.next_dip.get("sentence", "")
+    told = "; ".join(filter(None, [f"{grade.sentence}{doubt}", promised]))
+    return f"The {which} model is graded {word}: {told}."
 
 
 def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> None:

@@ -90,9 +90,10 @@ def response(
     *,
     title: str,
     notes: Sequence[str] = (),
+    band: tuple[float, float] | None = None,
 ) -> Path:
     """Draw voltage and the calculated P and Q over time [s], in pu, shape (N,), where nothing was
-    measured.
+    measured; `band` is half of what P and Q are drawn within.
     """
     _check_lengths(path, t=t, U=U, P=calculated[0], Q=calculated[1])
     from matplotlib import rc_context
@@ -105,6 +106,9 @@ def response(
         for panel, name, color, values in zip(panels, "UPQ", colors, (U, *calculated), strict=True):
             panel.plot(*style.thin(t, values), color=color)
             _label_axis(panel, f"{name} [pu]", -0.085)
+        for panel, values, half in zip(panels[1:], calculated, band or (), strict=False):
+            some, middle = style.thin(t, values)
+            panel.fill_between(some, middle - half, middle + half, color=style.FAINT)
         panels[2].set_xlabel("t [s]")
         return style.save(figure, path)
 

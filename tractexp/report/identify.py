@@ -13,6 +13,7 @@ from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
 from tractexp.identification.agreement import EventAgreement
 from tractexp.identification.estimate import EstimationResult
+from tractexp.identification.forecast import draw_dip
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
@@ -49,6 +50,12 @@ MODEL_ERROR = (
     " response, both in"
     " apparent power S. epsilon: Eq. (20)."
 )
+NEXT_DIP = (
+    "A dip that was not recorded, as long as those that were. The bands hold the worst sample of"
+    " 95 % of such events: noise, what the model misses of the known events, and the parameters'"
+    " scatter."
+)
+WITHIN = "the load is here in 95 % of events"
 FIXED = "fixed"
 SAME_END_SHARE = 0.01  # of the deviance: starts closer than this ended in the same place
 
@@ -152,6 +159,7 @@ def report(fit: "Identification") -> Report:
     )
     page.heading("Measured and calculated")
     _curves(page, details.fits, uncertainty)
+    _add_next_dip(page, fit)
     page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
     _parameters(page, fit, uncertainty)
     page.heading("How well it fits").add(errors(fit)).text(*map(as_sentence, samples(fit)))
@@ -172,6 +180,28 @@ def report(fit: "Identification") -> Report:
     _correlation(page, uncertainty)
     page.heading("How this page was made")
     return page.table(["", ""], _origin(result, command()), words=(1,))
+
+
+def _add_next_dip(page: Report, fit: "Identification") -> None:
+    """P and Q of the dip that is told of, with their bands; its sentence where there are none."""
+    told = fit.result.next_dip
+    if not told:
+        return
+    page.heading("The next dip").text(as_sentence(told["sentence"]))
+    if told["P"] is None:
+        return
+    first = fit.details.fits[0].event
+    t, U, start = draw_dip(first.U0, told["duration"], first.record.step)
+    response = fit.predict(t=t, U=U)
+    assert response.band is not None
+    chart = Chart("t [s]", ["U [pu]", "P [pu]", "Q [pu]"], heights=(0.9, 1.5, 1.5), pixels=460)
+    chart.line("voltage", t, U, style.VOLTAGE)
+    for panel, (power, half) in enumerate(
+        zip((response.P, response.Q), response.band, strict=True)
+    ):
+        chart.band(WITHIN, t, power - half, power + half, style.FAINT, panel + 1)
+        chart.line("calculated", t, power, style.PALETTE[0], panel + 1)
+    page.chart(chart.edge(t[start]), NEXT_DIP)
 
 
 def _of_currents(result: Any) -> str:

@@ -1,0 +1,123 @@
+"""A band of P and Q for a dip that a model has not seen, from what it missed of those that it has.
+
+Of each channel half the band is the root of
+
+    N² + (F m a)² + (1.96 s)²
+
+N is the largest excursion that noise makes in so many samples; a the largest change of S that the
+model calculates, as means over a cycle; m what it missed of the known events beyond their noise, at
+worst, over their a (the root of the mean of squares over the events); F how far the next event may
+exceed that; s the largest scatter of the calculated power by that of the parameters.
+
+Within a load the logarithm of m scatters from event to event by `EVENT_SPREAD`, the next event's
+about that of K known ones by `EVENT_SPREAD` √(1 + 1/K). It was measured on loads that the benchmark
+`next_dip` draws.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.domain import Playback
+from tractexp.errors import UserError
+from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
+
+EVENT_SPREAD = 0.45
+SCATTER_STEP = 0.02  # standard errors by which the scatter of the calculated power is probed
+NO_CHANGE = 1e-9  # pu: an event that changes S by less tells nothing of a share of it
+
+
+@dataclass(frozen=True)
+class PredictionBand:
+    """What the width of the band hangs on, of P and of Q: `noise` (2,) [pu], its standard
+    deviation, `share` (2,) of the largest change of S; from so many `events`.
+    """
+
+    noise: tuple[float, float]
+    share: tuple[float, float]
+    events: int
+
+    def find_half_width(self, change: float, samples: int, scatter: np.ndarray) -> np.ndarray:
+        """Half the band of P and of Q (2,) [pu] of an event that changes S by `change` [pu] at
+        most, in so many samples from the dip on.
+
+        `scatter` (2,) [pu] is the standard error of what is calculated, where it is largest.
+        """
+        noise = find_noise_peak(samples) * np.array(self.noise)
+        model = _find_reserve(self.events) * np.array(self.share) * change
+        return np.sqrt(noise**2 + model**2 + (interval_factor() * scatter) ** 2)
+
+
+def measure_band(played: Sequence[Playback]) -> PredictionBand | None:
+    """The band of a model that was played over these events; None where its motor stalls on one, or
+    where none changes the load.
+    """
+    missed = []
+    noises = []
+    for one in played:
+        event, record = one.event, one.event.record
+        left = np.stack([one.P - record.P, one.Q - record.Q])
+        calculated = one.P + 1j * one.Q - complex(event.P0, event.Q0)
+        change = find_largest_change(calculated[event.start :], record.step, event.f0)
+        if one.stalls or not np.isfinite(change):
+            return None
+        if change < NO_CHANGE:
+            continue
+        noise = np.nanstd(left[:, event.steady], axis=1)
+        after = np.nan_to_num(left[:, event.start :])
+        peak = find_noise_peak(after.shape[1]) * noise
+        squares = np.abs(after).max(axis=1) ** 2 - peak**2
+        missed.append(np.sqrt(np.maximum(squares, 0.0)) / change)
+        noises.append(noise)
+    if not missed:
+        return None
+    share, noise = (np.sqrt(np.mean(np.square(rows), axis=0)).tolist() for rows in (missed, noises))
+    return PredictionBand((noise[0], noise[1]), (share[0], share[1]), len(missed))
+
+
+def find_noise_peak(samples: int) -> float:
+    """Standard deviations that no sample of white noise exceeds in 95 % of cases."""
+    from scipy.special import ndtri
+
+    return float(ndtri((1 + INTERVAL_LEVEL ** (1 / max(samples, 1))) / 2))
+
+
+def find_largest_change(change: np.ndarray, step: float, frequency: float) -> float:
+    """The largest of means over a cycle of a change of S (N,) [pu], at samples `step` [s] apart:
+    decaying offsets of waveforms are no change of the load.
+    """
+    samples = min(max(1, round(1 / (frequency * step))), len(change))
+    means = np.convolve(change, np.full(samples, 1 / samples), "valid")
+    return float(np.abs(means).max())
+
+
+def find_scatter(
+    calculate: Callable[[np.ndarray], np.ndarray], values: np.ndarray, root: np.ndarray
+) -> np.ndarray:
+    """The largest standard error (2,) of P and Q that `calculate` gives (2, N) at values (d,).
+
+    `root` (k, d) are rows whose products add up to the covariance of the values. A row to neither
+    side of which there is a steady state tells nothing.
+    """
+    here = calculate(values)
+    squares = np.zeros_like(here)
+    for row in root:
+        for step in (SCATTER_STEP * row, -SCATTER_STEP * row):
+            try:
+                moved = calculate(values + step)
+            except UserError:
+                continue
+            if np.isfinite(moved).all():
+                squares += ((moved - here) / SCATTER_STEP) ** 2
+                break
+    return np.sqrt(squares.max(axis=1))
+
+
+def _find_reserve(events: int) -> float:
+    """How many times as much as of so many known events the model misses of the next, at most in
+    95 % of cases.
+    """
+    from scipy.special import ndtri
+
+    return float(np.exp(ndtri(INTERVAL_LEVEL) * EVENT_SPREAD * np.sqrt(1 + 1 / events)))
