@@ -9,7 +9,7 @@ import pytest
 
 import tractexp
 from tractexp.domain import WAVES
-from tractexp.identification.linear_network import CRITERION, HELD_OUT, black_boxes
+from tractexp.identification.linear_network import CRITERION, black_boxes
 from tractexp.identification.yardstick import poles_in_words, yardstick
 from tractexp.inference.model_error import model_error
 
@@ -46,7 +46,7 @@ def fit():
 
 def test_it_is_in_the_result_beside_the_model_s_own_error(fit):
     beside, own = fit.result.linear_network, fit.result.model_error
-    assert beside["chosen_by"] == HELD_OUT
+    assert beside["chosen_by"] == CRITERION
     assert beside["model_error"].keys() == own.keys()
     assert [e["name"] for e in beside["model_error"]["events"]] == [
         e["name"] for e in own["events"]

@@ -104,7 +104,7 @@ def linear_network(
     *,
     validate: Any = (),
     domain: str | None = None,
-    poles: int | None = None,  # null: as many as predict best the dips that are held out
+    poles: int | None = None,  # null: as many as the fitted dips ask for
     progress: Any = None,
 ) -> NetworkFit:
     """Fit the best linear network of few poles from the voltage to the current of recorded dips:
@@ -115,13 +115,12 @@ def linear_network(
     records : events, or whatever `tractexp.read` reads
         The dips to fit, all together.
     validate : as `records`
-        Dips that are only judged, and that tell the number of poles where it is not given; without
-        them an information criterion does.
+        Dips that are only judged: they choose nothing.
     domain : "phasors" or "waves"
         With "waves" space vectors of sampled currents follow those of the voltages, and the zero
         sequence has a path of its own; else P and Q follow U. None: that of `conf/config.yaml`.
     poles : int
-        None: as many as predict best, up to four.
+        None: as many as an information criterion of the fitted dips asks for, up to four.
     progress : callable
         Is told what is read, a sentence at a time.
 
@@ -148,13 +147,17 @@ def linear_network(
 def _fit_networks(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
     """The network for the events of a call, and those of fewer and of more poles."""
     from tractexp.domain import DOMAINS
-    from tractexp.identification.linear_network import MOST_VECTOR_POLES, black_boxes, selection
+    from tractexp.identification.linear_network import (
+        MOST_VECTOR_POLES,
+        black_boxes,
+        choose_network,
+    )
 
     domain = DOMAINS[of.domain]
-    train, held_out = domain.events(of.train), domain.events(of.validate)
+    train = domain.events(of.train)
     boxes = black_boxes(domain, train, MOST_VECTOR_POLES if of.order is None else of.order)
     if of.order is None:
-        return selection(boxes, train, held_out), boxes
+        return choose_network(boxes, train), boxes
     if len(boxes) <= of.order:
         raise UserError(
             f"{TASK.poles}={of.order}: the samples from the dips on are enough for"

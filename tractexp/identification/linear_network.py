@@ -7,7 +7,8 @@ u and i deviate from their course before the dip, complex (`tractexp.domain.port
 current follows a voltage that stays, C a capacitance, g_k what pole k adds at first and what dies
 out with it. The zero sequence has the path of a resistance and an inductance, g / (s - p) u.
 Between samples u is a straight line: so responses are exact. The poles are found by variable
-projection (`tractexp.identification.projection`), their number by events held out.
+projection (`tractexp.identification.projection`), their number by an information criterion of the
+events that were fitted: events held out choose nothing, so that they judge.
 """
 
 from collections.abc import Sequence
@@ -26,7 +27,7 @@ MOST_VECTOR_POLES = 4  # poles of the vectors
 OF_ZERO = 1  # of the zero sequence
 SAMPLES = 5  # for each unknown
 LEAST_VOLTAGE_MOVE = 1e-6  # pu: a voltage that moves by less tells nothing
-HELD_OUT, CRITERION = "the held-out dips", "the Bayesian information criterion"
+CRITERION = "the Bayesian information criterion"
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,23 +107,12 @@ def black_boxes(
     return [BlackBox(domain, (one, *zero), vectors[0].turns) for one in networks(vectors, most)]
 
 
-def best(domain: Domain, train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
-    """The best network of the number of poles that suits best. Raises `UserError` as `black_boxes`
-    does.
-    """
-    return selection(black_boxes(domain, train), train, held_out)
-
-
-def selection(
-    boxes: Sequence[BlackBox], train: Sequence[Event], held_out: Sequence[Event]
-) -> BlackBox:
-    """The one that leaves least of events that it has not seen; without such, of the least
-    information criterion.
-    """
+def choose_network(boxes: Sequence[BlackBox], train: Sequence[Event]) -> BlackBox:
+    """The one of the least information criterion for the events that all were fitted to."""
     vectors = [box.networks[0] for box in boxes]
-    ports = [boxes[0].domain.ports(event)[0] for event in held_out or train]
-    by = [one.squares(ports) for one in vectors] if held_out else information(vectors, ports)
-    return replace(boxes[int(np.argmin(by))], chosen_by=HELD_OUT if held_out else CRITERION)
+    ports = [boxes[0].domain.ports(event)[0] for event in train]
+    by = information(vectors, ports)
+    return replace(boxes[int(np.argmin(by))], chosen_by=CRITERION)
 
 
 def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:

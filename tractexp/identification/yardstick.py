@@ -1,9 +1,9 @@
 """How good a model of these records can get: its error over that of the best linear network of few
 poles.
 
-A network knows no physics, has as many poles as predict best, and leaves noise and what is not
-linear. A model that leaves much more lacks something; one that leaves less knows something that no
-linear network can.
+A network knows no physics, has as many poles as the fitted events ask for, and leaves noise and
+what is not linear. A model that leaves much more lacks something; one that leaves less knows
+something that no linear network can.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.domain import domain_of
 from tractexp.errors import UserError
-from tractexp.identification.linear_network import best
+from tractexp.identification.linear_network import black_boxes, choose_network
 from tractexp.identification.result import TRAIN, Fit, model_errors
 from tractexp.inference.model_error import STALL, in_percent
 from tractexp.wording import count_noun
@@ -30,7 +30,7 @@ def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
     events = [fit.waves or fit.event for fit in fits]
     split = sum(fit.role == TRAIN for fit in fits)
     try:
-        box = best(domain_of(events[0]), events[:split], events[split:])
+        box = choose_network(black_boxes(domain_of(events[0]), events[:split]), events[:split])
     except UserError as why:
         return {"sentence": f"no linear network stands beside it: {why}"}
     played = [
