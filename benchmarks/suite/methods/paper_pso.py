@@ -1,0 +1,16 @@
+"""Particle swarm optimization with the paper's settings, and nothing after it."""
+
+from third_order import ThirdOrderLoad
+
+from tractexp.identification.search import search
+from tractexp.plugin import build
+
+
+def fit(events):
+    load = ThirdOrderLoad(events)
+    return load, search(load.problem, build("optimizer", {"name": "pso"}), 0).values
+
+
+def predict(model, event):
+    load, values = model
+    return load.predict(values, event)

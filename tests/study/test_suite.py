@@ -1,0 +1,106 @@
+"""The benchmark that others can enter: what a method sees, what is counted, and what fails."""
+
+import json
+
+import numpy as np
+import pytest
+from suite import run
+from suite.cases import RECIPES, Event, SuiteCase, make_case, read_record
+
+SAMPLES, START = 400, 100
+RIGHT = """
+def fit(events):
+    assert all(event.P.shape == event.t.shape for event in events)
+    return 0.9
+
+def predict(model, event):
+    import numpy as np
+    assert np.isnan(event.P[event.start:]).all() and np.isfinite(event.P[:event.start]).all()
+    change = event.U - 1
+    return 1 + model * change, 0.5 + 0 * change, {band}
+
+def name(model):
+    return {named}
+"""
+
+
+def write(folder, name, text):
+    path = folder / f"{name}.py"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def case():
+    """A load whose P follows U by 1 and whose Q stays."""
+    t = 0.005 * np.arange(SAMPLES)
+    dip = (np.arange(SAMPLES) >= START) & (np.arange(SAMPLES) < 200)
+    U = 1 - 0.4 * dip
+    event = Event("dip", t, U, U.copy(), np.full(SAMPLES, 0.5), START, 50.0)
+    return SuiteCase(1, [event], [event], ("a",))
+
+
+@pytest.mark.parametrize(
+    ("band", "named", "held"),
+    [((0.05, 0.01), ["a"], [True, True]), ((0.03, 0.01), [], [False, True]), (None, ["b"], None)],
+)
+def test_the_error_is_that_of_the_response_and_a_band_holds_its_worst_sample(
+    tmp_path, case, band, named, held
+):
+    row = run.run_method(write(tmp_path, "mine", RIGHT.format(band=band, named=named)), case)
+    (dip,) = row["dips"]
+    assert dip["error"] == pytest.approx(0.1)
+    assert dip["held"] == held
+    assert row["named"] == named
+
+
+def test_what_a_method_raises_is_a_row_and_no_end(tmp_path, case):
+    wrong = write(
+        tmp_path, "wrong", "def fit(events):\n    return 1 / 0\n\ndef predict(m, e): ...\n"
+    )
+    row = run.run_method(wrong, case)
+    assert row["failed"] == "ZeroDivisionError: division by zero (line 2 of fit)"
+    late = write(tmp_path, "late", "def fit(events): ...\n\ndef predict(m, e):\n    return m[0]\n")
+    (dip,) = run.run_method(late, case)["dips"]
+    assert dip["error"] is None
+    assert "TypeError" in dip["failed"]
+
+
+def test_a_file_that_is_no_method_is_told_before_anything_runs(tmp_path):
+    with pytest.raises(SystemExit, match="a method needs a function predict"):
+        run.read_method(write(tmp_path, "half", "def fit(events): ...\n"))
+    with pytest.raises(SystemExit, match="there is no such Python file"):
+        run.read_method(tmp_path / "none.py")
+
+
+def test_numbers_are_those_of_cases():
+    assert run.read_numbers("1-3,51") == [1, 2, 3, 51]
+    with pytest.raises(ValueError, match="there is no case 61"):
+        run.read_numbers("61")
+
+
+def test_a_public_case_is_the_same_each_time_and_others_follow_their_seed():
+    number = 1 + RECIPES.index("stator_resistance")
+    one, again = make_case(number, 0), make_case(number, 0)
+    assert one.truth == ("stator_resistance",)
+    assert (len(one.fitted), len(one.unused)) == (3, 2)
+    assert np.array_equal(one.unused[0].P, again.unused[0].P)
+    assert not np.array_equal(one.unused[0].P, make_case(number, 1).unused[0].P)
+
+
+def test_a_shipped_record_judges_by_the_dip_that_is_not_fitted():
+    case = read_record(51)
+    assert (len(case.fitted), len(case.unused)) == (2, 1)
+    assert case.truth == ("stator_transients",)
+
+
+def test_the_command_writes_rows_and_a_page(tmp_path, capsys):
+    method = write(tmp_path, "mine", RIGHT.format(band=(9.0, 9.0), named=["stator_transients"]))
+    words = ["--methods", str(method), "--cases", "51", "--cores", "1", "--out", str(tmp_path)]
+    run.main(words)
+    (row,) = json.loads((tmp_path / "suite.json").read_text(encoding="utf-8"))["rows"]
+    assert row["dips"][0]["held"] == [True, True]
+    printed = capsys.readouterr().out
+    assert "mine | 1 | " in printed
+    assert "100% of 2 | 1 | 0 | 0 | " in printed
+    assert "mine" in (tmp_path / "suite.html").read_text(encoding="utf-8")
