@@ -99,7 +99,17 @@ class Unknown(UserError, AttributeError):
 
 
 def nearest(name: str, allowed: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?" for the closest allowed name, or "" when nothing is close."""
+    """Return "; did you mean 'x'?" for the closest allowed name, or "" when nothing is close.
+
+    Names are compared letter by letter, and with their words in order.
+
+    Examples
+    --------
+    >>> nearest("torque_of_load", ["load_torque", "motor_voltage"])
+    "; did you mean 'load_torque'?"
+    >>> nearest("weather", ["load_torque"])
+    ''
+    """
     ratios = {other: _measure_likeness(str(name), other) for other in allowed}
     closest = max(ratios, key=lambda other: (ratios[other], other), default="")
     return f"; did you mean '{closest}'?" if ratios.get(closest, 0.0) >= LEAST_LIKENESS else ""
@@ -120,13 +130,36 @@ def _sort_words(name: str) -> str:
 
 
 def among(name: object, allowed: Iterable[str], label: str = "Available") -> str:
-    """The end of a sentence about an unknown name: the nearest one, and all there are."""
+    """The end of a sentence about an unknown name: the nearest one, and all there are.
+
+    Examples
+    --------
+    >>> among("zipp", ["zip", "none"], "Loads")
+    "; did you mean 'zip'? Loads: none, zip"
+    """
     allowed = sorted(map(str, allowed))
     return f"{nearest(str(name), allowed) or '.'} {label}: {', '.join(allowed) or 'none'}"
 
 
 def check_choice(where: str, value: object, allowed: Iterable[object]) -> None:
-    """Raise `UserError` unless `value` is one of `allowed`; `where` is the setting's full key."""
+    """Raise `UserError` unless a value is one of those allowed.
+
+    Parameters
+    ----------
+    where : str
+        The setting's full key.
+    value : object
+        What was given.
+    allowed : iterable
+        What may be given.
+
+    Examples
+    --------
+    >>> check_choice("optimizer.space", "unit", ("unit", "raw"))
+    >>> check_choice("optimizer.space", "row", ("unit", "raw"))
+    Traceback (most recent call last):
+    tractexp.errors.UserError: optimizer.space=row is not one of unit, raw; did you mean 'raw'?
+    """
     allowed = tuple(allowed)
     if value not in allowed:
         names = tuple(map(str, allowed))
@@ -137,8 +170,14 @@ def check_choice(where: str, value: object, allowed: Iterable[object]) -> None:
 
 
 def check_distinct(where: str, values: Iterable[object]) -> None:
-    """Raise `UserError` for no values, or for one that is there twice; `where` is the setting's
-    full key.
+    """Raise `UserError` for no values, or for one that is there twice.
+
+    Parameters
+    ----------
+    where : str
+        The setting's full key.
+    values : iterable
+        What was given.
     """
     values = list(values)
     if not values:
@@ -151,8 +190,21 @@ def check_distinct(where: str, values: Iterable[object]) -> None:
 def check_range(
     where: str, value: float | None, low: float = float("-inf"), high: float = float("inf")
 ) -> None:
-    """Raise `UserError` unless low <= value <= high and it is finite, or None; `where` is the
-    setting's full key.
+    """Raise `UserError` unless a number is within a range and finite.
+
+    Parameters
+    ----------
+    where : str
+        The setting's full key.
+    value : float or None
+        None is never refused.
+    low, high : float
+        Least and greatest value allowed.
+
+    Examples
+    --------
+    >>> check_range("task.depth", 0.5, 0.0, 1.0)
+    >>> check_range("task.depth", None, 0.0, 1.0)
     """
     if value is not None and (not low <= value <= high or math.isinf(value)):
         limits = []

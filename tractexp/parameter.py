@@ -13,11 +13,35 @@ from tractexp.errors import UserError, among
 class Parameter:
     """One number to identify: its default, bounds, unit, meaning and source.
 
-    The attribute a plugin assigns it to is its name. `null`, if any, is the value at which the
-    equations are as if the term were absent. `symbol` is LaTeX. `power_exponent` says how the value
-    goes with the base of power, whatever its unit: on a base of a k-th of the MVA the same load has
-    k^power_exponent times the value. A power, a torque, an inertia or an admittance has 1, an
-    impedance -1; shares, times and voltages have 0.
+    The attribute a plugin assigns it to is its name.
+
+    Attributes
+    ----------
+    default : float
+        Where a search that asks for a start begins.
+    bounds : (float, float)
+        Least and greatest value, in its unit.
+    unit : str
+        "1" of a plain number.
+    about : str
+        What it means, in a few words.
+    source : str
+        Where default and bounds come from.
+    symbol : str
+        LaTeX; "": the name.
+    null : float or None
+        The value at which the equations are as if the term were absent.
+    power_exponent : int
+        How the value goes with the base of power, whatever its unit: on a base of a k-th of the MVA
+        the same load has k^power_exponent times the value. A power, a torque, an inertia or an
+        admittance has 1, an impedance -1; shares, times and voltages have 0.
+
+    Examples
+    --------
+    >>> class Load:
+    ...     p_v = Parameter(1.5, (0.0, 4.0), "1", "exponent of P", "IEEE Task Force 1995")
+    >>> Load.p_v.name, Load.p_v.bounds
+    ('p_v', (0.0, 4.0))
     """
 
     default: float
@@ -79,6 +103,14 @@ class Box:
 
     A problem's box has the names of its columns. An optimizer's has none: it is the unit cube, or
     the problem's bounds where the optimizer asks for `space="raw"`.
+
+    Examples
+    --------
+    >>> box = Box(np.array([0.0, 10.0]), np.array([1.0, 30.0]), ("C", "X"))
+    >>> box.from_unit(np.array([0.5, 0.25])).tolist()
+    [0.5, 15.0]
+    >>> box.clip(np.array([[2.0, 20.0]])).tolist()
+    [[1.0, 20.0]]
     """
 
     lower: np.ndarray  # (d,)
@@ -127,7 +159,13 @@ class Box:
         return (x - self.lower) / self.width
 
     def index(self, name: str) -> int:
-        """The column of a name. Raises `UserError` for one there is not."""
+        """The column of a name.
+
+        Raises
+        ------
+        UserError
+            For a name that there is not, with the nearest one.
+        """
         if name not in self.names:
             raise UserError(
                 f"this model has no parameter '{name}'{among(name, self.names, 'Parameters')}"
@@ -136,8 +174,24 @@ class Box:
 
 
 def even(n: int, d: int) -> np.ndarray:
-    """(n, d) points that fill the unit cube evenly. Source: Roberts 2018, the additive sequence
-    R_d.
+    """Points that fill the unit cube evenly, the same ones every time.
+
+    Parameters
+    ----------
+    n : int
+        How many.
+    d : int
+        Of so many coordinates.
+
+    Returns
+    -------
+    (n, d) array
+        In [0, 1). Source: Roberts 2018, the additive sequence R_d.
+
+    Examples
+    --------
+    >>> even(3, 1).ravel().round(3).tolist()
+    [0.118, 0.736, 0.354]
     """
     ratio = 2.0
     for _ in range(60):  # the root above 1 of x^(d + 1) = x + 1
@@ -148,11 +202,31 @@ def even(n: int, d: int) -> np.ndarray:
 def best_distinct(
     unit: np.ndarray, f: np.ndarray, distance: float, count: int, norm: float = np.inf
 ) -> np.ndarray:
-    """Indices of at most `count` points, best first, each further than `distance` from every better
-    one chosen.
+    """Indices of the best points that are not too close to a better one.
 
-    `unit` (n, d) in the unit cube, `f` (n,) objectives, lower is better. `norm` is the order of the
-    distance's norm: `np.inf` takes the coordinate that differs most, 2 is Euclid's.
+    Parameters
+    ----------
+    unit : (n, d)
+        Points in the unit cube.
+    f : (n,)
+        Objectives, lower is better.
+    distance : float
+        Each chosen one is further than this from every better one chosen.
+    count : int
+        At most so many.
+    norm : float
+        Order of the distance's norm: `np.inf` takes the coordinate that differs most, 2 is
+        Euclid's.
+
+    Returns
+    -------
+    (k,) array of ints
+        The best first.
+
+    Examples
+    --------
+    >>> best_distinct(np.array([[0.1], [0.15], [0.9]]), np.array([2.0, 1.0, 3.0]), 0.1, 2).tolist()
+    [1, 2]
     """
     remaining, chosen = np.argsort(f, kind="stable"), []
     while len(remaining) and len(chosen) < count:

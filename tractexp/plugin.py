@@ -79,9 +79,24 @@ _schemas: dict[type[Plugin], type] = {}
 def plugin(cls: Class) -> Class:
     """Register a plugin class under its module's name, in its base's group.
 
-    Raises `UserError` when the name is taken, when the class belongs to no group or lacks a method
-    its base leaves to it, when its docstring does not say where its equations come from (a line
-    starting with "Source:"), and for what its base and its parameters find declared wrongly.
+    Its annotated fields become its settings: the class is a frozen, keyword-only dataclass then.
+
+    Parameters
+    ----------
+    cls : type
+        A subclass of one of the framework's bases.
+
+    Returns
+    -------
+    type
+        The class, with `name` and `parameters`.
+
+    Raises
+    ------
+    UserError
+        When the name is taken, when the class belongs to no group or lacks a method its base leaves
+        to it, when its docstring does not say where its equations come from (a line starting with
+        "Source:"), and for what its base and its parameters find declared wrongly.
     """
     name = cls.__module__.rpartition(".")[2]
     where = f"plugin {cls.__module__}.{cls.__qualname__}"

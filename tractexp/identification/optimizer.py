@@ -32,17 +32,41 @@ class Evaluate(Protocol):
         ...
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, d) -> (evaluated points (n, d), objectives (n,)). Lower is
-        better; never nan.
+        """The objectives of a batch of points.
+
+        Parameters
+        ----------
+        x : (n, d)
+            Points; they are clipped into the box.
+
+        Returns
+        -------
+        (n, d) array
+            The points really evaluated.
+        (n,) array
+            Their objectives: lower is better, never nan.
         """
         ...
 
     def residuals(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, d) -> (evaluated points (n, d), residuals (n, m)); the objective is their sum
-        of squares.
+        """The residuals of a batch of points, whose sum of squares is the objective.
 
-        A point that cannot be simulated has nan in its whole row. Raises `UserError` where the
-        problem has no residuals.
+        Parameters
+        ----------
+        x : (n, d)
+            Points; they are clipped into the box.
+
+        Returns
+        -------
+        (n, d) array
+            The points really evaluated.
+        (n, m) array
+            Residuals; a point that cannot be simulated has nan in its whole row.
+
+        Raises
+        ------
+        UserError
+            Where the problem has no residuals.
         """
         ...
 
@@ -61,8 +85,17 @@ class Optimizer(Plugin):
     polish: bool = False
 
     def end(self, budget: int | None) -> int | None:
-        """The iterations after which a search ends by itself under a budget of simulations; None
-        where that is open.
+        """The iterations after which a search ends by itself.
+
+        Parameters
+        ----------
+        budget : int or None
+            The simulations it may make; None: any number.
+
+        Returns
+        -------
+        int or None
+            None: that is open.
         """
         return getattr(self, "iterations", None)
 
@@ -72,11 +105,24 @@ class Optimizer(Plugin):
 
     @abstractmethod
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
-        """Search `box`, yielding once at the end of each iteration (the initial population is
-        iteration 0).
+        """Search a box, yielding after the initial population and after each iteration.
 
         A generator: the search loop runs it until it returns or a budget is spent, in which case
-        `evaluate` raises and the generator simply ends. All randomness comes from `rng`.
+        `evaluate` raises and the generator simply ends. The first `yield` is the start (iteration
+        0).
+
+        Parameters
+        ----------
+        evaluate : Evaluate
+            The batch objective, which counts, clips and keeps the best.
+        box : Box
+            Bounds (d,): the unit cube, or the problem's own where `space` is "raw".
+        rng : numpy.random.Generator
+            All randomness comes from it.
+
+        Yields
+        ------
+        None
         """
 
 
@@ -104,10 +150,36 @@ class Iterative(Optimizer):
         return self.iterations or (self.usual if budget is None else None)
 
     def laid_out(self, budget: int | None, first: float, each: float) -> tuple[int, Iterable[int]]:
-        """How many iterations the search is laid out for, and their numbers 1, 2, ...
+        """How many iterations a search is laid out for, and their numbers.
 
-        The first population costs `first` simulations and an iteration `each`, on average: a budget
-        lasts for so many, and then ends them, for the numbers go on.
+        A budget lasts for so many, and then ends them, for the numbers go on.
+
+        Parameters
+        ----------
+        budget : int or None
+            The simulations it may make.
+        first : float
+            Simulations of the first population.
+        each : float
+            Simulations of an iteration, on average.
+
+        Returns
+        -------
+        int
+            The iterations that a schedule can count on.
+        iterable of ints
+            1, 2, ...
+
+        Examples
+        --------
+        >>> @dataclass(frozen=True, kw_only=True)
+        ... class Steps(Iterative):
+        ...     def search(self, evaluate, box, rng):
+        ...         yield
+        >>> Steps().laid_out(budget=120, first=20, each=10)[0]
+        10
+        >>> Steps(iterations=7).laid_out(None, 20, 10)
+        (7, range(1, 8))
         """
         count = self.end(budget)
         if count is not None:

@@ -37,12 +37,39 @@ class Loss(Plugin):
             )
 
     def rho(self, z: np.ndarray) -> np.ndarray:
-        """The loss of squared residuals `z`, in squared scales; z itself where z is small."""
+        """The loss of squared residuals.
+
+        Parameters
+        ----------
+        z : array
+            Squared residuals, in squared scales.
+
+        Returns
+        -------
+        array of the same shape
+            z itself where z is small.
+        """
         return z
 
     def scales(self, events: Sequence[Event], drive: Drive) -> np.ndarray:
-        """The usual residual of each sample of P and Q (C, N) [pu]. Raises `UserError` where it is
-        not known.
+        """The usual residual of each sample.
+
+        Parameters
+        ----------
+        events : Sequence[Event]
+            Those that are fitted.
+        drive : Drive
+            Their inputs and measurements, one after the other.
+
+        Returns
+        -------
+        (C, N) or (2, 1) array [pu]
+            The noise before each dip, or `scale`; 1 for squares.
+
+        Raises
+        ------
+        UserError
+            Where it is not known: no noise before a dip, and no `scale`.
         """
         if self.quadratic:
             return np.ones((2, 1))

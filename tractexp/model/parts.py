@@ -71,19 +71,37 @@ class Motor(Part):
 
     @abstractmethod
     def declare(self, eq: "Equations", *_: Any, **parameters: Any) -> Any:
-        """Declare states and sites in `eq` and return the phasor of the stator current [pu]; None:
-        no motor.
+        """Declare states and sites, and return the stator current.
 
         The motor draws V conj(I), V = `eq.V`; the framework declares that.
+
+        Parameters
+        ----------
+        eq : Equations
+            What offers states, sites and the voltage; docs/plugins.md lists its words.
+        **parameters : Symbol
+            Those of the motor that the method asks for by name.
+
+        Returns
+        -------
+        Expr or None
+            The phasor of the stator current [pu]; None: there is no motor.
         """
 
     def usual(self, *_: Any, **parameters: Any) -> "Iterable[tuple[Any, float, float]]":
-        """What such machines usually are: (quantity, median, factor), each positive and
-        log-normally spread.
+        """What such machines usually are, to which `model.priors` holds an estimate.
 
-        Two machines of three have a quantity within `factor` times or over its median. Parameters
-        are numbers or arrays (n,); quantities do not depend on the base. Where `model.priors` asks
-        for it, the estimate is held to it.
+        Two machines of three have a quantity within `factor` times or over its median.
+
+        Parameters
+        ----------
+        **parameters : float or (n,)
+            Those of the motor that the method asks for by name.
+
+        Returns
+        -------
+        iterable of (quantity, median, factor)
+            Each positive and log-normally spread; a quantity does not depend on the base.
         """
         return ()
 
@@ -109,9 +127,20 @@ class Static(Part):
     def law(
         self, u: "Symbol", *_: Any, **parameters: Any
     ) -> "tuple[Expr | float, Expr | float] | None":
-        """P/P_s0 and Q/Q_s0 at the voltage u = U/U_0, both 1 at u = 1; None: no static load.
+        """How the static load follows the voltage.
 
-        A law that names an argument `f` gets the frequency over that before the event.
+        Parameters
+        ----------
+        u : Symbol
+            U / U_0.
+        **parameters : Symbol
+            Those of the load that the method asks for by name; a law that names an argument `f`
+            gets the frequency over that before the event.
+
+        Returns
+        -------
+        (Expr, Expr) or None
+            P / P_s0 and Q / Q_s0, both 1 at u = 1; None: there is no static load.
         """
 
     def compute_damping(self, *_: Any, **parameters: Any) -> Any:
@@ -123,11 +152,18 @@ class Static(Part):
         return DAMPING
 
     def require(self, *_: Any, **parameters: Any) -> Iterable[tuple[Any, ...]]:
-        """What must hold for a steady state: (slack, sentence) or (slack, sentence, shown), slack
-        >= 0 where it does.
+        """What must hold for a steady state.
 
-        `{value}` in the sentence prints `shown`, by default the slack. May ask for `P0`, `Q0` and
-        `U0` by name.
+        Parameters
+        ----------
+        **parameters : Symbol
+            Those of the load, and `P0`, `Q0` and `U0` [pu], that the method asks for by name.
+
+        Returns
+        -------
+        iterable of (slack, sentence) or (slack, sentence, shown)
+            The slack is 0 or more where it holds; `{value}` in the sentence prints `shown`, by
+            default the slack.
         """
         return ()
 
@@ -160,20 +196,35 @@ class Effect(Part):
     equations.
 
     The parameters that say how large the effect is have a `null` at which the edited equations are
-    the unedited ones; `relevant` is the smallest departure from it that matters. The others vanish
-    there, and `grid` names the values of each at which to look for the effect. `reads` names the
-    recorded channels without which it cannot be seen, `confused_with` the effects that look alike
-    on ordinary dips. `places` and `kind` say where it acts and what it does there, of
-    `sites.PLACES` and `sites.KINDS`. One that `iterates` solves its equations anew at each stage of
-    a step, by parts that other effects have enlarged, which makes all of them dear: it is simulated
-    beside few.
+    the unedited ones. The others vanish there.
 
-    A member of a family names the textbook effect as its `family`: the same kind of effect at
-    another place, or at the same place by another law, tried beside a single textbook effect.
-    `differs` ends the sentence that begins with the textbook's name; `as_textbook` {own parameter:
-    the textbook's} says where a search begins and, where it `nests_textbook`, at which values it is
-    the textbook effect, the other parameters at their defaults. `likely` {parameter: standard
-    deviation} holds shapes to their defaults, the textbook law, unless the data say otherwise.
+    Attributes
+    ----------
+    order : int
+        Edits of a higher order come later: those that copy what others have edited.
+    grid : {parameter: values}
+        The values of each parameter without a null at which to look for the effect.
+    relevant : {parameter: float}
+        The smallest departure of a size from its null that matters.
+    reads : names
+        The recorded channels without which the effect cannot be seen.
+    confused_with : names
+        The effects that look alike on ordinary dips.
+    places, kind
+        Where it acts and what it does there, of `sites.PLACES` and `sites.KINDS`.
+    iterates : bool
+        Whether it solves its equations anew at each stage of a step, by parts that other effects
+        have enlarged, which makes all of them dear: it is simulated beside few.
+    family : name
+        The textbook effect that a member of its family is tried beside: the same kind of effect at
+        another place, or at the same place by another law.
+    differs : str
+        The end of the sentence that begins with the textbook's name.
+    as_textbook : {own parameter: the textbook's}
+        Where a search begins and, where it `nests_textbook`, at which values it is the textbook
+        effect, the other parameters at their defaults.
+    likely : {parameter: standard deviation}
+        Holds shapes to their defaults, the textbook law, unless the data say otherwise.
     """
 
     group: ClassVar[str] = "effect"
@@ -193,32 +244,65 @@ class Effect(Part):
     likely: ClassVar[Mapping[str, float]] = {}
 
     def curve(self, *_: Any, **parameters: Any) -> "Curve | None":
-        """The law found, where it is one that can be drawn, at these values of the parameters."""
+        """The law found, to be drawn.
+
+        Parameters
+        ----------
+        **parameters : float
+            The effect's own that the method asks for by name, in their units.
+
+        Returns
+        -------
+        Curve or None
+            None: it is no law that can be drawn.
+        """
         return None
 
     @abstractmethod
     def edit(self, eq: "Equations", *_: Any, **parameters: Any) -> None:
         """Edit the declared equations: call `eq.edit` on a site, add what is new.
 
-        Asking `eq` for what a model lacks refuses the effect for that model.
+        Parameters
+        ----------
+        eq : Equations
+            Asking it for what a model lacks refuses the effect for that model.
+        **parameters : Symbol
+            The effect's own that the method asks for by name.
         """
 
     def describe_sign(self, event: Any) -> str:
-        """How a recorded event shows this effect before anything is fitted, in words; "" where it
-        does not.
+        """How a recorded event shows this effect before anything is fitted.
 
         A model with `shown_effects` has the effects that an event shows, as nuisances: what the fit
-        needs to meet the record, and nobody asks for. `event` is a `tractexp.record.Event`, in
-        waveforms a `WaveEvent`.
+        needs to meet the record, and nobody asks for.
+
+        Parameters
+        ----------
+        event : tractexp.record.Event
+            In waveforms a `WaveEvent`.
+
+        Returns
+        -------
+        str
+            In words; "" where it does not.
         """
         return ""
 
     def refusal(self, eq: "Equations") -> str | None:
-        """A reason, as a sentence, that only this effect knows why it makes no sense for the
-        equations in `eq`.
+        """Why an effect makes no sense for a model, where only the effect knows.
 
         That a site, a speed or a quantity is not there needs no saying: asking `eq` for it refuses
         the effect.
+
+        Parameters
+        ----------
+        eq : Equations
+            Of the model that it would be added to.
+
+        Returns
+        -------
+        str or None
+            The reason; None: it makes sense.
         """
         return None
 
@@ -279,6 +363,18 @@ class Measurement(Effect):
     def observe(
         self, power: np.ndarray, drive: "Drive", values: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """P and Q (2, n, N) as the recorder would show them, in place or anew; `values` {parameter:
-        (E, n)}.
+        """P and Q as the recorder would show them, in place or anew.
+
+        Parameters
+        ----------
+        power : (2, n, N) [pu]
+            What n candidates calculate, all events one after the other.
+        drive : Drive
+            Inputs and measurements of these events.
+        values : {parameter: (E, n)}
+            The parameters' values in each event.
+
+        Returns
+        -------
+        (2, n, N) array [pu]
         """

@@ -37,34 +37,84 @@ class Reader(Plugin):
 
     @staticmethod
     def build_settings(path: str) -> dict[str, Any]:
-        """The settings that make it read all of one file; for a reader with `endings`."""
+        """The settings that make it read all of one file; for a reader with `endings`.
+
+        Parameters
+        ----------
+        path : str
+            Of the file.
+
+        Returns
+        -------
+        dict
+            {setting: value}.
+        """
         return {"path": path}
 
     @classmethod
     def takes(cls, path: str, *join: str) -> bool:
-        """Whether a file with one of its endings, and those of the same event, are meant for it:
-        readers that share an ending look inside.
+        """Whether files are meant for this reader: readers that share an ending look inside.
+
+        Parameters
+        ----------
+        path : str
+            A file with one of its endings.
+        *join : str
+            Those of the same event.
         """
         return True
 
     @abstractmethod
     def read(self) -> Events:
-        """Read and check everything; raises `UserError` naming the file, the place
-        and the value.
+        """Read and check everything.
+
+        Returns
+        -------
+        Events
+            Those that are fitted, and those held out.
+
+        Raises
+        ------
+        UserError
+            It names the file, the place and the value.
         """
 
     def table(self) -> tuple["Record", Sequence["FileDip"]] | None:
-        """The whole record of a file and its dips, from a reader of one table; None from other
-        readers.
+        """The whole record of a file and its dips, from a reader of one table.
+
+        Returns
+        -------
+        (Record, Sequence[FileDip]) or None
+            None from other readers.
         """
         return None
 
 
 def reader_of(path: str, *join: str) -> type[Any]:
-    """The reader of a file, or of the files of one event, by the ending and, where several share
+    """The reader of a file, or of the files of one event: by the ending and, where several share
     it, by what is inside.
 
-    Raises `UserError` for a folder, and for an ending that no reader takes.
+    Parameters
+    ----------
+    path : str
+        The file.
+    *join : str
+        Those of the same event.
+
+    Returns
+    -------
+    type
+        A reader plugin.
+
+    Raises
+    ------
+    UserError
+        For a folder, and for an ending that no reader takes.
+
+    Examples
+    --------
+    >>> reader_of("station.cfg").name
+    'comtrade'
     """
     ending = Path(path).suffix.lower()
     classes: list[Any] = list(discover()[Reader.group].values())

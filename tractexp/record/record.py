@@ -64,7 +64,22 @@ class Base:
         return self.origin == LOAD or self.power != 1.0
 
     def per_unit(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Columns by name, U and U2 [kV], P and P_3, P_5, ... [MW] and Q [Mvar], in per unit."""
+        """Columns in per unit of this base.
+
+        Parameters
+        ----------
+        columns : {name: array}
+            U and U2 [kV], P and P_3, P_5, ... [MW], Q [Mvar]; others stay as they are.
+
+        Returns
+        -------
+        {name: array}
+
+        Examples
+        --------
+        >>> Base(voltage=110.0, power=20.0).per_unit({"U": np.array([99.0]), "P": np.array([10.0])})
+        {'U': array([0.9]), 'P': array([0.5])}
+        """
         return {name: values / self._one(name) for name, values in columns.items()}
 
     def absolute(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

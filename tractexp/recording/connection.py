@@ -34,13 +34,23 @@ class Connection(Plugin):
 
     @abstractmethod
     def voltage(self) -> np.ndarray:
-        """(K, voltages): the load's phase voltages from those recorded; K is 3, or 1 for a
-        single-phase load.
+        """The matrix that makes a load's voltages of those recorded.
+
+        Returns
+        -------
+        (K, voltages) array
+            K phases to ground: 3, or 1 for a single-phase load.
         """
 
     @abstractmethod
     def current(self) -> np.ndarray:
-        """(K, currents): the load's currents from those recorded."""
+        """The matrix that makes a load's currents of those recorded.
+
+        Returns
+        -------
+        (K, currents) array
+            K as of the voltages; positive into the load.
+        """
 
     @property
     def voltages(self) -> int:
@@ -59,8 +69,24 @@ class Connection(Plugin):
 
 
 def usual(voltages: int, currents: int, lines: bool = False) -> Any:
-    """The default connection of so many channels, voltages between phases or to ground; None where
-    there is none.
+    """The default connection of so many channels.
+
+    Parameters
+    ----------
+    voltages, currents : int
+        How many channels there are.
+    lines : bool
+        Whether the voltages are between phases.
+
+    Returns
+    -------
+    name, {"name": name, **settings} or None
+        None: nothing is usual for so many.
+
+    Examples
+    --------
+    >>> usual(3, 3)
+    'three_phase'
     """
     for name, cls in sorted(discover()[Connection.group].items()):
         settings = getattr(cls, "usual", {}).get((voltages, currents, lines))

@@ -27,18 +27,51 @@ class Estimator(Plugin):
 
     @abstractmethod
     def half(self, nominal: float) -> float:
-        """Half of the window's length [s]. Raises `UserError` for a nominal frequency [Hz] that it
-        does not support.
+        """Half of the window's length [s].
+
+        Parameters
+        ----------
+        nominal : float [Hz]
+            Frequency of the grid.
+
+        Raises
+        ------
+        UserError
+            For a frequency that it does not support.
         """
 
     @abstractmethod
     def weight(self, at: np.ndarray, nominal: float) -> np.ndarray:
-        """Symmetric weights (W,), of any scale, at times (W,) [s] about the center, none further
-        away than half.
+        """The window.
+
+        Parameters
+        ----------
+        at : (W,) [s]
+            Times about the center, none further away than half.
+        nominal : float [Hz]
+            Frequency of the grid.
+
+        Returns
+        -------
+        (W,) array
+            Symmetric weights, of any scale.
         """
 
     def averager(self, rate: float, nominal: float) -> Averager:
-        """The window on samples taken at `rate` [Hz]."""
+        """The window on samples.
+
+        Parameters
+        ----------
+        rate : float [Hz]
+            At which they were taken.
+        nominal : float [Hz]
+            Frequency of the grid.
+
+        Returns
+        -------
+        Averager
+            What averages waveforms over it.
+        """
         reach = int(self.half(nominal) * rate + 1e-9)
         return make_weighted_averager(self.weight(np.arange(-reach, reach + 1) / rate, nominal))
 

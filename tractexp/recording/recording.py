@@ -50,7 +50,23 @@ NOTHING_BRIDGED = (np.empty(0, dtype=int), np.empty(0))
 
 
 def unit_of(text: str) -> tuple[str, float]:
-    """(quantity, factor to kV or kA) of a unit as a file writes it; ("", 1.0) for another."""
+    """What a unit measures.
+
+    Parameters
+    ----------
+    text : str
+        As a file writes it: "V", "[kA]", "кВ".
+
+    Returns
+    -------
+    (str, float)
+        The quantity and the factor to kV or kA; ("", 1.0) for another unit.
+
+    Examples
+    --------
+    >>> unit_of("[V]"), unit_of("kA"), unit_of("MW")
+    (('voltage', 0.001), ('current', 1.0), ('', 1.0))
+    """
     text = unicodedata.normalize("NFKC", text).strip(" .")
     text = text[1:-1].strip() if (text[:1], text[-1:]) in (("[", "]"), ("(", ")")) else text
     latin = text.translate(CYRILLIC)
@@ -58,8 +74,12 @@ def unit_of(text: str) -> tuple[str, float]:
 
 
 def quantity_of(text: str) -> str:
-    """The quantity of a unit as a file writes it, also of several ("V/kV"), where the size stays
-    open; "" of others.
+    """The quantity of a unit as a file writes it, also of several, where the size stays open.
+
+    Examples
+    --------
+    >>> quantity_of("V/kV"), quantity_of("V/A")
+    ('voltage', '')
     """
     quantities = {unit_of(part)[0] for part in re.split(r"[/|;]", text)}
     return quantities.pop() if len(quantities) == 1 else ""
@@ -69,6 +89,13 @@ def quantity_of(text: str) -> str:
 class Segment:
     """Samples of one rate: numbers from `first` up to but not including `stop`, from `start` [s]
     on.
+
+    Examples
+    --------
+    >>> Segment(0, 4, 1000.0, 0.5).t.tolist()
+    [0.5, 0.501, 0.502, 0.503]
+    >>> Segment(0, 1000, 1000.0, 0.0).between(0.2, 0.3).first
+    200
     """
 
     first: int
@@ -82,7 +109,18 @@ class Segment:
         return self.start + np.arange(self.stop - self.first) / self.rate
 
     def between(self, start: float, end: float) -> "Segment":
-        """The part of it from time `start` up to `end` [s]."""
+        """A part of it.
+
+        Parameters
+        ----------
+        start, end : float [s]
+            The part is from `start` up to, but not including, `end`.
+
+        Returns
+        -------
+        Segment
+            Without samples where they lie outside.
+        """
         first, stop = (
             min(max(int(np.ceil((t - self.start) * self.rate - 1e-6)), 0), self.stop - self.first)
             for t in (start, end)

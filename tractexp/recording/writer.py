@@ -21,10 +21,34 @@ class Writer(Plugin):
 
     @abstractmethod
     def record(self, record: Record, path: Path) -> list[Path]:
-        """Write a record to `path`, with the first ending, and what belongs beside it; returns the
-        files.
+        """Write a record, and what belongs beside it.
+
+        Parameters
+        ----------
+        record : Record
+            Of one event.
+        path : Path
+            With the first of `endings`.
+
+        Returns
+        -------
+        list of Path
+            The files written.
         """
 
     @abstractmethod
     def recording(self, recording: Recording, path: Path) -> list[Path]:
-        """The same for a recording."""
+        """Write a recording, and what belongs beside it.
+
+        Parameters
+        ----------
+        recording : Recording
+            All channels of a file.
+        path : Path
+            With the first of `endings`.
+
+        Returns
+        -------
+        list of Path
+            The files written.
+        """
