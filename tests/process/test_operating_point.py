@@ -20,7 +20,9 @@ def fitted(base=None, **parameters):
     """A result with some of its parameters, and perhaps its base, changed."""
     result = identified().result
     changes = {"own_base": base} if base else {}
-    return dataclasses.replace(result, parameters=result.parameters | parameters, **changes)
+    # the band was that of the parameters identified
+    changes |= {"parameters": result.parameters | parameters, "next_dip": {}}
+    return dataclasses.replace(result, **changes)
 
 
 @pytest.mark.parametrize("slip", [0.01, 0.3, 1.0])
