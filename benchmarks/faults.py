@@ -31,7 +31,9 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-import tractexp  # before NumPy: it keeps BLAS to one thread
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is imported
+
+import tractexp
 
 tractexp.__version__  # noqa: B018
 

@@ -22,7 +22,9 @@ import zipfile
 from datetime import datetime
 from pathlib import Path
 
-import tractexp  # before NumPy: it keeps BLAS to one thread
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is imported
+
+import tractexp
 
 tractexp.__version__  # noqa: B018
 

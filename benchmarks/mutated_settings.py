@@ -23,7 +23,9 @@ import traceback
 import warnings
 from pathlib import Path
 
-import tractexp  # before NumPy: it keeps BLAS to one thread
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is imported
+
+import tractexp
 
 tractexp.__version__  # noqa: B018
 

@@ -12,13 +12,14 @@ here: the generator has no phase jump. Seeds begin at 931000 and are used nowher
 import argparse
 import itertools
 import json
+import os
 import textwrap
 import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import tractexp  # noqa: F401 before NumPy: it keeps BLAS to one thread
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is imported
 
 import numpy as np  # isort: skip
 

@@ -24,7 +24,9 @@ from math import log
 from pathlib import Path
 from typing import Any
 
-import tractexp  # before NumPy: it keeps BLAS to one thread
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy is imported
+
+import tractexp
 
 tractexp.__version__  # noqa: B018
 

@@ -4,9 +4,12 @@ import os
 import shutil
 from pathlib import Path
 
+# before NumPy: BLAS has one thread, as in every process of the program
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 
-import tractexp  # before NumPy: it keeps BLAS to one thread, as every command does
+import tractexp
 
 LONG = (
     "process/test_tutorial.py",

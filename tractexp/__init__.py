@@ -9,7 +9,6 @@ Every name below is imported when it is first used, so that `import tractexp` ta
 """
 
 import importlib
-import os
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and type checkers; a test holds it to PUBLIC
@@ -36,11 +35,6 @@ if TYPE_CHECKING:  # for editors and type checkers; a test holds it to PUBLIC
     from tractexp.studies.api.search import search as search
 
     __version__: str
-
-# Our matrices have a dozen columns: BLAS threads only wait for each other (a hundredfold under
-# load), and their number would change the last bits of a result. This must stand before NumPy is
-# imported.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 PUBLIC = {
     "UserError": "tractexp.errors",

@@ -7,6 +7,7 @@ asked of a result that was loaded: a call with the same records, settings and se
 bits.
 """
 
+import functools
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, fields
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Self, get_origin
 
 from tractexp import files
+from tractexp.blas import in_one_thread
 from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
 from tractexp.progress import say
@@ -21,6 +23,7 @@ from tractexp.progress import say
 MARK = "tractexp"  # the key by which a saved result is known
 # of types of fields: to plain data, and back
 FORMS: dict[Any, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {}
+COMPUTING = ("report", "predict", "write_results", "write_drawings")  # methods of results
 Drawing = Callable[[Path], Path]  # makes the file of this path
 
 
@@ -98,10 +101,17 @@ class Outcome(Plain, Tabulated):
     kinds: ClassVar[dict[str, type["Outcome"]]] = {}
 
     def __init_subclass__(cls, **settings: Any) -> None:
-        """Register a kind of result by its name."""
+        """Register a kind of result by its name; what it computes later runs in one thread, as the
+        call did that made it.
+        """
         super().__init_subclass__(**settings)
         if "kind" in vars(cls):
             Outcome.kinds[cls.kind] = cls
+        for name, value in [*vars(cls).items()]:
+            if isinstance(value, functools.cached_property):
+                value.func = in_one_thread(value.func)
+            elif name in COMPUTING:
+                setattr(cls, name, in_one_thread(value))
 
     @classmethod
     def from_saved(cls, content: Mapping[str, Any]) -> Self:

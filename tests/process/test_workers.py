@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tractexp import interpreter
 from tractexp.errors import UserError
 from tractexp.workers import BARREN, Workers
 
@@ -109,3 +110,18 @@ def test_libraries_use_one_thread_in_each_worker(monkeypatch):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
     assert sorted(Workers(2).run_items(os.getenv, names, 3)) == [(0, "1"), (1, "1"), (2, "1")]
+
+
+def test_an_import_changes_nothing_of_its_process():
+    code = (
+        "import os, signal, sys, threading, warnings\n"
+        "def state():\n"
+        "    handlers = [signal.getsignal(s) for s in (signal.SIGINT, signal.SIGTERM)]\n"
+        "    outside = [n for n in sys.modules if n.partition('.')[0] == 'numpy']\n"
+        "    return dict(os.environ), sys.path[:], handlers, threading.enumerate(),"
+        " warnings.filters[:], outside\n"
+        "before = state()\n"
+        "import tractexp\n"
+        "assert state() == before\n"
+    )
+    subprocess.run(interpreter.command("-c", code), check=True, timeout=60)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar, get_type_hints
 
 from tractexp import plugin
+from tractexp.blas import limit_threads
 from tractexp.choices import defaults
 from tractexp.composition import read_choice
 from tractexp.errors import UserError, among, check_distinct, settings_as
@@ -22,7 +23,7 @@ R = TypeVar("R")
 
 def public(function: Callable[P, R]) -> Callable[P, R]:
     """A call whose arguments are checked: an unknown name or a wrong type is a `UserError` in one
-    sentence.
+    sentence. Its linear algebra runs in one thread.
 
     Sentences from below name a setting as the user wrote it: the argument (`bounds.C`) of this
     call, and the key of the configuration (`model.bounds.C`) on the command line, which calls the
@@ -47,10 +48,11 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
             parameter = signature.parameters[name]
             if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
                 check_kind(name, value, parameter.annotation)
-        with settings_as(
+        names = settings_as(
             function.__name__,
             lambda: {*named, *keywords, *(_settings("data") if open_ended else ())},
-        ):
+        )
+        with names, limit_threads():
             return function(*args, **keywords)
 
     return call_checked
