@@ -147,6 +147,12 @@ class CSV(Tabular, Reader):
     def table(self) -> tuple[Record, list[FileDip]] | None:
         return self._dips() if self.path else None
 
+    def read_voltage(self) -> Record | None:
+        if not self.path:
+            return None
+        inside, *join = event_paths(self.path, self.join, self.endings)
+        return self.record_voltage(self.path, inside, join, self.frequency)
+
     def _dips(self) -> tuple[Record, list[FileDip]]:
         whole = self._record(self.path)
         pre, post = (

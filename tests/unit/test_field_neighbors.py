@@ -3,6 +3,8 @@
 Each record is written as COMTRADE and looked at, as a user's is.
 """
 
+import re
+
 import numpy as np
 import pytest
 
@@ -259,3 +261,77 @@ def test_what_is_too_slow_for_waveforms_is_not_examined(tmp_path):
     first = str(tractexp.look(path, progress=False).summary()).splitlines()[0]
     assert first.startswith("not examined: 1.4 s from 0.600 s on at 200 Hz hold no waveforms")
     assert [row["kind"] for row in rows_of(str(tmp_path), path.name)] == ["not examined"]
+
+
+def write_table(path, header, rows, delimiter=","):
+    path.write_text("\n".join([header, *(delimiter.join(row) for row in rows)]) + "\n")
+    return str(path)
+
+
+def slow():
+    """t [s], U [kV], P [MW], Q [Mvar] of a dip of 30 % at 8 s for 0.3 s."""
+    t = np.arange(0, 20, 0.02)
+    u = np.where((t >= 8) & (t < 8.3), 0.7, 1.0)
+    return t, 110 * u, 20 * u**1.5, 8 * u**2
+
+
+@pytest.mark.parametrize(
+    ("told", "spell"),
+    [
+        ("since the year 0", lambda t: f"{739312.42743055556 + t / 86400:.9f}"),
+        ("since 1601", lambda t: f"{133537617300000000 + round(t * 1e7)}"),
+        ("since the year 1", lambda t: f"{638448849300000000 + round(t * 1e7)}"),
+        (
+            "counted from",
+            lambda t: f"2024-03-01 10:15:{30 + int(t + 1e-9)}:{round(t * 1e3) % 1000:03d}",
+        ),
+    ],
+)
+def test_other_clocks_of_programs_are_read(tmp_path, told, spell):
+    rows = [[spell(t), *(f"{x:.4f}" for x in values)] for t, *values in zip(*slow(), strict=True)]
+    path = write_table(tmp_path / "t.csv", "Time,U (kV),P (MW),Q (Mvar)", rows)
+    seen = tractexp.look(path, progress=False)
+    [event] = seen.events
+    assert event["start"] == pytest.approx(8, abs=0.03)
+    assert event["when"].startswith("2024-03-01T10:15:3")
+    assert any(told in note for note in seen.files.rows[0]["notes"])
+
+
+@pytest.mark.parametrize(("mark", "delimiter"), [(".", ";"), (",", ";")])
+def test_groups_of_digits_without_decimals_are_told_by_times_that_rise(tmp_path, mark, delimiter):
+    rows = [
+        [f"{1000 * x:,.0f}".replace(",", mark) for x in row] for row in zip(*slow(), strict=True)
+    ]
+    path = write_table(tmp_path / "t.csv", "t [ms];U [V];P [kW];Q [kvar]", rows, delimiter)
+    [load], _, _ = loads_of(path)
+    assert (load["U"], load["P"], load["Q"]) == pytest.approx((110, 20, 8), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("header", "count", "kilovolts"),
+    [("t,U (kV)", 1, 110), ("t,U", 1, 1), ("t,Ua (kV),Ub (kV),Uc (kV)", 3, 110)],
+)
+def test_a_table_of_voltage_alone_lists_its_events(tmp_path, header, count, kilovolts):
+    t, U, *_ = slow()
+    size = kilovolts / 110 / (np.sqrt(3) if count == 3 else 1)
+    rows = [[f"{a:.3f}", *[f"{b * size:.5f}"] * count] for a, b in zip(t, U, strict=True)]
+    path = write_table(tmp_path / "u.csv", header, rows)
+    [load], first, text = loads_of(path)
+    assert "dip at 8.000 s (30.0%, 300 ms)" in first
+    assert "no current is recorded with it" in first
+    assert "column P, Q is missing" in " ".join(text.split())
+    assert (load["U"], load["P"]) == (pytest.approx(kilovolts), None)
+    tractexp.look(path, progress=False).write(tmp_path / "page")
+    with pytest.raises(tractexp.UserError, match="column P, Q is missing"):
+        tractexp.read(path)
+
+
+@pytest.mark.parametrize("volts", [750, 1500, 3000])
+@pytest.mark.parametrize("ripple", [0.0, 0.02])
+def test_a_table_of_a_direct_voltage_alone_is_said_to_be_one(tmp_path, volts, ripple):
+    u = volts * DIP * (1 + ripple * np.sin(2 * np.pi * 300 * T))
+    rows = [[f"{a:.6f}", f"{b:.3f}"] for a, b in zip(T, u, strict=True)]
+    words = r"is direct: (\d+) V in the mean with a ripple of .* \(30\.\d%\) at 1\.00\d s for 2"
+    with pytest.raises(tractexp.UserError, match=words) as refused:
+        tractexp.look(write_table(tmp_path / "u.csv", "t,U [V]", rows), progress=False)
+    assert int(re.search(words, str(refused.value))[1]) == pytest.approx(volts, rel=1e-3)

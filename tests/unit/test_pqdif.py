@@ -130,6 +130,26 @@ def test_observations_are_segments_at_their_distance_and_others_are_left_out_wit
     assert any("1 of 3 observations" in note for note in recording.notes)
 
 
+def test_each_of_several_triggers_lists_its_event_and_any_can_be_chosen(write):
+    """Three parts, hours apart; each begins inside another sag, which its trigger tells apart."""
+    t = np.arange(COUNT) / RATE
+    records, depths = [made.source(*DEFINITIONS)], (0.8, 0.7, 0.6)
+    for k, left in enumerate(depths):
+        begin = START + timedelta(hours=k)
+        fall = np.where((t >= 0.4) & (t < 0.6), left / 0.7, 1.0)
+        values = waves() * fall * np.where(t < 0.05, 0.9, 1.0)
+        moment = begin + timedelta(seconds=0.4)
+        records.append(made.observation(begin, *instances(values), triggered=moment))
+    path = str(write(made.file(records)))
+    assert pqdif.load(path).find_triggers() == pytest.approx([0.4, 3600.4, 7200.4], abs=1e-4)
+    dips = [e for e in tractexp.look(path, progress=False).events if e["depth"] > 0.15]
+    assert [e["depth"] for e in dips] == pytest.approx([0.2, 0.3, 0.4], abs=0.01)
+    assert [e["dip"] for e in dips] == [2, 4, 6]
+    for number, left in zip((2, 4, 6), depths, strict=True):
+        [event] = tractexp.read(path, train=[number], validate=[])
+        assert event.depth == pytest.approx(1 - left, abs=0.01)
+
+
 def test_currents_at_half_the_rate_are_brought_together_with_the_voltages(write):
     values = waves()
     slow = [

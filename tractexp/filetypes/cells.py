@@ -3,6 +3,7 @@
 1.25   -1,25   1.0D-3   nan   #N/A   -   1,234.5   1.234,5   1 234,5   1'234.5
 """
 
+import itertools
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -107,6 +108,27 @@ def find_group_mark(rows: Sequence[Sequence[Any]], decimal: str) -> str:
             {","} if all(GROUPED["."].fullmatch(cell.strip()) for cell in open_marks) else set()
         )
     return marks.pop() if len(marks) == 1 else ""
+
+
+def find_rising_group_mark(rows: Sequence[Sequence[Any]]) -> str:
+    """The mark between groups of digits in a column of whole numbers that rise with it, and as
+    decimals would not: 980, 1.000; "" where there is none.
+    """
+    for column in zip(*rows, strict=False):
+        texts = [cell.strip() if isinstance(cell, str) else "" for cell in column]
+        for mark in ".,":
+            if not all(re.fullmatch(rf"\d{{1,3}}(?:\{mark}\d{{3}})*", text) for text in texts):
+                continue
+            grouped = [int(text.replace(mark, "")) for text in texts]
+            parts = [text.replace(mark, " ").split() for text in texts]
+            plain = [float(f"{first}.{''.join(rest)}") for first, *rest in parts]
+            if _rises(grouped) and not _rises(plain):
+                return mark
+    return ""
+
+
+def _rises(values: Sequence[float]) -> bool:
+    return all(a < b for a, b in itertools.pairwise(values))
 
 
 def numbers(

@@ -39,7 +39,8 @@ DAYS = (
     "%Y年%m月%d日",
 )
 CLOCK = re.compile(
-    r"\s*(?:(?P<day>\S.*?)[T\s]+)?(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,]\d*)?)"
+    r"\s*(?:(?P<day>\S.*?)[T\s]+)?(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):"
+    r"(?P<s>\d{1,2}(?:[.,]\d*|(?<=:\d\d:\d\d):\d{3})?)"
     r"(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2}|[+-]\d{2})?\s*"
 )
 DAY, HOUR = 86400.0, 3600.0  # s
@@ -180,7 +181,7 @@ def _moment(cell: Any, row: int) -> _Moment:
     hours, minutes, second = (
         int(match["h"] or 0),
         int(match["m"]),
-        float(match["s"].replace(",", ".")),
+        float(match["s"].replace(",", ".").replace(":", ".")),
     )
     if hours > 24 or minutes > 59 or second >= 61:
         raise BadCell(row, f"{quote_cell(cell)} is no time of a day")

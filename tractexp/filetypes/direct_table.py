@@ -18,6 +18,7 @@ from tractexp.recording.railway import DirectVoltage
 
 NOMINAL = (0.6, 0.75, 1.5, 3.0)  # kV of direct-current railways (EN 50163)
 FROM_NOMINAL = 0.2  # of it, by which the mean may differ
+ALTERNATING_NEAR = (0.69, 3.3)  # kV: alternating voltages near those
 NAMED = re.compile(
     r"(?<![a-z])dc(?![a-z])|(?<=[uvip])[_ ]?dc(?![a-z])|gleich(?=spannung|strom)"
     r"|постоянн\w*|直流",
@@ -60,7 +61,10 @@ def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
     direct = DirectVoltage.from_values(x, rate) if rate else None
     if direct is None or not direct.is_direct:
         return ""
-    if not any(named) and not (_is_railway(direct.mean) and keys & {"I", "P"}):
+    alone = (
+        not keys & {"I", "P"} and not _find_pulses(x, rate) and not _is_direct_alone(direct.mean)
+    )
+    if not any(named) and (alone or not _is_railway(direct.mean)):
         return ""
     said = direct.describe(names[number], float(t[0]))
     if any(named):
@@ -69,6 +73,14 @@ def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
         f"{said}; that it is no RMS value is told by {1000 * direct.mean:.4g} V, near a nominal"
         " one of direct current, without Q or angles: if it is one, add Q"
     )
+
+
+def _is_direct_alone(mean: float) -> bool:
+    """Whether a mean [kV] is near a nominal direct voltage, and near none of an alternating one
+    that it may be the RMS of.
+    """
+    near = any(abs(mean / nominal - 1) <= FROM_NOMINAL / 4 for nominal in NOMINAL)
+    return near and not any(abs(mean / other - 1) <= FROM_NOMINAL / 4 for other in ALTERNATING_NEAR)
 
 
 def _is_railway(mean: float) -> bool:

@@ -112,6 +112,23 @@ def map_times(table: TableFile) -> Mapped:
     return Mapped("waves", columns, (), _first_day(table, days), beside)
 
 
+def map_voltage(table: TableFile) -> Mapped | None:
+    """Which columns of a table hold times and the magnitude of a voltage, where there is nothing
+    beside them but its frequency; else None.
+    """
+    options = _options(table, {})
+    keys = _set(options, "U", ("U", "U1")) or _some(options, "U")
+    known = {*keys, "t", "frac", "day", "f", "dfdt", "U2"}
+    named = sum(bool(name) for name in table.heading.names)
+    alone = {*options} <= known and all(len(several) == 1 for several in options.values())
+    if not (alone and keys and "t" in options and named == len(options)):
+        return None
+    times = map_times(table)
+    return replace(
+        times, kind="powers", columns={**times.columns, **{key: options[key][0] for key in keys}}
+    )
+
+
 def _check_ambiguity(
     table: TableFile,
     options: Mapping[str, list[MappedColumn]],

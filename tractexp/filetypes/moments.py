@@ -23,6 +23,11 @@ EARLIEST = 3e8  # s since 1970, of a record: 1979
 SINCE_1970 = {"ms": 1.0, "us": 1e3, "ns": 1e6}
 ZERO_DAY = dt.datetime(1899, 12, 30)  # of spreadsheets
 SERIAL_DAYS = (20_000.0, 80_000.0)  # days of a spreadsheet: 1954 to 2119
+# {since when days are counted: by how many they are more than those of spreadsheets}
+DAYS_SINCE = {"1899": 0.0, "the year 0": 693_960.0}
+# {since when tenths of a microsecond are counted: s to 1970}
+TICKS_SINCE = {"1601": 11_644_473_600.0, "the year 1": 62_135_596_800.0}
+TICK_SECONDS = 1e-7  # s
 # Hz: what is sampled faster by its times has them in days
 FASTEST = {"powers": 2e3, "phasors": 2e3, "waves": 1e6}
 SECONDS_A_DAY = 86400.0  # s
@@ -75,11 +80,9 @@ def _read_numeric_times(
     table: TableFile, values: np.ndarray, unit: str, fastest: float
 ) -> TableTimes:
     """Times that are numbers."""
-    first, steps = float(values[0]), len(values) - 1
-    span = float(values[-1]) - first
-    in_days = SERIAL_DAYS[0] <= first <= SERIAL_DAYS[1] and 0 < span * fastest < steps
-    if not unit and in_days:
-        return _of_days(table, values)
+    first = float(values[0])
+    if not unit and (counted := _read_days(table, values, fastest) or _read_ticks(values, fastest)):
+        return counted
     since = next(
         (u for u, by in SINCE_1970.items() if by * LATEST < abs(first) <= 1e3 * by * LATEST), ""
     )
@@ -105,22 +108,44 @@ def _since_1970(seconds: float) -> dt.datetime | None:
     return dt.datetime(1970, 1, 1) + dt.timedelta(seconds=seconds)
 
 
-def _of_days(table: TableFile, values: np.ndarray) -> TableTimes:
-    """Times in days, as spreadsheets count them."""
+def _read_ticks(values: np.ndarray, fastest: float) -> TableTimes | None:
+    """Times in tenths of a microsecond, as Windows and .NET count them; None for others."""
+    first, span = float(values[0]), float(values[-1] - values[0])
+    for since, before in TICKS_SINCE.items():
+        begun = first * TICK_SECONDS - before
+        if EARLIEST <= begun <= LATEST and span * TICK_SECONDS * fastest >= len(values) - 1:
+            said = f"t is in tenths of a microsecond since {since} by its size: counted from"
+            note = f"{said} {first:.0f}, the first row"
+            return TableTimes((values - first) * TICK_SECONDS, _since_1970(begun), (note,))
+    return None
+
+
+def _read_days(table: TableFile, values: np.ndarray, fastest: float) -> TableTimes | None:
+    """Times in days, as spreadsheets and MATLAB count them; None where they are none."""
+    span, steps = float(values[-1] - values[0]), len(values) - 1
+    if not 0 < span * fastest < steps:
+        return None
+    for since, more in DAYS_SINCE.items():
+        if SERIAL_DAYS[0] <= values[0] - more <= SERIAL_DAYS[1]:
+            return _of_days(table, values - more, since)
+    return None
+
+
+def _of_days(table: TableFile, values: np.ndarray, since: str) -> TableTimes:
+    """Times in days since a year, by now counted as those of spreadsheets are."""
     t = (values - values[0]) * SECONDS_A_DAY
     steps = np.diff(t)
     if (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1
         raise UserError(
-            f"{table.source}: {table.place(i)}: times are days since 1899, as spreadsheets count"
-            " them, of too few "
+            f"{table.source}: {table.place(i)}: times are days since {since}, of too few "
             f"digits: {values[i]:.12g} follows {values[i - 1]:.12g}; ten decimals give 10"
             " microseconds: show them in "
             "the sheet, or the time as hh:mm:ss.000, and save again"
         )
     start = ZERO_DAY + dt.timedelta(days=float(values[0]))
     return TableTimes(
-        t, start, (f"t is in days since 1899 by its size: counted from {start.isoformat()}",)
+        t, start, (f"t is in days since {since} by its size: counted from {start.isoformat()}",)
     )
 
 

@@ -98,8 +98,9 @@ def load(path: Path, encoding: str | None = None) -> Recording:
         )
     segments, evened = _segments(str(path), stretches)
     start, begin = content.observations[0].start, stretches[0].t[0]
-    triggers = [seconds(o.triggered, start) - begin for o in content.observations if o.triggered]
     last = segments[-1].start + (segments[-1].stop - segments[-1].first) / segments[-1].rate
+    stated = (seconds(o.triggered, start) - begin for o in content.observations if o.triggered)
+    triggers = sorted({float(t) for t in stated if 0 < t < last})
     return Recording(
         source=str(path),
         channels=[
@@ -117,7 +118,8 @@ def load(path: Path, encoding: str | None = None) -> Recording:
         frequency=content.frequency if 10 <= content.frequency <= 100 else 50.0,
         station=content.station,
         start=_moment(start, float(begin), remarks),
-        trigger=next((t for t in triggers if 0 < t < last), None),
+        trigger=triggers[0] if triggers else None,
+        triggers=triggers if len(triggers) > 1 else (),
         notes=remarks.notes(),
         extra={"format": "PQDIF"},
     )

@@ -15,7 +15,14 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.filetypes.cells import BadCell, find_group_mark, group_mark, is_grouped, is_number
+from tractexp.filetypes.cells import (
+    BadCell,
+    find_group_mark,
+    find_rising_group_mark,
+    group_mark,
+    is_grouped,
+    is_number,
+)
 from tractexp.filetypes.clock import is_time
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, heading
@@ -57,8 +64,10 @@ class TextTable(TableFile):
         )
         self.heading = self._heading(rows, header)
         self.sample = rows[self.heading.first :]
-        self.decimal = form.decimal or _decimal(self.sample)
-        self.group = find_group_mark(self.sample, self.decimal)
+        rising = "" if form.decimal else find_rising_group_mark(self.sample)
+        decimal = {".": ",", ",": "."}.get(rising) or _decimal(self.sample)
+        self.decimal = form.decimal or decimal
+        self.group = rising or find_group_mark(self.sample, self.decimal)
         self.line = lines[self.heading.first][0]  # of the first row of values, from 1
         self.width = len(self.sample[0])
         self._lines: np.ndarray | None = None  # of the rows, where they were read cell by cell

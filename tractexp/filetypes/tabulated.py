@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,13 @@ from tractexp.filetypes.mapping import (
     MappedColumn,
     check_mapping,
     map_columns,
+    map_voltage,
 )
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.row_quality import find_bad_rows, find_filled_rows
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar
 from tractexp.filetypes.table import TableFile, TableForm, instrument_of, open_table
+from tractexp.record import Base, Record
 from tractexp.record.angle import unwrap_angle
 from tractexp.record.phasor import sequences
 from tractexp.recording.nominal_voltage import is_between_phases, off_nominal
@@ -80,6 +83,45 @@ class Tabular:
             if said := describe_direct_table(table, units):
                 raise UserError(f"{table.source}: {said}") from None
             raise
+
+    def record_voltage(
+        self, source: str, path: str, join: Sequence[str], nominal: float
+    ) -> Record | None:
+        """The line voltage [kV, or as it stands without a unit] of a table without powers as a
+        record of `source`, P and Q unknown (nan); None where it holds more, or cannot be read.
+        """
+        try:
+            table = open_table(path, replace(self._form, join=tuple(join)))
+            mapping = map_voltage(table)
+            if mapping is None or describe_direct_table(table, self.units):
+                return None
+            return _record_voltage(source, table, mapping, nominal)
+        except UserError:
+            return None
+
+
+def _record_voltage(source: str, table: TableFile, mapping: Mapped, nominal: float) -> Record:
+    values, start, said = _read(table, mapping)
+    keys = [key for key in values if key[0] == "U"]
+    columns = {"U": np.mean([values[key] for key in keys], axis=0)}
+    told = mapping.columns[keys[0]].role.line
+    absolute = _absolute(mapping, keys[0])
+    lines = _to_lines(columns, told, keys[0], None) if absolute else []
+    level = float(np.nanmedian(columns["U"])) if absolute else 1.0
+    record = Record(
+        name=Path(source).stem,
+        t=values["t"],
+        U=columns["U"] / level,
+        P=np.zeros(len(values["t"])),
+        Q=np.zeros(len(values["t"])),
+        source=source,
+        base=Base(level, frequency=table.frequency or nominal),
+        identity={"time": start.isoformat()} if start else {},
+        notes=(*table.notes, *said, *lines),
+    )
+    even = record.uniform(table.place)
+    unknown = np.full(even.samples, np.nan)
+    return replace(even, P=unknown, Q=unknown)
 
 
 def kind_of(path: str, *join: str) -> str:

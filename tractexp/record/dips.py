@@ -31,17 +31,19 @@ class FileDip:
 
 
 def cut_dips(
-    wholes: Sequence[Record], where: str, pre: float, post: float, trigger: float | None = None
+    wholes: Sequence[Record], where: str, pre: float, post: float, triggers: Sequence[float] = ()
 ) -> list[FileDip]:
     """The dips of records that follow each other, with at most `pre` and `post` [s] about the start
     of each.
 
-    `trigger` [s] is that of the recorder. A record never reaches into the dip before or after it.
-    It is checked for an event, and not yet for its units.
+    `triggers` [s] are those of the recorder, one a record at most. A record never reaches into the
+    dip before or after it. It is checked for an event, and not yet for its units.
     """
     file_dips: list[FileDip] = []
     for whole in wholes:
-        t, dips = whole.t, find_dips(whole.t, whole.U, trigger)
+        t = whole.t
+        trigger = next((moment for moment in triggers if t[0] <= moment <= t[-1]), None)
+        dips = find_dips(t, whole.U, trigger)
         firsts, stops = (
             [0, *(end for _, end in dips)],
             [*(start for start, _ in dips[1:]), whole.samples],

@@ -89,6 +89,12 @@ class Reader(Plugin):
         """
         return None
 
+    def read_voltage(self) -> "Record | None":
+        """The voltage alone of a table that holds no powers, P and Q unknown (nan); None from other
+        readers, and of other tables.
+        """
+        return None
+
 
 def reader_of(path: str, *join: str) -> type[Any]:
     """The reader of a file, or of the files of one event: by the ending and, where several share

@@ -31,14 +31,16 @@ def cut_recording(recording: Recording, begin: float, end: float) -> Recording:
             f"{recording.source}: nothing was recorded between {begin:.3f} and {end:.3f} s"
         )
     origin = segments[0].start
-    trigger = None if recording.trigger is None else recording.trigger - origin
+    moved = [trigger - origin for trigger in recording.find_triggers()]
+    triggers = [trigger for trigger in moved if 0 <= trigger <= end - origin]
     return replace(
         recording,
         channels=[_part(channel, parts) for channel in recording.channels],
         status=[_part(status, parts) for status in recording.status],
         segments=[replace(segment, start=segment.start - origin) for segment in segments],
         start=recording.start and recording.start + timedelta(seconds=origin),
-        trigger=trigger if trigger is not None and 0 <= trigger <= end - origin else None,
+        trigger=triggers[0] if triggers else None,
+        triggers=triggers,
         notes=[*recording.notes, f"cut from {recording.source}, {begin:.3f} to {end:.3f} s"],
         extra={
             key: recording.extra[key]

@@ -93,7 +93,7 @@ def _show_load(*paths: str) -> bool:
 
 def shows_load(view: View) -> bool:
     """Whether a file shows a load by itself: voltages with currents, or a table of powers."""
-    return any(s.record is not None or (s.feeder and s.feeder.currents) for s in view.sights)
+    return any(s.has_powers for s in view.sights)
 
 
 def propose_joining(path: str, view: View | None = None) -> str:

@@ -41,6 +41,7 @@ def join_recordings(recordings: Sequence[Recording]) -> Recording:
         channels=channels,
         status=[status for each in cut for status in each.status],
         trigger=next((each.trigger for each in cut if each.trigger is not None), None),
+        triggers=max((each.triggers for each in cut), key=len),
         notes=list(dict.fromkeys([*aligned.notes, *said, *notes])),
         extra={},
     )
@@ -98,6 +99,7 @@ def _cut_common(recording: Recording, aligned: Alignment, k: int) -> Recording:
         segments=[Segment(0, aligned.count, segment.rate, 0.0)],
         start=recording.start and recording.start + timedelta(seconds=gone),
         trigger=None if recording.trigger is None else recording.trigger - gone,
+        triggers=[trigger - gone for trigger in recording.triggers],
     )
 
 

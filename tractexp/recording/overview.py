@@ -95,6 +95,13 @@ class Sight:
         return self.feeder is None or self.feeder.loaded
 
     @property
+    def has_powers(self) -> bool:
+        """Whether more than a voltage is known of it."""
+        if self.record is not None:
+            return bool(np.isfinite(self.record.P).any())
+        return self.feeder is not None and bool(self.feeder.currents)
+
+    @property
     def dips(self) -> list[int]:
         """The numbers of the dips that are worth fitting."""
         return [s.dip for s in self.events if s.worth and s.dip is not None]
@@ -128,7 +135,10 @@ class Sight:
         if self.record is not None:
             first, base = slice(0, max(1, self.record.samples // 20)), self.record.base
             U, P, Q = (
-                float(np.nanmedian(v[first])) for v in (self.record.U, self.record.P, self.record.Q)
+                float(np.median(v[first][np.isfinite(v[first])]))
+                if np.isfinite(v[first]).any()
+                else float("nan")
+                for v in (self.record.U, self.record.P, self.record.Q)
             )
             return U * base.voltage, P * base.power, Q * base.power
         if not self.phasors:
@@ -235,7 +245,14 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
     """
     reader = build("data", node)
     if not isinstance(reader, WaveformReader):
-        table = reader.table()
+        try:
+            table = reader.table()
+        except UserError as error:
+            alone = reader.read_voltage()
+            if alone is None:
+                raise
+            shown = sight_of(alone, [])
+            return View(source, node, [replace(shown, said=(*shown.said, str(error)))])
         if table is not None:
             return View(source, node, [sight_of(*table)])
         read = reader.read()
@@ -322,14 +339,16 @@ def sight(
         phasors += [join_phasors(parts)] if parts else []
         if traces:
             trace = join_traces(traces)
-            changes += happenings_in(trace, recording.trigger)
+            within = (x for x in recording.find_triggers() if trace.t[0] <= x <= trace.t[-1])
+            changes += happenings_in(trace, next(within, None))
             dead = dead or find_dead_phases(trace)
             brief.append(len(trace.t) < FEWEST_HALF_CYCLES)
     dips, refused = [], ""
     try:
         streams = [(p, ()) for p in phasors]
         if changes and feeder.currents:
-            dips = reader.dips(feeder, streams, recording.frequency, recording.trigger)
+            triggers = recording.find_triggers()
+            dips = reader.dips(feeder, streams, recording.frequency, triggers)
     except UserError as error:
         refused = str(error)
     numbered = _number_events(changes, dips, reader.path, refused)

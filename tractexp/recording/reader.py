@@ -119,7 +119,7 @@ class WaveformReader(Reader):
         recording = self.open_recording()
         feeder = self.feeder(recording)
         dips = self.dips(
-            feeder, self._streams(recording, feeder), recording.frequency, recording.trigger
+            feeder, self._streams(recording, feeder), recording.frequency, recording.find_triggers()
         )
         events = chosen(
             self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips)
@@ -135,7 +135,7 @@ class WaveformReader(Reader):
         feeder: Feeder,
         streams: Sequence[Stream],
         frequency: float,
-        trigger: float | None = None,
+        triggers: Sequence[float] = (),
     ) -> list[FileDip]:
         """The dips of one load, on one base: voltage and apparent power before the first that can
         be used.
@@ -143,7 +143,7 @@ class WaveformReader(Reader):
         Raises `UserError` where there is none, and where the load carries no power.
         """
         wholes = [self._whole(feeder, stream, frequency) for stream in streams]
-        file_dips = cut_dips(wholes, self.path, self.pre, self.post, trigger)
+        file_dips = cut_dips(wholes, self.path, self.pre, self.post, triggers)
         waves = [each for _, several in streams if len(several) > 1 for each in several]
         file_dips = [replace(dip, result=_with_waves(dip, waves, frequency)) for dip in file_dips]
         if not file_dips:

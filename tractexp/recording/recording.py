@@ -229,6 +229,7 @@ class Recording:
     device: str = ""
     start: datetime | None = None  # of the first sample
     trigger: float | None = None  # s since the first sample
+    triggers: Sequence[float] = ()  # of all parts, where several were triggered
     status: Sequence[StatusChannel] = ()
     notes: Sequence[str] = ()  # what was mended while reading, with the line
     # what the format has besides, for a round trip
@@ -252,6 +253,12 @@ class Recording:
                 f"{self.frequency:g} Hz are needed"
             )
         return fast
+
+    def find_triggers(self) -> list[float]:
+        """The moments [s since the first sample] at which the recorder was triggered."""
+        if self.triggers or self.trigger is None:
+            return [*self.triggers]
+        return [self.trigger]
 
     def stretches(self) -> list[list[Segment]]:
         """The segments of `waveforms`, those that follow each other without a gap together."""

@@ -196,8 +196,8 @@ def _of_waves(
         chart.states(states, len(panels) - 1, VOLTAGE)
     first, last = span or (recording.waveforms()[0].start, float(shown.phasors[-1].t[-1]))
     chart.limits(None, first, last)
-    if recording.trigger is not None and first <= recording.trigger <= last:
-        chart.edge(recording.trigger, VOLTAGE, "dash", text="trigger")
+    for trigger in (each for each in recording.find_triggers() if first <= each <= last):
+        chart.edge(trigger, VOLTAGE, "dash", text="trigger")
     happened = (event.what.start for event in shown.events if first <= event.what.start <= last)
     return _mark_events(chart, shown).cursor(
         next(happened, first) + FIRST_CURSOR_CYCLES / recording.frequency
