@@ -1,11 +1,13 @@
-"""What becomes of damaged files: `python benchmarks/mutated_files.py [--count 10000] [--seed 1]`.
+"""What becomes of damaged files: `python benchmarks/mutated_files.py [--count 10000] [--first 0]
+[--seed 1]`.
 
 One small record, written in every format that is read, is damaged in ways that happen to files -
 bits, bytes, digits, fields and lines changed, lost, doubled or swapped, files cut - and given to
 `tractexp.read` in a process of its own. Allowed is a reading, or one sentence. Not allowed: another
 exception, a warning, words of Python in what a user reads, more than 5 s of a processor, more than
 500 MB (a workbook's rows come from a process whose own memory is limited). Counts and worst figures
-go to mutated_files.json; the exit code says whether all held.
+go to mutated_files.json; the exit code says whether all held. A case has a number, by which it is
+made again; `--first K` adds cases K, K + 1, ... to those that are stored.
 """
 
 import argparse
@@ -14,6 +16,7 @@ import json
 import multiprocessing
 import os
 import re
+import shutil
 import sys
 import tempfile
 import traceback
@@ -520,11 +523,11 @@ class Worker:
         return kind, words, figures, seconds, growth
 
 
-def run(count, seed, damaged=damaged):
+def run(count, seed, first=0, damaged=damaged, originals=originals):
     """Counts and findings of so many files, each `damaged(paths, folder, rng)`: its path and what
     was done.
     """
-    rng, worker = np.random.default_rng(seed), Worker()
+    worker = Worker()
     with tempfile.TemporaryDirectory() as base:
         sound, broken = Path(base) / "sound", Path(base) / "broken"
         sound.mkdir()
@@ -536,8 +539,8 @@ def run(count, seed, damaged=damaged):
             kind, words, right[name], *_ = worker.read(paths[0])
             if kind != "read":
                 bad.append({"format": name, "kind": f"sound file {kind}", "words": words})
-        for k in range(count):
-            name = list(formats)[k % len(formats)]
+        for k in range(first, first + count):
+            rng, name = np.random.default_rng([seed, k]), list(formats)[k % len(formats)]
             broken.mkdir(exist_ok=True)
             path, done = damaged(formats[name], broken, rng)
             kind, words, figures, seconds, growth = worker.read(path)
@@ -553,30 +556,54 @@ def run(count, seed, damaged=damaged):
             }
             if kind not in ("read as undamaged", "read as it now stands", "refused"):
                 bad.append(
-                    {"file": k, "format": name, "damage": done, "kind": kind, "words": words}
+                    {"case": k, "format": name, "damage": done, "kind": kind, "words": words}
                 )
             if (k + 1) % 500 == 0:
                 print(f"{k + 1} files, {len(bad)} bad", flush=True)
+            shutil.rmtree(broken)
         worker.pipe.send(None)
         worker.process.join()
-        return {"files": count, "seed": seed, "counts": counts, "worst": worst, "bad": bad}
+        return {"cases": count, "seed": seed, "counts": counts, "worst": worst, "bad": bad}
 
 
 def command(run, about, place):
-    """The exit code of a benchmark's command: `run(count, seed)` damages, and its counts go to a
-    file beside it.
+    """The exit code of a benchmark's command: `run(count, seed, first)` damages, and its counts go
+    to a file beside it.
     """
     asked = argparse.ArgumentParser(description=about.splitlines()[0])
     asked.add_argument("--count", type=int, default=10_000)
+    asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--seed", type=int, default=1)
     asked.add_argument("--json", type=Path, default=Path(place).with_suffix(".json"))
     told = asked.parse_args()
-    found = run(told.count, told.seed)
+    stored = json.loads(told.json.read_text(encoding="utf-8")) if told.first else None
+    if stored and (stored["cases"], stored["seed"]) != (told.first, told.seed):
+        sys.exit(f"{told.json} has {stored['cases']} cases of seed {stored['seed']}")
+    found = run(told.count, told.seed, told.first)
+    found = add(stored, found) if stored else found
     files.write_json(told.json, found)
     print(json.dumps(found["counts"], indent=1))
     for one in found["bad"][:40]:
         print(one)
     return len(found["bad"]) > 0
+
+
+def add(stored, found):
+    """The counts, worst figures and findings of two pieces of a run."""
+    counts = {
+        name: {
+            kind: stored["counts"].get(name, {}).get(kind, 0) + of_kind.get(kind, 0)
+            for kind in {**stored["counts"].get(name, {}), **of_kind}
+        }
+        for name, of_kind in found["counts"].items()
+    }
+    worst = {key: max(stored["worst"][key], value) for key, value in found["worst"].items()}
+    return found | {
+        "cases": stored["cases"] + found["cases"],
+        "counts": counts,
+        "worst": worst,
+        "bad": stored["bad"] + found["bad"],
+    }
 
 
 if __name__ == "__main__":

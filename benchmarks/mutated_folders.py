@@ -1,6 +1,6 @@
 """Configurations, results and states of runs with a few nodes changed, at the doors that read them.
 
-    python benchmarks/mutated_folders.py [CASES] [SEED]
+    python benchmarks/mutated_folders.py [--count 10000] [--first 0] [--seed 1]
 
 Each case is read, left out or refused in one sentence; anything else is printed with its number, by
 which `fuzzed` in `tests/process/test_doors.py` makes it again. Before, every file takes every shape
@@ -17,8 +17,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "process"))
 
 import test_doors
+from mutated_files import command
 
-from tractexp import files
 from tractexp.errors import UserError
 
 REFUSED, READ = "refused", "read or left out"
@@ -47,17 +47,20 @@ def tell(read, folder: Path) -> str:
     return READ
 
 
-def main(cases: int = 10_000, seed: int = 1) -> int:
+def run(count: int, seed: int, first: int = 0) -> dict:
+    """Counts and findings of so many cases, and the table of doors and shapes."""
     with tempfile.TemporaryDirectory() as root, contextlib.redirect_stdout(io.StringIO()):
         doors = tabulate(Path(root))
-        found = test_doors.fuzzed(cases, seed, Path(root))
-    content = {"cases": cases, "seed": seed, "wrong": found, "doors": doors}
-    files.write_json(Path(__file__).with_suffix(".json"), content)
-    print(f"{cases} cases of {len(test_doors.TREES)} files and doors, {len(found)} of them wrong")
-    for number, why in found.items():
-        print(f"  {number}: {why}")
-    return 1 if found else 0
+        found = test_doors.fuzzed(count, seed, Path(root), first)
+    return {
+        "cases": count,
+        "seed": seed,
+        "counts": {"folders": {"as allowed": count - len(found)}},
+        "worst": {},
+        "bad": [{"case": k, "words": why} for k, why in found.items()],
+        "doors": doors,
+    }
 
 
 if __name__ == "__main__":
-    sys.exit(main(*map(int, sys.argv[1:])))
+    sys.exit(command(run, __doc__, __file__))

@@ -1,5 +1,5 @@
-"""What becomes of damaged settings: `python benchmarks/mutated_settings.py [--count 10000] [--seed
-1]`.
+"""What becomes of damaged settings: `python benchmarks/mutated_settings.py [--count 10000] [--first
+0] [--seed 1]`.
 
 Four in ten are commands that work, changed in one to three arguments as people and programs change
 them: values that are no numbers, not finite, huge, of another kind, names that do not exist,
@@ -417,22 +417,22 @@ def changed_sidecar(rng):
     return one_of(DAMAGE, rng)(data, rng) if data and rng.random() < 0.4 else data
 
 
-def made(count, seed, folder):
-    """(what, call, given) of `count` mutants, the same for the same seed."""
-    rng, path = np.random.default_rng(seed), table(folder)
-    sound = commands(path)
+def made(count, seed, folder, first=0):
+    """(what, call, given) of `count` mutants from number `first` on, each the same for the same
+    seed: four of ten are commands.
+    """
+    path = table(folder)
+    beside, sound = path.with_suffix(".json"), commands(path)
     keys = [keys_of(arguments) for arguments in sound]
-    commanded = 4 * count // 10
-    for k in range(commanded):
-        which = k % len(sound)
-        arguments = changed(sound[which], keys[which], rng)
-        yield "configuration", perform, (arguments, folder)
-    beside = path.with_suffix(".json")
-    for _ in range(count - commanded):
-        data = changed_sidecar(rng)
-        beside.write_bytes(data)
-        yield "sidecar", read, (path,)
-    beside.unlink(missing_ok=True)
+    for k in range(first, first + count):
+        rng = np.random.default_rng([seed, k])
+        if k % 10 < 4:
+            which = int(rng.integers(len(sound)))
+            yield "configuration", perform, (changed(sound[which], keys[which], rng), folder)
+        else:
+            beside.write_bytes(changed_sidecar(rng))
+            yield "sidecar", read, (path,)
+            beside.unlink(missing_ok=True)
 
 
 def prepared():
@@ -448,7 +448,7 @@ def prepared():
     return GlobalHydra.instance().clear
 
 
-def run(count, seed):
+def run(count, seed, first=0):
     counts = {"configuration": {}, "sidecar": {}}
     bad, worst = [], 0.0
     end = prepared()
@@ -456,7 +456,7 @@ def run(count, seed):
     with tempfile.TemporaryDirectory() as base:
         os.chdir(base)
         try:
-            for k, (what, call, given) in enumerate(made(count, seed, Path(base))):
+            for k, (what, call, given) in enumerate(made(count, seed, Path(base), first), first):
                 started = time.process_time()
                 kind, words = outcome(call, *given)
                 worst = max(worst, time.process_time() - started)
@@ -472,7 +472,7 @@ def run(count, seed):
                     )
                     bad.append(
                         {
-                            "number": k,
+                            "case": k,
                             "what": what,
                             "kind": kind,
                             "given": str(shown)[:600],
@@ -483,10 +483,10 @@ def run(count, seed):
             os.chdir(here)
             end()
     return {
-        "mutants": count,
+        "cases": count,
         "seed": seed,
         "counts": counts,
-        "slowest": round(worst, 1),
+        "worst": {"seconds": round(worst, 1)},
         "bad": bad,
     }
 

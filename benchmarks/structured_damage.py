@@ -1,5 +1,5 @@
 """Damage that knows the structure of a file: `python benchmarks/structured_damage.py [--count
-10000] [--seed 1]`.
+10000] [--first 0] [--seed 1]`.
 
 Links, counts, types and emptiness are changed, with all around them sound; what is allowed is as in
 mutated_files.py.
@@ -40,7 +40,6 @@ def damage(path, rng):
     """(bytes of the damaged file, what was done) of a sound one, by its ending; None where nothing
     is known of it.
     """
-    data, ending = path.read_bytes(), path.suffix.lower()
     ways = {
         ".pqd": _pqdif,
         ".xlsx": _archive,
@@ -52,7 +51,8 @@ def damage(path, rng):
         ".cev": _report,
         ".parquet": _footer,
     }
-    return ways[ending](data, rng) if ending in ways else None
+    way = ways.get(path.suffix.lower())
+    return way(path.read_bytes(), rng) if way else None
 
 
 def _records(data):
@@ -240,6 +240,13 @@ def _footer(data, rng):
 
 
 if __name__ == "__main__":
-    from mutated_files import command, run
+    import numpy as np
+    from mutated_files import command, originals, run
 
-    sys.exit(command(functools.partial(run, damaged=restructured), __doc__, __file__))
+    def known(folder):
+        """The sound files of whose structure something is known."""
+        made, rng = originals(folder), np.random.default_rng(0)
+        return {name: paths for name, paths in made.items() if damage(paths[0], rng)}
+
+    damaging = functools.partial(run, damaged=restructured, originals=known)
+    sys.exit(command(damaging, __doc__, __file__))

@@ -34,7 +34,7 @@ def test_the_stored_run_is_long_and_found_nothing():
     assert stored["bad"] == []
     assert (
         sum(sum(counts.values()) for counts in stored["counts"].values())
-        == stored["mutants"]
+        == stored["cases"]
         >= 10_000
     )
     assert {kind for counts in stored["counts"].values() for kind in counts} == {"works", "refused"}

@@ -8,7 +8,7 @@ that is modelled here.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -176,14 +176,14 @@ def direct_voltage(recording: Recording) -> str:
 
 @dataclass(frozen=True)
 class DirectVoltage:
-    """A voltage as a direct one: its mean, what is faster, and the deepest dip."""
+    """A voltage as a direct one: its mean, what is faster, and the deepest dip, where it is one."""
 
     mean: float  # kV
     alternating: float  # kV RMS of what is faster than a cycle
     greatest: float  # kV
-    fall: float  # of the mean
-    begin: float  # s from the first sample to that of the dip
-    seconds: float
+    fall: float = 0.0  # of the mean
+    begin: float = 0.0  # s from the first sample to that of the dip
+    seconds: float = 0.0
 
     @classmethod
     def from_values(cls, x: np.ndarray, rate: float) -> "DirectVoltage | None":
@@ -195,12 +195,14 @@ class DirectVoltage:
         smooth = np.convolve(x, np.full(n, 1 / n), "valid")
         rest = (x[n // 2 : len(x) - n // 2] - smooth)[: len(smooth) // n * n]
         ripple = float(np.sqrt(np.median(rest.reshape(-1, n).var(axis=1))))
-        mean = float(np.median(smooth))
-        shares = smooth / mean if mean else np.ones(len(smooth))
+        found = cls(float(np.median(smooth)), ripple, float(np.abs(x).max()))
+        if not found.is_direct:
+            return found
+        shares = smooth / found.mean
         fall = 1 - float(shares.min())
         below = shares < 1 - max(LEAST_DC_DIP, fall / 2)
         begin, count = (int(np.argmax(below)) + n // 2) / rate, np.count_nonzero(below)
-        return cls(mean, ripple, float(np.abs(x).max()), fall, begin, count / rate)
+        return replace(found, fall=fall, begin=begin, seconds=count / rate)
 
     @property
     def alternates(self) -> bool:
