@@ -11,6 +11,7 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
 from tractexp.errors import TASK, UserError, check_choice
+from tractexp.files import limit_time
 from tractexp.filetypes.tidy import unique
 from tractexp.outcome import Tabulated
 from tractexp.plugin import build, discover, plugin
@@ -154,8 +155,9 @@ def written(parts: Sequence[Part], writer: Writer, folder: Path) -> Converted:
 def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, Any]) -> list[Part]:
     """What a file, an event, or a list of such is written as."""
     if isinstance(source, str | Path):
-        reader: Reader = build(GROUP, node_of(str(source), settings))
-        return parts_of(reader, writer, what)
+        with limit_time(source):
+            reader: Reader = build(GROUP, node_of(str(source), settings))
+            return parts_of(reader, writer, what)
     if isinstance(source, Sequence):
         return [part for one in source for part in _parts(one, writer, what, settings)]
     if not isinstance(source, Record | Event):

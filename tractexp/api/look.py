@@ -280,16 +280,18 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
         raise UserError("nothing to look at: give a file, e.g. look('station.cfg')")
     distinct = list(dict.fromkeys(map(_source, flat)))
     with tell_late_stages(progress) as stage:
-        views = []
+        views, contents = [], []
         if together := _join_given(distinct, settings):
             distinct, settings = [together["path"]], {**settings, "join": together["join"]}
         for k, source in enumerate(distinct, start=1):
             count = f"{k} of {len(distinct)}: " if len(distinct) > 1 else ""
-            stage(f"reading {count}{source if isinstance(source, str) else source.name}")
-            views.append(_view(source, settings))
-        stage("measuring the quality of the channels")
-        content = files.plain({"files": [_content(view) for view in views]})
-    return Look(distinct, settings, content, views)
+            name = source if isinstance(source, str) else source.name
+            stage(f"reading {count}{name}")
+            with files.limit_time(name):
+                views.append(_view(source, settings))
+                stage("measuring the quality of the channels")
+                contents.append(_content(views[-1]))
+    return Look(distinct, settings, files.plain({"files": contents}), views)
 
 
 def _source(given: Any) -> str | Record:
@@ -314,7 +316,10 @@ def _join_given(
     """How the files that were given are read as those of one event; None where they are not."""
     paths = [source for source in sources if isinstance(source, str)]
     alone = settings or len(paths) < len(sources) or any(map(files.is_archive, paths))
-    return None if alone else join_event(paths)
+    if alone or not paths:
+        return None
+    with files.limit_time(paths[0]):
+        return join_event(paths)
 
 
 def _view(source: str | Record, settings: Mapping[str, Any]) -> View:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files, plugin
+from tractexp import files
 from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Report, Table
 from tractexp.composition import choices
@@ -22,6 +22,7 @@ from tractexp.record import (
     describe,
     detect,
     on_own_base,
+    read_records,
 )
 from tractexp.record.angle import unwrap_angle
 from tractexp.record.dips import around
@@ -255,7 +256,8 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
 
 def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
     """The records of a file, by the reader its ending names, or of a choice of `conf/data`."""
-    read = plugin.build(GROUP, node_of(path, settings)).read()
+    with files.limit_time(path):
+        read = read_records(node_of(path, settings))
     return [*read.train, *read.validate]
 
 

@@ -60,9 +60,11 @@ def rows_of(folder: str, file: str) -> Rows:
     is an error.
     """
     try:
+        with files.limit_time(Path(folder, file)):
+            within = list_within(Path(folder, file))
         return [
             row
-            for path in list_within(Path(folder, file))
+            for path in within
             for row in _rows_of_one(folder, path.relative_to(folder).as_posix())
         ]
     except UserError as error:
@@ -85,22 +87,31 @@ def _rows_of_one(folder: str, file: str) -> Rows:
     """The rows of one file that is no .zip, or of a .zip that holds the files of one event."""
     row, path = _blank(file), Path(folder, file)
     try:
-        view = archive.look_at_file(path)
-        rows = [
-            row | _event(view, file, number, shown, event)
-            for number, shown in enumerate(view.sights, 1)
-            for event in shown.events
-        ]
-        rows = rows or [row | _common(view) | _without_events(view)]
-        return files.plain(rows if shows_load(view) else _with_proposal(rows, path))
+        with files.limit_time(path):
+            return _rows_of_view(row, path)
     except UserError as error:
-        return _with_proposal([row | {"kind": UNREAD, "why": str(error)}], path)
+        return [row | {"kind": UNREAD, "why": str(error)}]
     except Exception as error:  # a survey of thousands of files does not end with one of them
         why = (
             f"the program failed at this file, which is its mistake: {type(error).__name__}:"
             f" {error}"
         )
         return [row | {"kind": UNREAD, "why": why}]
+
+
+def _rows_of_view(row: dict[str, Any], path: Path) -> Rows:
+    """The rows of a file, each with what stands in `row`."""
+    try:
+        view = archive.look_at_file(path)
+    except UserError as error:
+        return _with_proposal([row | {"kind": UNREAD, "why": str(error)}], path)
+    rows = [
+        row | _event(view, row["file"], number, shown, event)
+        for number, shown in enumerate(view.sights, 1)
+        for event in shown.events
+    ]
+    rows = rows or [row | _common(view) | _without_events(view)]
+    return files.plain(rows if shows_load(view) else _with_proposal(rows, path))
 
 
 def _without_events(view: View) -> dict[str, str]:

@@ -232,9 +232,9 @@ def read_events(data: Mapping[str, Any]) -> Any:
     """The recorded events of a choice of data, read and with their dips found (`Events` of
     `Event`).
     """
-    from tractexp.record import Events, detect
+    from tractexp.record import Events, detect, read_records
 
-    records = build("data", data).read()
+    records = read_records(data)
     return Events([detect(r) for r in records.train], [detect(r) for r in records.validate])
 
 

@@ -9,6 +9,7 @@ from tractexp.record.own_base import on_own_base as on_own_base
 from tractexp.record.reader import Events as Events
 from tractexp.record.reader import Reader as Reader
 from tractexp.record.reader import endings as endings
+from tractexp.record.reader import read_records as read_records
 from tractexp.record.reader import reader_of as reader_of
 from tractexp.record.record import Base as Base
 from tractexp.record.record import Record as Record

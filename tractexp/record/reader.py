@@ -1,14 +1,15 @@
 """The interface of reader plugins: records from the `data` configuration."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from tractexp import files
 from tractexp.errors import UserError
 from tractexp.overrides import survey_of
-from tractexp.plugin import Plugin, discover
+from tractexp.plugin import Plugin, build, discover
 from tractexp.record import foreign
 
 if TYPE_CHECKING:
@@ -94,6 +95,18 @@ class Reader(Plugin):
         readers, and of other tables.
         """
         return None
+
+
+def read_records(data: Mapping[str, Any]) -> Events:
+    """The records of a choice of data. Raises `UserError` as their reader does, and where they take
+    longer than any record.
+    """
+    reader = build(Reader.group, data)
+    if reader.folders:  # each file of the folder has its own time
+        return reader.read()
+    named = getattr(reader, "path", "") or next(iter(getattr(reader, "train", None) or [""]))
+    with files.limit_time(str(named) or reader.name):
+        return reader.read()
 
 
 def reader_of(path: str, *join: str) -> type[Any]:

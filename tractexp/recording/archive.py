@@ -19,7 +19,8 @@ def look_at_file(path: Path) -> View:
     """A file of an archive, looked at by the reader of its ending. Raises `UserError` where it
     cannot be read.
     """
-    return view_of(str(path), settings_of(str(path)))
+    with files.limit_time(path):
+        return view_of(str(path), settings_of(str(path)))
 
 
 def event_name(file: str, load: int, event: LoadEvent) -> str:

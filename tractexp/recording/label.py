@@ -44,6 +44,7 @@ SURE = 3.0  # score of a mark right after the letter of a quantity: "Ia", "UL1",
 BY_NAME = "their names differ in the phase alone"
 GLUED = 0.5  # score of a mark at the end of a word, where any word may end
 MOST_MARKS = 3  # in a name: "HCSA -HVS1A" has two
+MOST_PLACES = 8  # where one of them may stand, by likelihood: their combinations take time
 NO_WAVE = re.compile(r"(?<![a-z])(?:mag|magnitude|rms|ang|angle|diff|bias)(?![a-z])")
 OTHER_UNITS = frozenset(
     (  # of what is neither voltage nor current, whatever its name begins with
@@ -316,8 +317,9 @@ def _single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int
         score = 3.0 * quantity_before(text, at) + 2 * (not digits) if alone else GLUED
         marks[letters.index(match[0])].append((at, score))
     for place, several in marks.items():
-        for size in range(1, min(len(several), MOST_MARKS) + 1):
-            for those in itertools.combinations(several, size):
+        likely = sorted(several, key=lambda mark: -mark[1])[:MOST_PLACES]
+        for size in range(1, min(len(likely), MOST_MARKS) + 1):
+            for those in itertools.combinations(likely, size):
                 key = "".join("*" if i in dict(those) else c for i, c in enumerate(text))
                 yield key, letters, False, place, max(score for _, score in those)
 

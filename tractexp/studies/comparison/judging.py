@@ -10,9 +10,9 @@ from tractexp import files, provenance
 from tractexp.api.setup import Setup
 from tractexp.errors import UserError
 from tractexp.inference.problem import Problem
-from tractexp.plugin import build, discover, get
+from tractexp.plugin import discover, get
 from tractexp.progress import count_parts
-from tractexp.record import detect
+from tractexp.record import detect, read_records
 from tractexp.studies.api.benchmark import BenchmarkResult, benchmark
 from tractexp.studies.comparison.ablation import family
 from tractexp.studies.comparison.comparison import Comparison, compare
@@ -164,7 +164,7 @@ def _problem(run: SearchRun) -> Problem:
     # relative paths count from where the run was started
     home = Path(run.folder) if run.folder else Path()
     with contextlib.chdir(home) if home.is_dir() else contextlib.nullcontext():
-        records = build("data", config["data"]).read()
+        records = read_records(config["data"])
     train = [detect(record) for record in records.train]
     return Setup.from_arguments(train, config["model"], objective=config.get("objective")).problem
 
