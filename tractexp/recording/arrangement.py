@@ -30,7 +30,14 @@ from tractexp.recording.label import (
 )
 from tractexp.recording.nominal_voltage import is_between_phases
 from tractexp.recording.recording import Recording
-from tractexp.recording.snapshot import OTHER_FREQUENCY, frequency, nearest_nominal, snapshots
+from tractexp.recording.snapshot import (
+    OTHER_FREQUENCY,
+    frequency,
+    frequency_of,
+    nearest_nominal,
+    network_frequency,
+    snapshots,
+)
 
 LEAST_LIVE_SEQUENCE = 0.5  # of the upper level of V1: less is a fault, or a dead line
 LOADED = 0.2  # of the upper level of I1, as well
@@ -219,7 +226,7 @@ def _lines(recording: Recording, feeder: Feeder) -> None:
 def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
     """The feeder's phasors while voltage and current are alive; None where they never are."""
     numbers = [*feeder.voltages, *feeder.currents]
-    windows = snapshots(recording, numbers, frequency(recording, feeder.voltages))
+    windows = snapshots(recording, numbers, frequency_of(recording, feeder.voltages))
     if windows is None or not any(windows.pure(i) for i in feeder.voltages):
         return None  # noise has no order
     connection = chosen("connection", feeder.connection)
@@ -308,7 +315,7 @@ def _level(recording: Recording, numbers: Sequence[int]) -> float:
     """Median positive sequence of three voltages while they are alive; 0 where they have no
     waveform.
     """
-    windows = snapshots(recording, numbers)
+    windows = snapshots(recording, numbers, network_frequency(recording))
     if windows is None:
         return 0.0
     size = np.nan_to_num(np.abs(sequences(windows.select_channels(numbers))[0]))

@@ -25,9 +25,10 @@ from tractexp.recording.happening import (
 )
 from tractexp.recording.infeed import describe_directions
 from tractexp.recording.measure import FeederWaves, phasors_of
-from tractexp.recording.quality import Quality, measure_stamp_jitter, network_frequency, quality
+from tractexp.recording.quality import Quality, measure_stamp_jitter, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
+from tractexp.recording.snapshot import network_frequency
 from tractexp.recording.trace import join_traces, of_waves
 from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
 

@@ -157,17 +157,6 @@ def _blunt(x: np.ndarray, cycle: float, near: float) -> int:
     return 2 + int(2 * np.sqrt(2 * near / amplitude) * cycle / (2 * np.pi))
 
 
-def network_frequency(recording: Recording) -> float | None:
-    """The network's frequency [Hz] as the largest of a recording's channels shows it; None where
-    none does.
-    """
-    f = frequency(
-        recording, [i for i, c in enumerate(recording.channels) if c.quantity == "voltage"]
-    )
-    f = f or frequency(recording, range(len(recording.channels)))
-    return f if f is not None and nearest_nominal(f) is not None else None
-
-
 def _frequency(
     recording: Recording, number: int, segment: Segment, network: float | None
 ) -> float | None:

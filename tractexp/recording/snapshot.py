@@ -2,6 +2,7 @@
 a file.
 """
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -29,6 +30,10 @@ FEWEST_LINES = 1 << 14
 _measured: WeakKeyDictionary[
     Recording, dict[tuple[int, Segment, float], tuple[np.ndarray, np.ndarray]]
 ] = WeakKeyDictionary()
+
+
+# {recording: the frequency [Hz] of its network}
+_network: WeakKeyDictionary[Recording, float | None] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,9 +145,8 @@ def _of_channel(
     """Phasors (M,) and rest (M,) of one channel in windows of n samples, whose first are counted
     from the segment's.
     """
-    phase, begin = 2 * np.pi * f * np.arange(n) / segment.rate, segment.first
-    basis = np.column_stack([np.ones(n), np.sqrt(2) * np.cos(phase), -np.sqrt(2) * np.sin(phase)])
-    inverse = np.linalg.pinv(basis)  # (3, n)
+    begin = segment.first
+    basis, inverse = _basis(f / segment.rate, n)
     if whole:
         blocks = channel.values(begin, begin + len(firsts) * n).reshape(len(firsts), n)
     else:
@@ -151,6 +155,14 @@ def _of_channel(
     return fitted[:, 1] + 1j * fitted[:, 2], np.sqrt(
         np.mean((blocks - fitted @ basis.T) ** 2, axis=1)
     )
+
+
+@functools.lru_cache(maxsize=64)
+def _basis(turns: float, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and sinusoid (n, 3) of so many turns a sample, and what fits them to samples (3, n)."""
+    phase = 2 * np.pi * turns * np.arange(n)
+    basis = np.column_stack([np.ones(n), np.sqrt(2) * np.cos(phase), -np.sqrt(2) * np.sin(phase)])
+    return basis, np.linalg.pinv(basis)
 
 
 def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
@@ -177,6 +189,26 @@ def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
         return at
     turned = (np.angle(x[1:] * x[:-1].conj()) / np.diff(windows.t) / (2 * np.pi))[pairs]
     return at + float(np.median(turned))
+
+
+def network_frequency(recording: Recording) -> float | None:
+    """The network's frequency [Hz] as the largest of a recording's channels shows it; None where
+    none does.
+    """
+    if recording not in _network:
+        volts = [i for i, c in enumerate(recording.channels) if c.quantity == "voltage"]
+        f = frequency(recording, volts) or frequency(recording, range(len(recording.channels)))
+        _network[recording] = f if f is not None and nearest_nominal(f) is not None else None
+    return _network[recording]
+
+
+def frequency_of(recording: Recording, numbers: Sequence[int]) -> float | None:
+    """That of the network, where some of the channels turn with it; else as `frequency`."""
+    f = network_frequency(recording)
+    seen = snapshots(recording, numbers, f) if f is not None else None
+    if seen is not None and any(seen.pure(number) for number in numbers):
+        return f
+    return frequency(recording, numbers)
 
 
 def _line(
