@@ -52,25 +52,43 @@ def write_page(rows: Sequence[dict[str, Any]], seed: int, path: Path) -> str:
     return "\n".join([*lines, str(path)])
 
 
-def summarize(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """The row of a method in the table."""
+def measure(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
+    """What a method reached, as numbers; a share of nothing is nan."""
     errors = collect_errors(rows)
     held = [one for row in rows for dip in row.get("dips", ()) for one in dip["held"] or ()]
     known = [row for row in rows if row["truth"] is not None and row.get("named") is not None]
-    right = sum(bool(row["named"]) and row["named"] == sorted(row["truth"]) for row in known)
-    wrong = sum(bool(row["named"]) and row["named"] != sorted(row["truth"]) for row in known)
-    silent = sum(not row["named"] and bool(row["truth"]) for row in known)
-    names = [str(right), str(wrong), str(silent)] if known else [""] * 3
+    is_right = [row["named"] == sorted(row["truth"]) for row in known]
+    named = [bool(row["named"]) for row in known]
     seconds = [row["seconds"] for row in rows if "seconds" in row]
+    return {
+        "cases": len(rows),
+        "error_median": float(np.quantile(errors, 0.5, method="higher")),
+        "error_90": float(np.quantile(errors, 0.9, method="higher")),
+        "unpredicted": int(np.isinf(errors).sum()),
+        "dips": len(errors),
+        "band_held": float(np.mean(held)) if held else np.nan,
+        "in_bands": len(held),
+        "could_name": len(known),
+        "named_right": sum(a and b for a, b in zip(named, is_right, strict=True)),
+        "named_wrong": sum(a and not b for a, b in zip(named, is_right, strict=True)),
+        "silent": sum(not row["named"] and bool(row["truth"]) for row in known),
+        "seconds": float(np.median(seconds)) if seconds else np.nan,
+    }
+
+
+def summarize(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """The row of a method in the table."""
+    told = measure(rows)
+    names = [str(told[key]) for key in ("named_right", "named_wrong", "silent")]
     return [
         rows[0]["method"],
-        str(len(rows)),
-        in_percent(np.quantile(errors, 0.5, method="higher")),
-        in_percent(np.quantile(errors, 0.9, method="higher")),
-        f"{np.isinf(errors).sum()} of {len(errors)}",
-        f"{np.mean(held):.0%} of {len(held)}" if held else "",
-        *names,
-        f"{np.median(seconds):.1f}" if seconds else "",
+        str(told["cases"]),
+        in_percent(told["error_median"]),
+        in_percent(told["error_90"]),
+        f"{told['unpredicted']} of {told['dips']}",
+        f"{told['band_held']:.0%} of {told['in_bands']}" if told["in_bands"] else "",
+        *(names if told["could_name"] else [""] * 3),
+        f"{told['seconds']:.1f}" if np.isfinite(told["seconds"]) else "",
     ]
 
 

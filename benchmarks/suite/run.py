@@ -1,9 +1,10 @@
 """Run methods over the numbered cases: python benchmarks/suite/run.py [--methods A.py B.py]
-[--cases 1-20] [--seed 0] [--cores 2] [--out FOLDER]
+[--cases 1-20] [--seed 0] [--cores 2] [--out FOLDER] [--track sqlite:///mlflow.db]
 
 A method is a file with `fit(events)` and `predict(model, event)`, and `name(model)` if it says what
 is missing (README.md beside this file). By default all of `methods/` run over all cases. Written
-are `suite.json`, a row a method and case, and the page `suite.html`. Nothing of an unused dip
+are `suite.json`, a row a method and case, and the page `suite.html`; with `--track` each method is
+a run in MLflow, too. Nothing of an unused dip
 reaches a method but its voltage, its frequency and the power before it.
 """
 
@@ -28,7 +29,7 @@ sys.path.insert(0, str(HERE))
 import numpy as np  # noqa: E402
 from cases import MADE, RECORDS, Event, SuiteCase, make_cases  # noqa: E402
 from joblib import Parallel, delayed  # noqa: E402
-from page import write_page  # noqa: E402
+from page import measure, write_page  # noqa: E402
 
 METHODS = HERE / "methods"
 
@@ -113,6 +114,19 @@ def run_suite(
     return list(rows)
 
 
+def log_rows(rows: Sequence[dict[str, Any]], seed: int, uri: str) -> None:
+    """A run in MLflow for each method, with what it reached as metrics."""
+    from tractexp import tracking
+    from tractexp.tracking import TrackedRun
+
+    for method in sorted({row["method"] for row in rows}):
+        own = [row for row in rows if row["method"] == method]
+        metrics = {key: value for key, value in measure(own).items() if np.isfinite(value)}
+        cases = [row["case"] for row in own]
+        parameters = {"method": method, "seed": seed, "cases": str(cases)}
+        tracking.log(TrackedRun("suite", method, parameters=parameters, metrics=metrics), uri)
+
+
 def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--methods", nargs="*", type=Path, default=sorted(METHODS.glob("*.py")))
@@ -120,6 +134,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, default=0, help="of cases 21 to 50")
     parser.add_argument("--cores", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("suite"))
+    parser.add_argument("--track", help="address of an MLflow store")
     asked = parser.parse_args(words)
     methods = [path.resolve() for path in asked.methods]
     rows = run_suite(methods, asked.cases, asked.seed, asked.cores)
@@ -127,6 +142,8 @@ def main(words: Sequence[str] | None = None) -> None:
     content = {"seed": asked.seed, "rows": rows}
     (asked.out / "suite.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     print(write_page(rows, asked.seed, asked.out / "suite.html"))
+    if asked.track:
+        log_rows(rows, asked.seed, asked.track)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """The benchmark that others can enter: what a method sees, what is counted, and what fails."""
 
 import json
+import sqlite3
 
 import numpy as np
 import pytest
@@ -96,11 +97,15 @@ def test_a_shipped_record_judges_by_the_dip_that_is_not_fitted():
 
 def test_the_command_writes_rows_and_a_page(tmp_path, capsys):
     method = write(tmp_path, "mine", RIGHT.format(band=(9.0, 9.0), named=["stator_transients"]))
+    store = f"sqlite:///{tmp_path / 'mlflow.db'}"
     words = ["--methods", str(method), "--cases", "51", "--cores", "1", "--out", str(tmp_path)]
-    run.main(words)
+    run.main([*words, "--track", store])
     (row,) = json.loads((tmp_path / "suite.json").read_text(encoding="utf-8"))["rows"]
     assert row["dips"][0]["held"] == [True, True]
     printed = capsys.readouterr().out
     assert "mine | 1 | " in printed
     assert "100% of 2 | 1 | 0 | 0 | " in printed
     assert "mine" in (tmp_path / "suite.html").read_text(encoding="utf-8")
+    with sqlite3.connect(tmp_path / "mlflow.db") as kept:
+        logged = dict(kept.execute("select key, value from latest_metrics"))
+    assert (logged["band_held"], logged["named_right"]) == (1.0, 1.0)
