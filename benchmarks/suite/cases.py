@@ -147,8 +147,7 @@ def read_record(number: int) -> SuiteCase | None:
     station, andes = SHARED / "data" / "dfr220kv-shandong" / "xtz.cfg", SHARED / "cases" / "andes"
     place = number - RECORDS[0]
     if place in (0, 1):
-        name = ("tibet", "contactors")[place]
-        dips = [tractexp.read(f"{name}_{depth}pct")[0] for depth in (50, 30, 65)]
+        dips = tractexp.read(("tibet", "contactors")[place])
         truth = (("stator_transients",), ("undervoltage_trip",))[place]
         return split_case(number, dips, (0, 1), truth)
     if place in (2, 3, 4, 5) and station.is_file():

@@ -6,7 +6,7 @@ import sqlite3
 import numpy as np
 import pytest
 from suite import run
-from suite.cases import RECIPES, Event, SuiteCase, make_case, read_record
+from suite.cases import RECIPES, Event, SuiteCase, make_case, make_cases, read_record
 
 SAMPLES, START = 400, 100
 RIGHT = """
@@ -89,10 +89,22 @@ def test_a_public_case_is_the_same_each_time_and_others_follow_their_seed():
     assert not np.array_equal(one.unused[0].P, make_case(number, 1).unused[0].P)
 
 
-def test_a_shipped_record_judges_by_the_dip_that_is_not_fitted():
-    case = read_record(51)
+@pytest.mark.parametrize(
+    ("number", "truth"), [(51, "stator_transients"), (52, "undervoltage_trip")]
+)
+def test_a_shipped_record_judges_by_the_dip_that_is_not_fitted(number, truth):
+    case = read_record(number)
     assert (len(case.fitted), len(case.unused)) == (2, 1)
-    assert case.truth == ("stator_transients",)
+    assert "65pct" in case.unused[0].name
+    assert case.truth == (truth,)
+
+
+def test_cases_of_files_that_are_there_have_dips_to_fit_and_others():
+    there = [case for case in make_cases(range(53, 61), 0)]
+    if not there:
+        pytest.skip("needs ../shared")
+    assert all(case.fitted and case.unused and case.truth is None for case in there)
+    assert {event.frequency for case in there for event in case.fitted} <= {50.0, 60.0}
 
 
 def test_the_command_writes_rows_and_a_page(tmp_path, capsys):
