@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
-from hydra.core.config_store import ConfigStore
 from hydra.core.object_type import ObjectType
 from hydra.core.plugins import Plugins
 from hydra.plugins.config_source import ConfigResult, ConfigSource
@@ -77,14 +76,13 @@ def register(arguments: Sequence[str] = ()) -> None:
     from tractexp.sweep.sweeper import Grid, GridConfig
 
     hydra_config_store.share()
-    store = ConfigStore.instance()
-    store.store(name="config_schema", node=Config)
+    hydra_versions.store_schema(None, "config_schema", Config)
     for group, names in _list_offered().items():
         for name in names:
             where = f"schema/{group}" if _is_configured(group, name) else group
             hydra_config_store.store_later(where, name, functools.partial(_schema_of, group, name))
-    store.store(group="hydra/sweeper", name="grid", node=GridConfig)
-    store.store(group="hydra/launcher", name="cores", node=CoresConfig)
+    hydra_versions.store_schema("hydra/sweeper", "grid", GridConfig)
+    hydra_versions.store_schema("hydra/launcher", "cores", CoresConfig)
     Plugins.instance().register(PluginSearchPath)
     Plugins.instance().register(ModelFiles)
     for cls in (Grid, Cores):
@@ -93,7 +91,7 @@ def register(arguments: Sequence[str] = ()) -> None:
         from tractexp.sweep.batches import LAUNCHERS
 
         for name, (cls, schema) in LAUNCHERS.items():
-            store.store(group="hydra/launcher", name=name, node=schema)
+            hydra_versions.store_schema("hydra/launcher", name, schema)
             hydra_plugins.admit(cls)
     register_resolver = hydra_versions.register_resolver()
     register_resolver("fingerprint", _fingerprint, replace=True)

@@ -856,3 +856,54 @@ def test_what_the_jobs_of_a_sweep_share_is_spelled_once_for_each(monkeypatch):
     configs = [{"seed": k, "optimizer": {"name": "pso", "population": 20}} for k in range(5)]
     assert shared_settings(configs) == {"optimizer.name": "pso", "optimizer.population": "20"}
     assert len(spelled) == len(configs)
+
+
+HOLDERS = """
+import pathlib, subprocess, sys
+from hydra.experimental.callback import Callback
+
+ASK = (
+    "from pathlib import Path; from tractexp.run_folder import find_holder;"
+    "print(find_holder(Path('sweep')).partition(' on ')[0])"
+)
+
+class Holders(Callback):
+    \"\"\"Notes who holds the sweep as each job starts, as another process sees it.\"\"\"
+
+    def on_job_start(self, config, **more):
+        seen = subprocess.run([sys.executable, "-c", ASK], capture_output=True, text=True)
+        pathlib.Path(f"holder{config.hydra.job.num}").write_text(seen.stdout)
+"""
+
+
+# Hydra 1.4 says of a callback of anybody's that a list of what may be called is to come
+@pytest.mark.filterwarnings("ignore:(?s).*execution_whitelist")
+@pytest.mark.parametrize(
+    ("sweeper", "asked"),
+    [
+        ("basic", ["hydra.sweeper.max_batch_size=1", "seed=1,2"]),
+        ("optuna", ["hydra.sweeper.n_trials=2", "hydra.sweeper.n_jobs=1", "seed=choice(1,2)"]),
+    ],
+)
+def test_each_batch_of_another_sweeper_holds_the_folder(sweeper, asked, tmp_path, monkeypatch):
+    if sweeper != "basic":
+        pytest.importorskip(f"hydra_plugins.hydra_{sweeper}_sweeper", reason="not installed")
+    (tmp_path / "holders_of_a_sweep.py").write_text(HOLDERS)
+    monkeypatch.syspath_prepend(tmp_path)
+    note = "+hydra.callbacks.h={_target_: holders_of_a_sweep.Holders}"
+    done = run_command(
+        "-m",
+        *QUICK,
+        "tracking.enabled=false",
+        f"hydra/sweeper={sweeper}",
+        "hydra.launcher.backend=sequential",
+        HERE,
+        note,
+        "optimizer=pso",
+        *asked,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    holders = [(tmp_path / f"holder{k}").read_text().strip() for k in range(2)]
+    assert holders == [f"process {os.getpid()}"] * 2
+    assert not list((tmp_path / "sweep").glob(".tractexp.*lock"))
