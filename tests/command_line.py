@@ -14,7 +14,7 @@ import sys
 import warnings
 from unittest import mock
 
-COLUMNS = {"COLUMNS": "140"}
+COLUMNS = {"COLUMNS": "1000"}  # no sentence is folded
 
 
 def start_command(*arguments, cwd, **environment) -> subprocess.CompletedProcess:

@@ -28,6 +28,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 from tractexp import credentials, interpreter  # noqa: E402
 from tractexp.errors import Stopped, UserError  # noqa: E402
 from tractexp.output import outlet  # noqa: E402
+from tractexp.progress import ask_for  # noqa: E402
 from tractexp.wording import one_line  # noqa: E402
 
 # what no single job that is logged has: maybe
@@ -154,6 +155,7 @@ def end_on_signal(*_: object) -> None:
 
 
 def _run(arguments: list[str]) -> int:
+    arguments = ask_for(arguments)
     signal.signal(signal.SIGTERM, end_on_signal)
     if not any(argument.startswith(UNLOGGED) for argument in arguments):
         from tractexp.tracking.process import start_ahead

@@ -152,6 +152,10 @@ class Written(Outcome):
     page: ClassVar[str] = ""  # file of the page; "" for none
     content: Mapping[str, Any]  # for machines
 
+    def screen(self) -> Report:
+        """What a command prints of it: the answer on one screen; by default the summary."""
+        return self.summary()
+
     def report(self) -> Report:
         """The page as a list of blocks: a notebook shows it, `save(path)` writes it.
 

@@ -1,11 +1,13 @@
-"""Progress of a call: lines, and one live line, on a terminal, in a notebook or in a log file.
+"""Progress of a call: one live line on a terminal and in a notebook, lines in a log file.
 
-All by rich. In a notebook its own live display asks for ipywidgets; the same bar is shown by
-IPython's display instead, which every notebook has.
+What a log file has of it goes to the standard error: the output is the answer. All by rich. In a
+notebook its own live display asks for ipywidgets; the same bar is shown by IPython's display
+instead, which every notebook has.
 """
 
 import functools
 import itertools
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -15,6 +17,9 @@ from typing import Any
 from tractexp.wording import one_line
 
 LOG_WIDTH = 120  # characters a table may take in a log file
+WIDTH = "COLUMNS"  # the variable by which a user says how many, wherever it is printed
+EVERYTHING = "--all"  # the option that prints more than the first screen
+STILL = "  still"  # begins what is told of a stage that takes long: on a live line, in no log file
 # s: a log file gets a progress line after so long, then every so often
 FIRST_LINE, NEXT_LINES = 2.0, 10.0
 BLINK = 0.15  # s between two pictures of a bar in a notebook
@@ -38,14 +43,48 @@ def console() -> Any:
     from rich.console import Console
 
     lively = Console(highlight=False, soft_wrap=True)
-    if lively.is_terminal or lively.is_jupyter:
+    if lively.is_terminal or lively.is_jupyter or WIDTH in os.environ:
         return lively
     return Console(highlight=False, soft_wrap=True, width=LOG_WIDTH)
+
+
+def text_width() -> int | None:
+    """Where sentences are folded, in characters; None where each is one line, as in a log file."""
+    return console().width if console().is_terminal or WIDTH in os.environ else None
+
+
+def is_everything_asked() -> bool:
+    """Whether the command was asked for more than the first screen."""
+    return bool(_everything)
+
+
+_everything: list[str] = []
+
+
+def ask_for(arguments: list[str]) -> list[str]:
+    """Note whether a command line asks for everything by `--all`; the rest of it."""
+    _everything[:] = [argument for argument in arguments if argument == EVERYTHING]
+    return [argument for argument in arguments if argument != EVERYTHING]
 
 
 def say(text: str = "") -> None:
     """Print one line."""
     console().print(one_line(text), markup=False)
+
+
+def log(text: str) -> None:
+    """Print one line of progress for a log file, beside the output."""
+    print(one_line(text), file=sys.stderr, flush=True)
+
+
+def tell_beside(text: str) -> None:
+    """Print what was read and begun: where everything is asked for, and in a log file; a terminal
+    has the first screen.
+    """
+    if is_everything_asked():
+        say(text)
+    elif not _lively():
+        log(text)
 
 
 @contextmanager
@@ -68,11 +107,10 @@ def report_search(
                 rest = describe_remaining_time(
                     spent, share(iteration, simulations, iterations, budget)
                 )
-                say(
+                log(
                     f"  iteration {iteration}: {simulations} simulations, best objective"
                     f" {best:.4g}{rest}"
                 )
-                sys.stdout.flush()
 
         yield line
         return
@@ -81,16 +119,16 @@ def report_search(
         BarColumn(bar_width=24),
         TextColumn(
             "{task.fields[simulations]} simulations, best objective"
-            " {task.fields[best]:.4g}{task.fields[rest]}"
+            " {task.fields[best]}{task.fields[rest]}"
         ),
     ]
     started, total = time.perf_counter(), 1.0 if iterations or budget else None
-    with _live(columns, total, simulations=0, best=float("nan"), rest="") as update:
+    with _live(columns, total, simulations=0, best="", rest="") as update:
 
         def callback(iteration: int, best: float, simulations: int) -> None:
             done = share(iteration, simulations, iterations, budget)
             rest = describe_remaining_time(time.perf_counter() - started, done)
-            update(completed=done or 0.0, simulations=simulations, best=best, rest=rest)
+            update(completed=done or 0.0, simulations=simulations, best=f"{best:.4g}", rest=rest)
 
         yield callback
 
@@ -128,8 +166,7 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
         done += 1
         if (spent := pace()) and done < total:
             rate, rest = done / spent, spent * (total - done) / done
-            say(f"  {done} of {total} {what}, {rate:.2g} a second, about {rest:.0f} s left")
-            sys.stdout.flush()
+            log(f"  {done} of {total} {what}, {rate:.2g} a second, about {rest:.0f} s left")
 
     yield count
 
@@ -142,40 +179,29 @@ def counter(what: str, progress: Progress = None) -> Callable[[int], Counting]:
 
 
 @contextmanager
-def tell_stages(progress: Progress) -> Iterator[Callable[[str], None]]:
-    """Yield a function for the lines of the stages: the newest stands on a live line; a log file
-    has each.
+def tell_stages(progress: Progress = None) -> Iterator[Callable[[str], None]]:
+    """Yield a function for the lines of the stages: the newest stands on a live line.
+
+    A log file has a stage once the call has taken `FIRST_LINE` seconds, and not that it goes on.
     """
     from rich.progress import SpinnerColumn, TextColumn
 
     if callable(progress) or progress is False:
         yield progress or (lambda line: None)
-    elif _lively():
+        return
+    if _lively():
         with _live(
             [SpinnerColumn(), TextColumn("{task.fields[stage]}", markup=False)], None, stage=""
         ) as update:
             yield lambda line: update(stage=one_line(line))
-    else:
-        yield lambda line: say(f"  {line}")
-
-
-@contextmanager
-def tell_late_stages(progress: Progress = None) -> Iterator[Callable[[str], None]]:
-    """As `telling`, but a log file has a stage only once the call has taken `FIRST_LINE` seconds.
-
-    It stands with what is said of errors, so that the first line of the output is the answer.
-    """
-    started = time.perf_counter()
-    if _lively() or callable(progress) or progress is False:
-        with tell_stages(progress) as show:
-            yield show
         return
+    started = time.perf_counter()
 
-    def show_late(line: str) -> None:
-        if time.perf_counter() - started >= FIRST_LINE:
-            print(f"  {one_line(line)}", file=sys.stderr, flush=True)
+    def log_late(line: str) -> None:
+        if time.perf_counter() - started >= FIRST_LINE and not line.startswith(STILL):
+            log(f"  {line}")
 
-    yield show_late
+    yield log_late
 
 
 def tell(progress: Progress, lines: Iterable[str]) -> None:

@@ -139,6 +139,13 @@ def build_again_command(*settings: str, of: Collection[str] = OF_LOAD) -> str:
     return min(whole, *by_folder, key=len) if by_folder else whole
 
 
+def build_folder_command(*settings: str) -> str:
+    """The command that does something else with what this run wrote into its folder; "" where it
+    has none, as from Python.
+    """
+    return next((quoting.shell("tractexp", "again", str(f), *settings) for f in _placed), "")
+
+
 def _not_taken_over(argument: str) -> bool:
     """Whether an argument keeps `tractexp again` from repeating this run by its folder."""
     # which is none of the settings that a folder keeps

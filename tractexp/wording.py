@@ -8,6 +8,8 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
+LONGEST_SENTENCE = 230  # characters of a sentence on a screen: three lines
+ELLIPSIS = " ..."
 NEGLIGIBLE = 1e-6  # no model of the noise separates one in ten million from one in a billion
 # alternatives that share a name, or figures: so many are told by what they have in common
 FEWEST_GROUPED = 3
@@ -138,3 +140,15 @@ def shown_in_words(shown: Mapping[str, str]) -> str:
         "in the model because the record shows it:"
         f" {'; '.join(f'{name} ({how})' for name, how in shown.items())}"
     )
+
+
+def shorten(sentence: str, longest: int = LONGEST_SENTENCE) -> str:
+    """As many clauses of a sentence as there is room for, or words; an ellipsis says that there are
+    more.
+    """
+    if len(sentence) <= longest:
+        return sentence
+    cut = sentence[: longest - len(ELLIPSIS)]
+    at = max(cut.rfind("; "), cut.rfind(", "))
+    at = at if at > longest // 2 else max(cut.rfind(" "), longest // 2)
+    return f"{cut[:at]}{ELLIPSIS}"

@@ -23,7 +23,7 @@ QUICK = ("optimizer=multistart_least_squares", "optimizer.starts=2", "hydra.run.
 @pytest.fixture(scope="module")
 def job(tmp_path_factory):
     folder = tmp_path_factory.mktemp("identity")
-    done = run_command(*RECORDING, *QUICK, cwd=folder)
+    done = run_command(*RECORDING, *QUICK, "--all", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 

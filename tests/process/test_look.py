@@ -164,6 +164,7 @@ def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, statio
         assert words[0] == "tractexp"
         done = run_command(
             *words[1:],
+            "--all",
             "optimizer=random_search",
             "budget=50",
             "tracking.enabled=false",

@@ -777,8 +777,8 @@ def test_a_run_killed_in_an_old_folder_leaves_no_result_under_its_own_configurat
     job = subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    while "optimizer: pso" not in (line := job.stdout.readline()):
-        assert line, job.stderr.read()
+    while "optimizer: pso" not in (line := job.stderr.readline()):
+        assert line, job.stdout.read()
     time.sleep(1.0)
     job.send_signal(way)
     job.communicate(timeout=60)

@@ -112,7 +112,7 @@ def test_an_error_of_nothing_is_undefined(error, words):
 
 def test_a_load_without_one_power_is_identified_and_has_no_error_of_it(tmp_path):
     path = hostile.INPUTS["no_reactive_power.csv"](tmp_path / "dip.csv")
-    done = run_command("data=csv", f"data.train=[{path.name}]", *SEARCH, cwd=tmp_path)
+    done = run_command("--all", "data=csv", f"data.train=[{path.name}]", *SEARCH, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "epsilon_q undefined" in done.stdout
     assert "NaN" not in (tmp_path / "run" / "result.json").read_text()
@@ -132,7 +132,7 @@ def test_a_load_without_one_power_is_identified_and_has_no_error_of_it(tmp_path)
 )
 def test_what_no_load_can_be_found_in_is_a_sentence(name, sentence, tmp_path):
     path = hostile.INPUTS[name](tmp_path / name)
-    done = run_command("data=csv", f"data.train=[{path.name}]", *SEARCH, cwd=tmp_path)
+    done = run_command("--all", "data=csv", f"data.train=[{path.name}]", *SEARCH, cwd=tmp_path)
     assert done.returncode == 2
     assert sentence in done.stderr
 

@@ -71,9 +71,11 @@ def run_step(step: Step, folder: Path) -> None:
     """Run the command of a step, and read what it found and prints."""
     before = {*folder.glob("outputs/runs/*")}
     quiet = ["tracking.enabled=false"] if any("=" in word for word in step.command) else []
+    # the screen has the first one only
+    every = ["--all"] if any("=" in word for word in step.command) else []
     # a package is not overwritten: each is made in a folder of its own, as the refusal says
     here = Path(tempfile.mkdtemp(dir=folder)) if step.command[0] == "new" else folder
-    done = run_command(*step.command, *quiet, cwd=here)
+    done = run_command(*step.command, *quiet, *every, cwd=here)
     assert done.returncode == 0, f"{step.command}: {done.stderr}"
     step.next = printed_commands(done.stdout)
     # no wheel has it

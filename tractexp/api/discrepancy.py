@@ -21,9 +21,8 @@ from tractexp.api.identify import Identification
 from tractexp.api.read import dips_together
 from tractexp.api.response import Response
 from tractexp.api.setup import Given, describe_records
-from tractexp.api.task import Job, Task
+from tractexp.api.task import Job, Task, print_result, print_written
 from tractexp.blocks import Report, Table
-from tractexp.blocks.terminal import show
 from tractexp.errors import MODEL, UserError, check_range
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.result import Result, conclude, refuse_failed
@@ -31,9 +30,11 @@ from tractexp.identification.search import History, SearchResult, search
 from tractexp.inference.problem import Problem
 from tractexp.outcome import Written
 from tractexp.plugin import get, plugin
-from tractexp.progress import Progress, console, say, tell_stages
+from tractexp.progress import Progress, is_everything_asked, say, tell_stages
 from tractexp.provenance import build_again_command
 from tractexp.wording import join_words, shown_in_words, with_error
+
+NEXT = "next: "
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.investigate import Findings as Steps
@@ -305,6 +306,11 @@ class Investigation(Written):
 
         return discrepancy.summary(self)
 
+    def screen(self) -> Report:
+        from tractexp.report import discrepancy_screen
+
+        return discrepancy_screen.screen(self)
+
     def report(self) -> Report:
         """The page: events before and after, where they disagree, candidates, what changed."""
         from tractexp.report import discrepancy
@@ -530,10 +536,18 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
             lines.append(f"investigate it as the base model: {again}")
     if grade != Grade.ADEQUATE and better:
         in_waves = build_again_command("task=discrepancy", "domain=waves", of=("data", "task"))
-        lines.append(f"next: {better}: {in_waves}")
+        lines.append(f"{NEXT}{better}: {in_waves}")
     if term := paths.get(PLUGIN):
         lines.append(f"use the proposed term: {adopt_term(term)}")
     return lines
+
+
+def choose_next(lines: Sequence[str], recommendation: str) -> str:
+    """What a screen has room for: first what the task says of another domain, then the first
+    command, else the recommendation.
+    """
+    urgent = [line.removeprefix(NEXT) for line in lines if line.startswith(NEXT)]
+    return next(iter([*urgent, *lines, recommendation]))
 
 
 @plugin
@@ -576,11 +590,8 @@ class Discrepancy(Task, call=investigate):
         """Investigate the run's events, and print each stage."""
         train, held = job.events_of_fit
         for line in describe_records(train, held, "hold out"):
-            say(line)
-        job.prepare_log()
-        return super().perform(
-            job, records=train, validate=held, progress=lambda line: say(f"  {line}"), **instead
-        )
+            job.tell_beside(line)
+        return super().perform(job, records=train, validate=held, progress=None, **instead)
 
     def conclude(self, job: Job, result: Written) -> None:
         """The page's path and the command that uses the extended model end what is printed."""
@@ -590,15 +601,12 @@ class Discrepancy(Task, call=investigate):
             lambda paths: self.track(job, result, paths),
         )
         paths = {path.name: path for path in (*results, *result.write_drawings(job.folder))}
-        say()
-        show(result.summary(), console())
-        if page := paths.get(result.page):
-            say(f"page: {page}")
-        beside = sorted(
-            str(path.relative_to(job.folder)) for name, path in paths.items() if name != result.page
-        )
-        say(f"beside it: {', '.join(beside)}")
-        for line in _next_commands(result, paths):
+        print_result(job, result)
+        lines = _next_commands(result, paths)
+        if not (is_everything_asked() or job.in_sweep):
+            lines = [f"next: {choose_next(lines, result.recommendation)}"]
+        print_written(paths.values(), result.page)
+        for line in lines:
             say(line)
         self.log(job, result, [*paths.values()])
 

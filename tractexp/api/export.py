@@ -21,7 +21,12 @@ from tractexp.record.identity import describe_identities
 if TYPE_CHECKING:
     from tractexp.exchange.format import Identified
 
-OWN, FILE = BASES = ("own", "file")
+MACHINE, OWN, FILE = BASES = ("machine", "own", "file")
+NAMES = {
+    MACHINE: "the motor's own rating: its apparent power before the dip",
+    OWN: "the record's own base",
+    FILE: "the base of the record's file",
+}
 POWER, VOLTAGE = 100.0, 110.0  # MVA and kV, where nobody said what one per unit is
 
 
@@ -67,7 +72,9 @@ def export(
     # MVA, what 1 pu of the record's file stands for; null: what the record says, else 100
     power: float | None = None,
     voltage: float | None = None,  # kV, line to line; null: what the record says, else 110
-    base: str = OWN,  # own: values on the base of the fit; file: on that of the record's file
+    # machine: values on the motor's own rating; own: on the base of the fit; file: on that of the
+    # record's file
+    base: str = MACHINE,
     # export also a model that does not describe the load, or is no physical one
     doubtful: bool = False,
     playback: bool = True,  # play a dip through the file, in its simulator where that is installed
@@ -86,9 +93,9 @@ def export(
         What 1 pu of the record's file stands for; None: what the record says, else 100.
     voltage : float [kV, line to line]
         The same of the voltage; None: what the record says, else 110.
-    base : "own" or "file"
-        Whether values are on the base of the fit, or on that of the record's file, where it was
-        another.
+    base : "machine", "own" or "file"
+        Whether values are on the motor's own rating, its apparent power before the dip (of a load
+        without a motor: as "own"), on the base of the fit, or on that of the record's file.
     doubtful : bool
         Whether a model is exported that does not describe the load, or is no physical one.
     playback : bool
@@ -122,13 +129,13 @@ def export(
         fit.result.records[0].get("base", {}) if fit.result.records else {},
     )
     file_power = power or (own.file_power if own.in_mva else POWER)
-    on_file = base == FILE
+    ratio = _choose_ratio(fit, base)
     identified = Identified(
         fit.result,
         bus,
-        file_power * (1.0 if on_file else own.ratio),
+        file_power * own.ratio / ratio,
         voltage or recorded.get("voltage_kV") or VOLTAGE,
-        own.ratio if on_file else 1.0,
+        ratio,
     )
     form = build("format", {"name": format})
     form.check_parts(identified)
@@ -145,6 +152,17 @@ def export(
         more.append(agreement.describe_differences(identified.power, ("MW", "Mvar")))
     share = None if agreement is None else agreement.share
     return Exported(format, form.suffix, identified.model.title, text, (*notes, *more), share)
+
+
+def _choose_ratio(fit: Identification, base: str) -> float:
+    """How many per units of the export's base one of the fit's is."""
+    from tractexp.exchange.rating import compute_rating
+
+    if base == FILE:
+        return fit.result.base.ratio
+    if base == OWN or fit.operating_point is None:
+        return 1.0
+    return 1 / compute_rating(fit.result)
 
 
 def _objections(fit: Identification) -> list[str]:
@@ -178,13 +196,9 @@ def _powers(load: "Identified") -> str:
 
 def _base_sentence(load: "Identified", base: str, ratio: float, guessed: bool) -> str:
     """On which base the values of an export are, in a sentence."""
-    which = (
-        ""
-        if ratio == 1
-        else ", the base of the record's file"
-        if base == FILE
-        else ", the record's own base"
-    )
+    which = "" if ratio == 1 else f", {NAMES[FILE if base == FILE else OWN]}"
+    if base == MACHINE and load.ratio != 1:
+        which = f", {NAMES[MACHINE]}"
     said = f"per unit of {load.power:.6g} MVA and {load.voltage:.6g} kV{which}"
     if guessed:
         return f"{said}; 1 pu of the file is taken for {POWER:g} MVA, for no power is given"

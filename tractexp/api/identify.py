@@ -17,7 +17,7 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.choices import set_holding
 from tractexp.errors import Stopped, UserError, among
-from tractexp.identification.adequacy import Adequacy
+from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.result import Result, by_event, conclude, play, refuse_failed
 from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.inference.model_error import ModelError
@@ -26,7 +26,7 @@ from tractexp.inference.problem import Problem
 from tractexp.outcome import FORMS, Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell
-from tractexp.provenance import build_again_command
+from tractexp.provenance import build_again_command, build_folder_command
 from tractexp.record import OwnBase
 from tractexp.wording import epsilon, join_words
 
@@ -39,6 +39,12 @@ if TYPE_CHECKING:
     from tractexp.record import Event
 
 FIXED = "fixed"
+USABLE, DOUBTFUL, UNUSABLE = "usable", "doubtful", "unusable"
+USABILITY = {
+    Grade.ADEQUATE: USABLE,
+    Grade.EFFECT_MISSING: DOUBTFUL,
+    Grade.WRONG_MODEL: UNUSABLE,
+}
 FORMS[Result] = (asdict, lambda content: Result.from_content(content, "the saved result"))
 LEAST_TOLD_MOVE = 2.0  # standard errors from which a rival structure's move is told
 
@@ -276,6 +282,30 @@ class Identification(Written):
         return doubts(self.result, self.operating_point)
 
     @property
+    def usability(self) -> str:
+        """`usable`, `doubtful` or `unusable`, by the grade and by what speaks against it as a load;
+        "" where it was not judged.
+        """
+        if not self.grade:
+            return ""
+        return UNUSABLE if self.doubts else USABILITY[Grade(self.grade)]
+
+    @property
+    def own_parameters(self) -> list[Estimate]:
+        """The estimates but for those of what the records show beside the load."""
+        return [e for e in self.parameters.values() if e.name not in self.result.nuisances]
+
+    @property
+    def next_steps(self) -> list[str]:
+        """What to do next, the most pressing first: a model that is usable is handed on."""
+        from tractexp.exchange.format import choose_format
+
+        if self.usability != USABLE or not (name := choose_format(self.result)):
+            return self.advice
+        command = build_folder_command("task=export", f"task.format={name}")
+        return [f"hand it on: {command}", *self.advice] if command else self.advice
+
+    @property
     def adequate(self) -> bool:
         """Whether nothing but noise is left of the fitted dips."""
         return self.grade == "adequate"
@@ -381,6 +411,12 @@ class Identification(Written):
         from tractexp.report import identify
 
         return identify.summary(self)
+
+    def screen(self) -> Report:
+        """The answer on one screen of a terminal."""
+        from tractexp.report import screen
+
+        return screen.screen(self)
 
     def report(self) -> Report:
         """The page: measured and calculated power, the residual, parameters, how far to trust
@@ -693,6 +729,10 @@ class Identify(Task, call=identify):
     figures: bool | None = None  # write the page; null: in single runs, not in sweeps
     # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
     predictor: bool | None = None
+
+    def perform(self, job: Job, **instead: Any) -> Identification:
+        """Identify; what is read is told where everything is asked for."""
+        return super().perform(job, **{"progress": job.tell_beside, **instead})
 
     def draws(self, job: Job) -> bool:
         """Whether this run draws figures: as set, else in single runs."""

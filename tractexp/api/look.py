@@ -18,7 +18,7 @@ from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
 from tractexp.outcome import Tabulated, Written
 from tractexp.overrides import build_typed_command
-from tractexp.progress import Progress, tell_late_stages
+from tractexp.progress import Progress, tell_stages
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, describe_smearing
 from tractexp.recording.event_views import join_event, propose_joining
@@ -202,12 +202,16 @@ class Look(Written):
         return Table(columns, rows, title)
 
     def summary(self) -> Report:
-        """One screen: which load and dip to fit by which command, then a line for each file, bus
-        and load.
-        """
+        """Which load and dip to fit by which command, then a line for each file, bus and load."""
         from tractexp.report import look_console
 
         return look_console.summary(self.content)
+
+    def screen(self) -> Report:
+        """The same with as many loads as one screen has room for."""
+        from tractexp.report import look_console
+
+        return look_console.screen(self.content)
 
     def build_full_report(self) -> Report:
         """Notes, channels, why the loads are such, all events and all commands."""
@@ -279,7 +283,7 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
     if not flat:
         raise UserError("nothing to look at: give a file, e.g. look('station.cfg')")
     distinct = list(dict.fromkeys(map(_source, flat)))
-    with tell_late_stages(progress) as stage:
+    with tell_stages(progress) as stage:
         views, contents = [], []
         if together := _join_given(distinct, settings):
             distinct, settings = [together["path"]], {**settings, "join": together["join"]}

@@ -18,7 +18,7 @@ from tractexp.errors import DATA, UserError, check_range
 from tractexp.outcome import Written
 from tractexp.overrides import build_typed_command
 from tractexp.plugin import discover, get, plugin
-from tractexp.progress import Progress, count_parts, tell_late_stages
+from tractexp.progress import Progress, count_parts, tell_stages
 from tractexp.record import detect
 from tractexp.recording import archive
 from tractexp.recording.record_files import find_records
@@ -208,7 +208,7 @@ def survey(
         :MOST_RANKED_EVENTS
     ]
     settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
-    with tell_late_stages(progress) as stage:
+    with tell_stages(progress) as stage:
         stage(f"choosing among {len(worth)} events")
         best = _best(place, [row["event"] for row in worth], informative, model, values, settings)
     content["informative"] = files.plain(

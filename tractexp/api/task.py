@@ -18,7 +18,7 @@ from tractexp.blocks.terminal import show
 from tractexp.errors import UserError
 from tractexp.outcome import Written
 from tractexp.plugin import Plugin, build, get
-from tractexp.progress import console, say
+from tractexp.progress import console, is_everything_asked, say, tell_beside, text_width
 from tractexp.run_folder import Write
 
 if TYPE_CHECKING:
@@ -160,12 +160,10 @@ class Task(Plugin):
     def conclude(self, job: "Job", result: Written) -> None:
         """Write a result, show it, draw it, log it."""
         paths = job.write(result.write_results, lambda paths: self.track(job, result, paths))
-        say()
-        show(result.summary(), console())
-        say()
+        print_result(job, result)
         if self.draws(job):
             paths += result.write_drawings(job.folder)
-        print_paths(paths)
+        print_written(paths, result.page)
         self.log(job, result, paths)
 
     def log(self, job: "Job", result: Any, paths: list[Path]) -> None:
@@ -205,6 +203,28 @@ def setting_of(parameter: inspect.Parameter) -> tuple[Any, Any]:
 def _plain(kind: Any) -> Any:
     """A list for a sequence, as the configuration's schema knows it."""
     return list[get_args(kind)[0]] if get_origin(kind) is not None else kind
+
+
+def print_result(job: "Job", result: Written) -> None:
+    """Print one screen; everything where that is asked for, and in a sweep, whose jobs have no
+    page.
+    """
+    everything = is_everything_asked() or job.in_sweep
+    show(result.summary() if everything else result.screen(), console(), text_width())
+
+
+def print_written(paths: Iterable[Path], page: str) -> None:
+    """Print where the page is, and the names of what is beside it; without a page each path."""
+    by_name = {path.name: path for path in paths}
+    if page not in by_name:
+        print_paths(by_name.values())
+        return
+    first = by_name.pop(page)
+    here = Path.cwd()
+    say(f"page: {first.relative_to(here) if first.is_relative_to(here) else first}")
+    beside = sorted(str(path.relative_to(first.parent)) for path in by_name.values())
+    if beside:
+        say(f"beside it: {', '.join(beside)}")
 
 
 def print_paths(paths: Iterable[Path]) -> None:
@@ -335,6 +355,11 @@ class Job:
         """
         self.prepare_log()
         say(line)
+
+    def tell_beside(self, line: str) -> None:
+        """As `tell`, of a task whose first screen is the answer: see `progress.tell_beside`."""
+        self.prepare_log()
+        tell_beside(line)
 
     def identify_load(self, **instead: Any) -> Any:
         """The identification that model, objective, optimizer and limits describe (an

@@ -1,6 +1,7 @@
 """A report as a terminal or a log file shows it: sentences and tables."""
 
 import io
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -8,19 +9,48 @@ from tractexp.blocks.block import CodeBlock, Heading, Items, Paragraphs, Report,
 from tractexp.wording import one_line
 
 PLAIN_LINE_WIDTH = 200  # characters of a line of text that is no terminal's
+COLUMN_GAP = 2  # characters between two columns
+NARROWEST_WORDS = 12  # characters to which a column of words may be folded
+COMMAND = re.compile(r"(?<=: )tractexp [^;]*$")  # at the end of a line: it is copied whole
 
 
-def show(report: Report, console: Any) -> None:
-    """Print a report on a console of rich."""
+def show(report: Report, console: Any, width: int | None = None) -> None:
+    """Print a report on a console of rich, its sentences folded at `width` characters."""
     for text in (report.title, report.lead):
         if text:
-            console.print(one_line(text), markup=False)
+            _print_text(text, console, width)
     for block in report.blocks:
         if isinstance(block, Table):
             _table(block.brief, console)
         else:
             for line in _lines(block):
-                console.print(one_line(line), markup=False)
+                _print_text(line, console, width)
+
+
+def _print_text(text: str, console: Any, width: int | None) -> None:
+    for line in fold(one_line(text), width):
+        console.print(line, markup=False)
+
+
+def fold(text: str, width: int | None) -> list[str]:
+    """The lines of a sentence, all but the first indented; a command at its end is one line, which
+    the terminal breaks, so that it is copied whole.
+    """
+    from rich.cells import cell_len
+
+    if width is None or cell_len(text) <= width:
+        return [text]
+    lead = text[: len(text) - len(text.lstrip())]
+    command = COMMAND.search(text)
+    first, *words = (text[: command.start()] if command else text).split()
+    lines, indent = [lead + first], f"{lead}  "
+    for word in words:
+        longer = f"{lines[-1]} {word}"
+        if cell_len(longer) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(indent + word)
+    return [*lines, *([f"{indent}{command[0]}"] if command else [])]
 
 
 def _lines(block: Any) -> Sequence[str]:
@@ -56,22 +86,58 @@ def plain(report: Report) -> str:
 
 
 def _table(table: Table, console: Any) -> None:
-    """The first column and those of words are to the left; the last is folded."""
+    """The first column and those of words are to the left. Columns of words are folded where the
+    console is narrow; where that is not enough, each row is a sentence.
+    """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table as Grid
 
     if not table.columns:
         return
+    if _least_width(table) > console.width:
+        _print_rows(table, console)
+        return
     grid = Grid(
-        title=one_line(table.title) or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False
+        title=one_line(table.title) or None,
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        padding=(0, COLUMN_GAP - 1, 0, 0),
     )
-    last = len(table.columns) - 1
     for i, column in enumerate(table.columns):
-        justify, fixed = (
-            "left" if i == 0 or i in table.words else "right",
-            i < last and i not in table.words,
-        )
-        grid.add_column(one_line(column), justify=justify, no_wrap=fixed)
+        justify = "left" if i == 0 or i in table.words else "right"
+        grid.add_column(one_line(column), justify=justify, no_wrap=not _folds(table, i))
     for row in table.cells:
         grid.add_row(*map(one_line, row))
     console.print(grid, markup=False)
+
+
+def _folds(table: Table, column: int) -> bool:
+    """Whether the cells of a column are folded where there is no room for them."""
+    return column in table.words or column == len(table.columns) - 1
+
+
+def _least_width(table: Table) -> int:
+    """How many characters a table needs, its columns of words folded."""
+    from rich.cells import cell_len
+
+    total = COLUMN_GAP * (len(table.columns) - 1)
+    for i, column in enumerate(table.columns):
+        cells = [column, *(row[i] for row in table.cells)]
+        longest = max(map(cell_len, cells))
+        if _folds(table, i):
+            words = [cell_len(word) for cell in cells for word in cell.split()]
+            longest = min(longest, max([NARROWEST_WORDS, *words]))
+        total += longest
+    return total
+
+
+def _print_rows(table: Table, console: Any) -> None:
+    """Each row of a table as a sentence: its first cell, and what the columns say of it."""
+    if table.title:
+        _print_text(table.title, console, console.width)
+    for first, *rest in table.cells:
+        pairs = zip(table.columns[1:], rest, strict=True)
+        told = ", ".join(f"{column} {cell}" for column, cell in pairs if cell)
+        _print_text(f"{first}: {told}", console, console.width)

@@ -10,7 +10,7 @@ from typing import Any
 
 from tractexp import files, quoting
 from tractexp.errors import UserError
-from tractexp.progress import console
+from tractexp.progress import console, text_width
 
 FOLDER = Path("outputs", "looks")
 DOES = (
@@ -47,14 +47,18 @@ def look(arguments: list[str]) -> int:
             "tractexp look: give a file beside the settings, e.g. tractexp look station.cfg"
         )
     from tractexp.api.look import look as looked
-    from tractexp.api.task import call, print_paths
+    from tractexp.api.task import call, print_written
     from tractexp.blocks.terminal import show
 
     view = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
     rest = f"  everything: {quoting.shell('tractexp', 'look', *chosen.file, '--all')}"
-    show(view.build_full_report() if chosen.all else view.summary().text(rest), console())
+    show(
+        view.build_full_report() if chosen.all else view.screen().text(rest),
+        console(),
+        text_width(),
+    )
     usual = FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-    print_paths(view.write(chosen.folder or files.new_folder(usual)))
+    print_written(view.write(chosen.folder or files.new_folder(usual)), view.page)
     return 0
 
 

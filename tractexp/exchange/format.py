@@ -13,7 +13,7 @@ from tractexp.exchange.circuit import TCircuit
 from tractexp.identification.result import Result, parts
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
-from tractexp.plugin import Plugin, discover
+from tractexp.plugin import Plugin, build, discover
 from tractexp.record.identity import label
 from tractexp.record.own_base import scale_parameter
 from tractexp.wording import join_words
@@ -202,3 +202,15 @@ class Format(Plugin):
         by = f"; {TASK.format}={others} can represent '{name}'" if others else ""
         represented = ", ".join(sorted(self._list_represented(kind) or ["none"]))
         return f"{why}; it can represent {represented}{by}"
+
+
+def choose_format(result: Result) -> str:
+    """The first format by name that represents every part of a model; "" where none does."""
+    load, formats = Identified(result), discover()[Format.group]
+    for name in sorted(formats):
+        try:
+            build(Format.group, {"name": name}).check_parts(load)
+        except UserError:
+            continue
+        return name
+    return ""

@@ -59,22 +59,34 @@ class OperatingPoint:
         """The motor's part of the active power; of use where that is drawn."""
         return self.P_motor / self.P if self.P else float("inf")
 
-    def __str__(self) -> str:
-        """Powers, slip, inertia and starting current in a line."""
-        p, q = self.units
+    @property
+    def machine(self) -> str:
+        """The motor's share, and what it is as a machine, in a line."""
+        share = [f"{self.share:.0%} of P"] if self.P > 0 else []
+        return ", ".join([*share, *self._figures])
+
+    @property
+    def _figures(self) -> list[str]:
+        """Slip, H and starting current, a clause each."""
         machine = [f"slip {100 * self.slip:.2g} %"]
         if self.H is not None:
             machine.append(
-                f"H {self.H:.2g} s on its own {'MVA' if p == 'MW' else 'apparent power'}"
+                f"H {self.H:.2g} s on its own"
+                f" {'MVA' if self.units[0] == 'MW' else 'apparent power'}"
             )
         if self.starting is not None:
             machine.append(f"starting current {self.starting:.2g} times that before the dip")
+        return machine
+
+    def __str__(self) -> str:
+        """Powers, slip, inertia and starting current in a line."""
+        p, q = self.units
         share = f", {self.share:.0%} of P" if self.P > 0 else ""
         return (
             f"before the dip: motor {self.P_motor:.4g} {p} and {self.Q_motor:.4g} {q}{share};"
             " static load "
             f"{self.P - self.P_motor:.4g} {p} and {self.Q - self.Q_motor:.4g} {q};"
-            f" {', '.join(machine)}"
+            f" {', '.join(self._figures)}"
         )
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event, Thread
 
-from tractexp.progress import describe_remaining_time
+from tractexp.progress import STILL, describe_remaining_time
 
 SILENCE = 4.0  # s after which a line says that a step goes on
 
@@ -105,7 +105,7 @@ class Effort:
                         far.append(f"{self.total} simulations")
                     self._said, counted = now, self.total
                     reached = f": {', '.join(far)}" if far else ""
-                    self._tell(f"  still {self._step or 'at work'}{reached}")
+                    self._tell(f"{STILL} {self._step or 'at work'}{reached}")
 
         watcher = Thread(target=watch, name="progress", daemon=True)
         watcher.start()

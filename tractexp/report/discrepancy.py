@@ -58,26 +58,36 @@ def summary(findings: "Outcome") -> Report:
         [f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"]
     )
     report.add(gap(content))
-    if places := content["where"]:
-        loudest, others = places[0], len(places) - 1
-        span = f"{loudest['start']:.3f} to {loudest['end']:.3f} s"
-        stretches = "stretches" if others > 1 else "stretch"
-        more = f", and {others} more {stretches}" if others else ""
-        report.text(
-            f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of"
-            f" the excess{more}"
-        )
-    if near := content["nearest"]:
-        closed = {role: (near["gap"][role] or {}).get("closed") for role in ROLES}
-        shares = join_words(
-            [f"{closed[role]:.0%} {on}" for role, on in ROLES.items() if closed[role] is not None]
-        )
-        sizes = ", ".join(findings.sizes_of_nearest)
-        report.text(
-            f"nearest, not accepted: {join_words(near['effects'])}; gap closed"
-            f" {shares or 'unknown'}; {sizes}"
-        )
+    report.text(*describe_where(content), *describe_nearest(content, findings.sizes_of_nearest))
     return report.text(f"noise: {content['noise']}", f"next: {findings.recommendation}")
+
+
+def describe_where(content: Mapping[str, Any]) -> list[str]:
+    """Where the base model disagrees most, in a line; [] where it does not."""
+    if not (places := content["where"]):
+        return []
+    loudest, others = places[0], len(places) - 1
+    span = f"{loudest['start']:.3f} to {loudest['end']:.3f} s"
+    stretches = "stretches" if others > 1 else "stretch"
+    more = f", and {others} more {stretches}" if others else ""
+    return [
+        f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of"
+        f" the excess{more}"
+    ]
+
+
+def describe_nearest(content: Mapping[str, Any], sizes: Sequence[str]) -> list[str]:
+    """The effects that come nearest where none is accepted, in a line; [] elsewhere."""
+    if not (near := content["nearest"]):
+        return []
+    closed = {role: (near["gap"][role] or {}).get("closed") for role in ROLES}
+    shares = join_words(
+        [f"{closed[role]:.0%} {on}" for role, on in ROLES.items() if closed[role] is not None]
+    )
+    return [
+        f"nearest, not accepted: {join_words(near['effects'])}; gap closed"
+        f" {shares or 'unknown'}; {', '.join(sizes)}"
+    ]
 
 
 def gap(content: Mapping[str, Any]) -> Table:

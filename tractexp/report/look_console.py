@@ -4,6 +4,7 @@ is asked for.
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from tractexp.blocks import Report, Table
@@ -25,17 +26,52 @@ from tractexp.report.look import (
     size,
     starts,
 )
-from tractexp.wording import count_noun, figure, join_words
+from tractexp.wording import count_noun, figure, join_words, shorten
 
 NOTES = 3  # of a file that have room
 MOST_LINE_EVENTS = 4  # events of a bus that its line has room for
+# files, buses of a file, rows of a table of loads, reasons that a screen has room for
+MOST_FILES, MOST_BUSES, MOST_LOADS, MOST_REASONS = 2, 2, 6, 2
+ONE_LINE, TWO_LINES = 76, 150  # characters
 Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
 
 
-def summary(content: Entry) -> Report:
-    """One screen: which load and which dip to fit by which command, then a line for each file, bus
-    and load.
+def screen(content: Entry) -> Report:
+    """What 25 lines of a terminal hold: which load and which dip to fit by which command; then of
+    each file where it is from, its buses, and which loads are worth fitting.
     """
+    entries = content["files"]
+    page = Report().text(_answer(entries)).items(unfitted.sentences(entries)[:MOST_REASONS])
+    for entry in entries[:MOST_FILES]:
+        page.text(shorten(_about(entry), TWO_LINES))
+        if notes := entry["notes"]:
+            page.items([shorten(f"note: {notes[0]}", ONE_LINE)])
+        buses = _buses(entry["feeders"])
+        told = [_bus(entry, n, bus) for n, bus in enumerate(buses, 1) if _is_loaded(bus)]
+        page.items([shorten(bus, TWO_LINES) for bus in told[:MOST_BUSES]])
+        if buses:
+            _add_loads(page, entry, _loads(entry, buses))
+    if len(entries) > MOST_FILES:
+        page.text(f"  {count_noun(len(entries) - MOST_FILES, 'file')} more")
+    return page
+
+
+def _is_loaded(bus: Sequence[Entry]) -> bool:
+    return any(feeder["loaded"] for feeder in bus)
+
+
+def _add_loads(page: Report, entry: Entry, loads: Table) -> None:
+    """The table of loads by what decides alone, those that are worth fitting first."""
+    detail = {loads.columns.index(name) for name in ("currents", "beside")} | {*loads.detail}
+    rows = [[*row[:-1], re.split(", but ", str(row[-1]))[0]] for row in loads.rows]
+    rows.sort(key=lambda row: not row[-1].startswith("yes"))
+    page.add(replace(loads, rows=rows[:MOST_LOADS], detail=detail))
+    if len(rows) > MOST_LOADS:
+        page.text(f"  {count_noun(len(rows) - MOST_LOADS, 'load')} more")
+
+
+def summary(content: Entry) -> Report:
+    """Which load and which dip to fit by which command, then a line for each file, bus and load."""
     page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
         held = f"; {count_noun(len(entry['channels']), 'channel')}" if entry["channels"] else ""

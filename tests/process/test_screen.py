@@ -1,0 +1,131 @@
+"""The first screen of a command: 25 lines of 80 characters, the answer first; all else by --all."""
+
+import dataclasses
+import io
+from contextlib import nullcontext
+
+import pytest
+from command_line import run_command
+from rich.console import Console
+from screens import LINES, WIDTH, count_rows
+from test_export import identified
+
+import tractexp
+from tractexp.api.identify import Identification
+from tractexp.blocks import Table
+from tractexp.blocks.block import Report
+from tractexp.blocks.terminal import fold, show
+from tractexp.wording import shorten
+
+EXACT = ("optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false")
+
+
+def print_at(report, width):
+    """The lines of a report on a console of so many characters, broken where the console breaks
+    them.
+    """
+    out = io.StringIO()
+    console = Console(file=out, width=width, highlight=False, soft_wrap=True, color_system=None)
+    show(report, console, width)
+    return count_rows(out.getvalue(), width)
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory):
+    """The command of the README on a terminal of 80 columns, as it is and with --all."""
+    folder = tmp_path_factory.mktemp("screen")
+    command = ("data=tibet_50pct", *EXACT)
+    short = run_command(*command, cwd=folder, COLUMNS=str(WIDTH))
+    every = run_command(*command, "--all", cwd=folder)
+    return short, every
+
+
+def test_the_answer_of_an_identification_is_one_screen(printed):
+    short, every = printed
+    assert (short.returncode, every.returncode) == (0, 0)
+    rows = count_rows(short.stdout, WIDTH)
+    assert len(rows) <= LINES - 1, "\n".join(rows)  # one more is the line of the log
+    assert rows[0].startswith("load: ")
+    assert "tibet_50pct" in rows[0]
+    assert any(row.startswith("doubtful: the model describes this load within") for row in rows)
+    assert next(row.split()[0] for row in rows if "identified" in row) == "T_prime"
+    assert short.stdout.count("next: ") == 1
+    assert "report.html" in short.stdout
+    for part in ("fit: tibet_50pct", "Runge-Kutta", "search ended at", "epsilon_p", "correlations"):
+        assert (part in short.stdout, part in every.stdout) == (False, True), part
+    assert "synthetic stand-in" in every.stdout
+
+
+def test_what_was_read_is_told_beside_the_answer_in_a_log_file(printed):
+    short, every = printed
+    assert "fit: tibet_50pct" in short.stderr
+    assert "still" not in short.stdout + short.stderr
+    assert every.stderr == ""
+
+
+def fitted(**changes):
+    """A load from the field: named by its file, in MW, of many parameters with wide intervals."""
+    result = identified().result
+    names = [*result.parameters]
+    source = {"station": "牵引变电所 Nord-West", "load": "Feeder 12 / T1 catenary side"}
+    own = {
+        "own_base": {"power": 29.7, "file_power": 100.0, "in_mva": True, "origin": "file"},
+        "records": [{"source": source, "base": {"voltage_kV": 27.5, "power_MVA": 100.0}}],
+        "verdicts": dict.fromkeys(names, "not identifiable from this record: it moves with T_m"),
+        "intervals": {name: [0.0012345, 0.0098765] for name in names},
+        "standard_errors": dict.fromkeys(names, 0.00123),
+        "adequacy": {"grade": "wrong_model", "sentence": "the model leaves much, " * 20, "p": 0.0},
+        "advice": ["find what is missing: tractexp task=discrepancy data.path='a file.cfg'"],
+        "model_error": {
+            "value": 0.35,
+            "interval": [0.3, 0.4],
+            "of_S": 0.1,
+            "held_out": {"value": 0.4, "interval": [0.3, 0.5], "of_S": 0.1},
+        },
+    }
+    return Identification(dataclasses.replace(result, **own | changes))
+
+
+def test_a_load_of_the_field_is_named_with_its_size_and_why_it_is_unusable():
+    rows = print_at(fitted().screen(), WIDTH)
+    assert len(rows) <= LINES - 3, "\n".join(rows)
+    assert "Nord-West, Feeder 12 / T1 catenary side" in rows[0]
+    told = " ".join(rows)
+    assert "kV" in told
+    assert "MW" in told
+    assert "Mvar" in told
+    assert "unusable: the model leaves much" in told
+    assert "fitted 35 % (30 % to 40 %), held out 40 % (30 % to 50 %)" in " ".join(told.split())
+
+
+@pytest.mark.parametrize(
+    ("grade", "word"),
+    [("adequate", "usable"), ("effect_missing", "doubtful"), ("wrong_model", "unusable")],
+)
+def test_the_grade_says_whether_the_model_may_be_used(grade, word):
+    adequacy = {"grade": grade, "sentence": "so", "p": 0.5}
+    sound = fitted(adequacy=adequacy, verdicts={})
+    assert sound.usability == word
+    with pytest.raises(tractexp.errors.UserError) if word == "unusable" else nullcontext():
+        tractexp.export(sound, "andes", playback=False)
+
+
+def test_a_narrow_console_gets_a_sentence_for_each_row():
+    table = Table(["parameter", "value", "verdict"], [["T_prime", 0.12345, "identified"]])
+    wide, narrow = print_at(Report().add(table), 60), print_at(Report().add(table), 24)
+    assert len(wide) == 3
+    assert narrow == ["T_prime: value 0.12345,", "  verdict identified"]
+
+
+def test_a_sentence_is_folded_at_words_and_its_command_stays_whole():
+    command = "tractexp task=discrepancy data.path='a b.cfg' data.train=[1]"
+    assert fold(f"next: find it: {command}", 30) == ["next: find it:", f"  {command}"]
+    assert fold("one two three", 7) == ["one two", "  three"]
+    assert fold("one two three", None) == ["one two three"]
+    # a character that takes the place of two
+    assert fold("站站站 站站", 8) == ["站站站", "  站站"]
+
+
+def test_a_sentence_is_cut_at_a_clause():
+    assert shorten("one, two, three, four", 20) == "one, two, three ..."
+    assert shorten("short", 20) == "short"

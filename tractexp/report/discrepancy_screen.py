@@ -1,0 +1,47 @@
+"""The first screen of an investigation: the verdict, how good the model is now, how much of the gap
+is closed, and where. All else is on the page, and printed by `--all`.
+"""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tractexp.blocks import Report, Table
+from tractexp.report.discrepancy import describe_nearest, describe_where, gap
+from tractexp.report.screen import describe_load
+from tractexp.wording import alternatives, shorten
+
+if TYPE_CHECKING:
+    from tractexp.api.discrepancy import Investigation
+
+MOST_SIZES = 3  # parameters of the effects named that the screen has room for
+
+
+def screen(found: "Investigation") -> Report:
+    """One screen, the verdict first."""
+    names = alternatives(found.content["name_sets"])
+    page = Report().text(f"verdict: {found.verdict.upper()} {shorten(names)}".rstrip())
+    left, fitted = found.remainder.caption, [event.record.name for event in found.question.train]
+    sentences = [found.reason, *found.sizes[:MOST_SIZES], left, *found.proposal_sentences[:1]]
+    page.items([shorten(sentence) for sentence in sentences if sentence])
+    page.text(describe_load(found.result, fitted), shorten(_describe_grade(found)), "")
+    page.add(_gap(found)).text("")
+    told = [
+        *describe_where(found.content),
+        *describe_nearest(found.content, found.sizes_of_nearest),
+    ]
+    return page.text(*map(shorten, told))
+
+
+def _describe_grade(found: "Investigation") -> str:
+    """Whether the model that the investigation ends with may be used, and why."""
+    which = "the extended model" if found.names else "the base model"
+    sentence = found.content["adequacy"]["sentence"].replace("the model", which, 1)
+    doubt = "; ".join(found.fit.doubts)
+    return f"{found.fit.usability}: {'; '.join(filter(None, [sentence, doubt]))}"
+
+
+def _gap(found: "Investigation") -> Table:
+    """The gap without the errors of single channels."""
+    table = gap(found.content)
+    epsilons = [k for k, name in enumerate(table.columns) if name.startswith("epsilon")]
+    return replace(table, detail=epsilons)

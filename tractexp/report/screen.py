@@ -1,0 +1,85 @@
+"""The first screen of a command: the answer in at most 25 lines of 80 characters. All else is on
+the page, and printed by `--all`.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from tractexp.blocks import Report, Table
+from tractexp.identification.result import Result
+from tractexp.identification.verdict import UNIDENTIFIED, brief
+from tractexp.inference.model_error import in_percent, tell_error
+from tractexp.record.identity import UNKNOWN, Identity, label
+from tractexp.wording import count_noun, list_first, shorten, with_error
+
+if TYPE_CHECKING:
+    from tractexp.api.identify import Identification
+
+MOST_PARAMETERS = 10  # rows of the table of parameters
+MOST_EVENTS = 2  # events that a line names
+
+
+def screen(fit: "Identification") -> Report:
+    """Which load, whether the model may be used and why, its parameters, its error, what next."""
+    result = fit.result
+    names = [event["name"] for event in result.events if event["role"] == "train"]
+    page = Report().text(describe_load(result, names))
+    if fit.headline:
+        page.text(shorten(f"{fit.usability}: {fit.headline}."))
+    page.text("").add(tabulate_parameters(fit))
+    if len(rows := fit.own_parameters) > MOST_PARAMETERS:
+        page.text(f"{count_noun(len(rows) - MOST_PARAMETERS, 'parameter')} more: --all prints all")
+    page.text("")
+    if fit.operating_point is not None:
+        page.text(f"motor: {fit.operating_point.machine}")
+    page.text(describe_error(result))
+    return page.text(*(f"next: {sentence}" for sentence in fit.next_steps[:1]))
+
+
+def describe_load(result: Result, names: Sequence[str]) -> str:
+    """Station and load, voltage and power before the dip, and which dips were fitted."""
+    own, before = result.base, result.before
+    scale, units = (own.power, ("MW", "Mvar")) if own.in_mva else (own.ratio, ("pu", "pu"))
+    powers = [
+        f"{scale * before[key]:.4g} {unit}" for key, unit in zip(("P0", "Q0"), units, strict=True)
+    ]
+    identities: list[Identity] = result.identities
+    voltage = identities[0].voltage if identities else None
+    level = f"{before['U0'] * voltage:.4g} kV" if voltage else f"{before['U0']:.4g} pu"
+    dips = list_first(names, MOST_EVENTS)
+    parts = [label(identities), level, *powers, f"fitted: {dips}"]
+    unknown = f" ({UNKNOWN})" if not (own.in_mva or voltage) else ""
+    return f"load: {', '.join(filter(None, parts))}{unknown}"
+
+
+def tabulate_parameters(fit: "Identification") -> Table:
+    """Name, value with its standard error, unit, 95 % interval, and what that means, in a word."""
+    rows = [
+        [
+            e.name,
+            with_error(e.value, e.standard_error or 0.0),
+            e.unit,
+            "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
+            brief(e.verdict).replace(UNIDENTIFIED, "not identifiable"),
+        ]
+        for e in fit.own_parameters[:MOST_PARAMETERS]
+    ]
+    return Table(["parameter", "value", "unit", "95 % interval", "verdict"], rows, words=(2, 4))
+
+
+def describe_error(result: Result) -> str:
+    """The model's error on the events fitted and held out, in a line."""
+    fitted, held_out = result.model_error, result.model_error.get("held_out")
+    if not fitted:
+        return "error: not judged"
+    parts = [f"fitted {_tell_error(fitted)}"]
+    parts.append(f"held out {_tell_error(held_out)}" if held_out else "no event was held out")
+    return f"error, of the response: {', '.join(parts)}"
+
+
+def _tell_error(entry: dict[str, object]) -> str:
+    """A model's error with its interval."""
+    interval = entry.get("interval")
+    if entry.get("stalls") or not isinstance(interval, list | tuple) or None in interval:
+        return tell_error(entry)
+    return f"{tell_error(entry)} ({' to '.join(map(in_percent, interval))})"
