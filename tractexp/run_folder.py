@@ -44,6 +44,7 @@ RESULTS = (
     "history.csv",
     "interrupted.json",
     "report.html",
+    "sheet.html",
     "posterior.npz",
     "unexplained.csv",
     "survey.csv",

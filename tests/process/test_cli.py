@@ -90,6 +90,7 @@ def test_the_main_job_writes_the_contracted_result(main_job):
         "mlflow.json",
         "result.json",
         "report.html",
+        "sheet.html",
     }
     assert (folder / "run" / "report.html").stat().st_size < 1e6
     rows = np.genfromtxt(folder / "run" / "history.csv", delimiter=",", names=True)

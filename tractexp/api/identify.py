@@ -23,7 +23,7 @@ from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.inference.model_error import ModelError
 from tractexp.inference.prior import departures
 from tractexp.inference.problem import Problem
-from tractexp.outcome import FORMS, Written
+from tractexp.outcome import FORMS, Drawing, Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell
 from tractexp.provenance import build_again_command, build_folder_command
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from tractexp.record import Event
 
 FIXED = "fixed"
+SHEET = "sheet.html"
 USABLE, DOUBTFUL, UNUSABLE = "usable", "doubtful", "unusable"
 USABILITY = {
     Grade.ADEQUATE: USABLE,
@@ -303,7 +304,9 @@ class Identification(Written):
         if self.usability != USABLE or not (name := choose_format(self.result)):
             return self.advice
         command = build_folder_command("task=export", f"task.format={name}")
-        return [f"hand it on: {command}", *self.advice] if command else self.advice
+        return (
+            [f"hand in {SHEET}, and export it: {command}", *self.advice] if command else self.advice
+        )
 
     @property
     def adequate(self) -> bool:
@@ -425,6 +428,15 @@ class Identification(Written):
         from tractexp.report import identify
 
         return identify.report(self)
+
+    def sheet(self) -> Report:
+        """What is handed in, to be printed: see `tractexp.report.sheet`."""
+        from tractexp.report import sheet
+
+        return sheet.sheet(self)
+
+    def drawings(self) -> Mapping[str, Drawing]:
+        return {**super().drawings(), SHEET: lambda path: self.sheet().save(path)}
 
     @property
     def moves(self) -> dict[str, tuple[str, float]]:

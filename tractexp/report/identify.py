@@ -69,10 +69,8 @@ def summary(fit: "Identification") -> Report:
     to do next.
     """
     result = fit.result
-    verdicts = own_verdicts(result).items()
-    poor = [
-        f"{name}: {verdict}" for name, verdict in verdicts if not verdict.startswith(IDENTIFIED)
-    ]
+    verdicts = own_verdicts(result)
+    poor = [f"{name}: {verdict}" for name, verdict in name_verdicts(result).items()]
     notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
     start = [text for event in result.events if (text := starts_at_rest(event))]
     report = Report()
@@ -113,6 +111,12 @@ def network(fit: "Identification") -> list[str]:
         for n, v in result.nuisances.items()
     )
     return [shown_in_words(result.shown_effects), f"nuisances of the fit: {values}"]
+
+
+def name_verdicts(result: Any) -> dict[str, str]:
+    """The verdicts of parameters that are not identified, by their names."""
+    own = own_verdicts(result).items()
+    return {name: verdict for name, verdict in own if not verdict.startswith(IDENTIFIED)}
 
 
 def own_verdicts(result: Any) -> dict[str, str]:
@@ -179,7 +183,7 @@ def report(fit: "Identification") -> Report:
     page.heading("How the estimates depend on each other")
     _correlation(page, uncertainty)
     page.heading("How this page was made")
-    return page.table(["", ""], _origin(result, command()), words=(1,))
+    return page.table(["", ""], list_origin(result, command()), words=(1,))
 
 
 def _add_next_dip(page: Report, fit: "Identification") -> None:
@@ -356,9 +360,19 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
 
 def errors(fit: "Identification") -> Table:
     """The model's error on each event, and the errors of Eq. (20)."""
-    result, unknown = fit.result, {"value": None, "interval": (), "of_S": None}
+    return tabulate_errors(fit.result)
+
+
+def tabulate_errors(result: Any) -> Table:
+    """The same of a result."""
+    unknown = {"value": None, "interval": (), "of_S": None}
     of_events = result.model_error.get("events") or [unknown] * len(result.events)
     return error_table(result.events, of_events, result.epsilons)
+
+
+def error_rows(result: Any) -> list[list[str]]:
+    """Name, role, model's error and its interval of each event."""
+    return [[str(cell) for cell in row[:4]] for row in tabulate_errors(result).rows]
 
 
 def error_table(events: Sequence[Any], of_events: Sequence[Any], epsilons: Sequence[str]) -> Table:
@@ -597,7 +611,8 @@ def _correlation(page: Report, uncertainty: Uncertainty) -> None:
     )
 
 
-def _origin(result: Any, command: str) -> list[list[str]]:
+def list_origin(result: Any, command: str) -> list[list[str]]:
+    """The command, the version and the records that a result was made of, a row each."""
     rows = [["command", command]] if command else []
     rows.append(
         [
