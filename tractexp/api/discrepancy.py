@@ -32,12 +32,13 @@ from tractexp.outcome import Written
 from tractexp.plugin import get, plugin
 from tractexp.progress import Progress, is_everything_asked, say, tell_stages
 from tractexp.provenance import build_again_command
-from tractexp.wording import join_words, shown_in_words, with_error
+from tractexp.wording import join_words, shorten, shown_in_words, with_error
 
 NEXT = "next: "
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.investigate import Findings as Steps
+    from tractexp.discrepancy.readings import Reading
     from tractexp.tracking import TrackedRun
 
 
@@ -194,6 +195,19 @@ class Investigation(Written):
         columns = [*shapes[0]] if shapes else []
         rows = [[shape[key] for key in columns] for shape in shapes]
         return Table(columns, rows, "what is left", entry["sentence"] if entry else "")
+
+    @property
+    def readings(self) -> "list[Reading]":
+        """What the shapes that are left may be physically, and what would decide it; [] where
+        nothing is left.
+        """
+        from tractexp.discrepancy.readings import read_shapes
+        from tractexp.discrepancy.remainder import Remainder
+
+        entry = self.content["remainder"] or {}
+        of_each = (entry.get(key) for key in ("of_names", "of_nearest", "of_base"))
+        shapes = [Remainder(**shape) for shape in next(filter(None, of_each), [])]
+        return read_shapes(shapes, self.question.train[0])
 
     @property
     def proposal(self) -> Mapping[str, Any] | None:
@@ -542,12 +556,14 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
     return lines
 
 
-def choose_next(lines: Sequence[str], recommendation: str) -> str:
+def choose_next(lines: Sequence[str], result: Investigation) -> str:
     """What a screen has room for: first what the task says of another domain, then the first
-    command, else the recommendation.
+    command, then what would decide about what is left, else the recommendation.
     """
     urgent = [line.removeprefix(NEXT) for line in lines if line.startswith(NEXT)]
-    return next(iter([*urgent, *lines, recommendation]))
+    open_ones = result.readings if result.verdict == "unexplained" else []
+    deciding = [f"{shorten(one.sentence)}: {one.command}" for one in open_ones]
+    return next(iter([*urgent, *lines, *deciding, result.recommendation]))
 
 
 @plugin
@@ -604,7 +620,7 @@ class Discrepancy(Task, call=investigate):
         print_result(job, result)
         lines = _next_commands(result, paths)
         if not (is_everything_asked() or job.in_sweep):
-            lines = [f"next: {choose_next(lines, result.recommendation)}"]
+            lines = [f"{NEXT}{choose_next(lines, result)}"]
         print_written(paths.values(), result.page)
         for line in lines:
             say(line)

@@ -14,6 +14,7 @@ from tractexp.discrepancy.discrepancy_json import recommendation
 from tractexp.discrepancy.explain import Nearest
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import estimates
+from tractexp.discrepancy.readings import read_shapes
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import Identity, describe_identities, title
@@ -310,6 +311,14 @@ def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose
         " the dip.",
         words=(4,),
     )
+    if readings := read_shapes(shapes, findings.context.events[0]):
+        page.table(
+            ["what is left", "may be", "source", "what would decide", "by"],
+            [[r.shape, r.means, r.source, r.decides, r.command] for r in readings],
+            "None of them is a finding: the effects of the catalogue were tested and do not"
+            " explain.",
+            words=(1, 2, 3, 4),
+        )
 
 
 def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
