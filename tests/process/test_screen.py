@@ -51,7 +51,13 @@ def test_the_answer_of_an_identification_is_one_screen(printed):
     assert next(row.split()[0] for row in rows if "identified" in row) == "T_prime"
     assert short.stdout.count("next: ") == 1
     assert "report.html" in short.stdout
-    for part in ("fit: tibet_50pct", "Runge-Kutta", "search ended at", "epsilon_p", "correlations"):
+    for part in (
+        "fit: tibet_50pct",
+        "Runge-Kutta",
+        "acceptance of Eq. (20)",
+        "epsilon_p",
+        "correlations",
+    ):
         assert (part in short.stdout, part in every.stdout) == (False, True), part
     assert "synthetic stand-in" in every.stdout
 

@@ -24,6 +24,7 @@ from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.provenance import command
 from tractexp.record.identity import Identity, describe_identities, title
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
+from tractexp.report.sliders import add_sliders
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, spectrum_chart, wave_chart
 from tractexp.wording import as_sentence, epsilon, in_words, shown_in_words
@@ -166,6 +167,8 @@ def report(fit: "Identification") -> Report:
     _add_next_dip(page, fit)
     page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
     _parameters(page, fit, uncertainty)
+    page.heading("Moved by hand")
+    add_sliders(page, fit)
     page.heading("How well it fits").add(errors(fit)).text(*map(as_sentence, samples(fit)))
     page.heading("What to do next").items(fit.advice)
     if together is not None:

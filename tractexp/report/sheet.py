@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 PANEL_HEIGHTS = (0.8, 1.3, 1.3)
 PIXELS = 430
 MOST_CHARTS = 4  # events that are drawn
+MOST_POINTS = 1600  # of a line: twice as many as a printed page is wide
 USES = {
     "usable": (
         "It may be used for this load in studies of voltage dips like those below: it leaves no"
@@ -153,13 +154,17 @@ def _add_charts(page: Report, fit: "Identification") -> None:
 
 def _draw(chart: Chart, one: Any, scales: tuple[float, float, float]) -> None:
     record, (level, *powers) = one.event.record, scales
-    chart.line("measured", record.t, level * record.U, style.MEASURED, width=3)
+
+    def line(name: str, values: np.ndarray, color: str, panel: int, width: float = 1.6) -> None:
+        chart.line(name, *style.thin(record.t, values, MOST_POINTS), color, panel, width=width)
+
+    line("measured", level * record.U, style.MEASURED, 0, 3)
     for panel, (name, color, scale) in enumerate(
         zip("PQ", (style.ACTIVE, style.REACTIVE), powers, strict=True), start=1
     ):
         measured, calculated = np.asarray(getattr(record, name)), np.asarray(getattr(one, name))
-        chart.line("measured", record.t, scale * measured, style.MEASURED, panel, width=3)
-        chart.line(f"{name} calculated", record.t, scale * calculated, color, panel)
+        line("measured", scale * measured, style.MEASURED, panel, 3)
+        line(f"{name} calculated", scale * calculated, color, panel)
     chart.edge(one.event.t_start).edge(one.event.t_end)
 
 
