@@ -52,6 +52,7 @@ The commonest
   tractexp task=discrepancy data=csv 'data.train=[dip1.csv,dip2.csv]' 'data.validate=[dip3.csv]'
       name the effect that the model lacks, and show the gap shrink
   tractexp again RUN_FOLDER task=discrepancy         an earlier run with other settings on top
+  tractexp --all ...              all that a run has to say, instead of one screen
   tractexp ui                     look at all that was logged, in a browser on this computer only
   tractexp doctor
       whether everything here is sound; heal what can be (tractexp sync: log what was not logged)
