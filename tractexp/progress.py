@@ -78,13 +78,11 @@ def log(text: str) -> None:
 
 
 def tell_beside(text: str) -> None:
-    """Print what was read and begun: where everything is asked for, and in a log file; a terminal
-    has the first screen.
+    """Print what was read and begun, where everything is asked for: the first screen is the
+    answer.
     """
     if is_everything_asked():
         say(text)
-    elif not _lively():
-        log(text)
 
 
 @contextmanager

@@ -770,6 +770,7 @@ def test_a_run_killed_in_an_old_folder_leaves_no_result_under_its_own_configurat
         "seed=2",
         "optimizer=pso",
         "optimizer.iterations=10000000",
+        "--all",
     ]
     command = [
         word for word in command if word not in ("budget=200", "optimizer=multistart_least_squares")
@@ -777,8 +778,8 @@ def test_a_run_killed_in_an_old_folder_leaves_no_result_under_its_own_configurat
     job = subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    while "optimizer: pso" not in (line := job.stderr.readline()):
-        assert line, job.stdout.read()
+    while "optimizer: pso" not in (line := job.stdout.readline()):
+        assert line, job.stderr.read()
     time.sleep(1.0)
     job.send_signal(way)
     job.communicate(timeout=60)

@@ -16,7 +16,7 @@ from tractexp.record import Event
 from tractexp.record.identity import Identity
 
 POWERS = ("P", "Q")  # channels of phasors; those of waveforms are currents
-NEAR = 0.12  # of a frequency: so far off it counts as that
+SAME_FREQUENCY = 0.12  # of a frequency: so far off it counts as that
 SAME_RING = 0.1  # of a frequency: shapes of two events that close ring alike
 SLOW = 0.1  # s, from which on a decay is one of the load rather than of a field
 LOOK, WAVES = "look", "waves"
@@ -50,7 +50,7 @@ class Rule:
 
 
 def _about(multiple: float) -> tuple[float, float]:
-    return multiple * (1 - NEAR), multiple * (1 + NEAR)
+    return multiple * (1 - SAME_FREQUENCY), multiple * (1 + SAME_FREQUENCY)
 
 
 RULES = (

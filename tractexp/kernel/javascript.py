@@ -9,6 +9,7 @@ import sympy
 
 from tractexp import files
 from tractexp.errors import UserError
+from tractexp.kernel.emit import HALF_WAY
 from tractexp.kernel.expressions import OURS, Expressions
 from tractexp.kernel.graph import Symbol
 from tractexp.kernel.layout import EVENT, PHASOR_INPUTS, SMOOTH
@@ -17,7 +18,6 @@ from tractexp.kernel.lowered import Lowered, Phase
 COMPARISONS = {"olt": "<", "ole": "<=", "ogt": ">", "oge": ">=", "oeq": "===", "une": "!=="}
 LOGIC = {"and": "&&", "or": "||", "xor": "!=="}
 CALLS = {"fabs": "Math.abs", "floor": "Math.floor", "ceil": "Math.ceil"}
-HALF_WAY = {"classical": 0.5, "printed": 1 / 6}  # of a step, as in `emit`
 
 
 class Script:

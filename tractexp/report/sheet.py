@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tractexp.api.identify import Identification
 
 PANEL_HEIGHTS = (0.8, 1.3, 1.3)
-PIXELS = 430
+CHART_PIXELS = 430
 MOST_CHARTS = 4  # events that are drawn
 MOST_POINTS = 1600  # of a line: twice as many as a printed page is wide
 USES = {
@@ -145,7 +145,7 @@ def _add_charts(page: Report, fit: "Identification") -> None:
         voltage = one.event.record.base.voltage
         level, kilovolt = (voltage, "kV") if voltage != 1.0 else (1.0, "pu")
         labels = [f"U [{kilovolt}]", f"P [{units[0]}]", f"Q [{units[1]}]"]
-        chart = Chart("t [s]", labels, heights=PANEL_HEIGHTS, pixels=PIXELS)
+        chart = Chart("t [s]", labels, heights=PANEL_HEIGHTS, pixels=CHART_PIXELS)
         _draw(chart, one, (level, scale, scale))
         page.chart(chart, one.event.record.name)
     if len(fits) > MOST_CHARTS:

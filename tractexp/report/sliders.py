@@ -16,7 +16,7 @@ from tractexp.wording import as_sentence
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification
 
-MOST_STEPS = 20_000  # Runge-Kutta steps of the event: a browser takes some ten milliseconds
+MOST_PAGE_STEPS = 20_000  # Runge-Kutta steps of the event: a browser takes some ten milliseconds
 DIGITS = 9  # after the point, of what the page carries
 
 
@@ -64,7 +64,7 @@ def _collect(fit: "Identification") -> dict[str, Any]:
     """What the page needs of the first event and of the estimates."""
     problem, own = fit.spec.problem, fit.result.base
     drive, part, substeps = problem.drive, problem.drive.part(0), int(problem.step.substeps[0])
-    if (part.stop - part.start) * substeps > MOST_STEPS:
+    if (part.stop - part.start) * substeps > MOST_PAGE_STEPS:
         raise UserError("there are no sliders: the record is too long to be calculated in a page")
     rows = dict(zip(PHASOR_INPUTS, np.nan_to_num(drive.inputs[:, part]), strict=True))
     record = problem.events[0].record
