@@ -246,9 +246,8 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
             ("double_cage", "zip"),
             "cannot represent the motor 'double_cage': no open reader of DGS names the columns of a"
             " second cage; it"
-            " can represent electromechanical, none, stator_flux; task.format=andes, modelica or"
-            " psse_dyr can represent"
-            " 'double_cage'",
+            " can represent electromechanical, none, stator_flux; task.format=andes, load_json,"
+            " modelica or psse_dyr can represent 'double_cage'",
         ),
         (
             "powerfactory",
@@ -458,7 +457,7 @@ def test_an_export_says_its_load_base_powers_and_agreement(tmp_path):
         ],
         own_base={"power": 40.0, "file_power": 40.0, "in_mva": True, "origin": "given"},
     )
-    done = tractexp.export(Identification(result), "powerfactory")
+    done = tractexp.export(Identification(result), "powerfactory", base="own")
     said = "\n".join(done.notes)
     for part in (
         "station North; load T2",

@@ -335,7 +335,7 @@ def test_an_export_says_which_base_it_takes(records, fits):
     assert json.loads(tractexp.export(known, "andes").text)["Bus"][0]["Vn"] == 230.0
     guessed = "1 pu of the file is taken for 100 MVA, for no power is given"
     assert any(guessed in note for note in tractexp.export(fits[5.04], "andes").notes)
-    with pytest.raises(UserError, match=r"base=system is not one of own, file"):
+    with pytest.raises(UserError, match=r"base=system is not one of machine, own, file"):
         tractexp.export(known, "andes", base="system")
     assert Identified(known.result).values == known.result.parameters
 
