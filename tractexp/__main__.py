@@ -112,6 +112,9 @@ def _dispatch_command(arguments: list[str]) -> int:
         credentials.check(key if equals else "what is given", argument)
     if arguments[:1] and (place := COMMANDS.get(arguments[0])):
         return _command(place, arguments[1:])
+    if arguments[:1] and _is_file(arguments[0]):
+        return _command(COMMANDS["look"], arguments)
+    arguments = ask_for(arguments)
     if arguments[:1] == ["again"]:
         from tractexp.cli.again import build_repeat_command
 
@@ -121,8 +124,6 @@ def _dispatch_command(arguments: list[str]) -> int:
 
         survey = choose_command(*arguments)
         return _run(survey) if survey else 0
-    if arguments[:1] and _is_file(arguments[0]):
-        return _command(COMMANDS["look"], arguments)
     if {"--help", "-h"} & {*arguments}:
         from tractexp.usage import usage
 
@@ -155,7 +156,6 @@ def end_on_signal(*_: object) -> None:
 
 
 def _run(arguments: list[str]) -> int:
-    arguments = ask_for(arguments)
     signal.signal(signal.SIGTERM, end_on_signal)
     if not any(argument.startswith(UNLOGGED) for argument in arguments):
         from tractexp.tracking.process import start_ahead

@@ -91,7 +91,7 @@ def summary(fit: "Identification") -> Report:
         *(f"  {sentence}" for sentence in poor),
         *notes,
         *filter(None, [fit.end_of_search]),
-        *(f"next: {sentence}" for sentence in fit.advice),
+        *(f"next: {sentence}" for sentence in fit.next_steps),
     )
 
 
