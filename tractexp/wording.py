@@ -148,7 +148,8 @@ def shorten(sentence: str, longest: int = LONGEST_SENTENCE) -> str:
     """
     if len(sentence) <= longest:
         return sentence
-    cut = sentence[: longest - len(ELLIPSIS)]
-    at = max(cut.rfind("; "), cut.rfind(", "))
-    at = at if at > longest // 2 else max(cut.rfind(" "), longest // 2)
-    return f"{cut[:at]}{ELLIPSIS}"
+    room = longest - len(ELLIPSIS)
+    cut = sentence[: room + 1]
+    clause = max(cut.rfind("; "), cut.rfind(", "))
+    at = clause if clause > longest // 2 else cut.rfind(" ")
+    return f"{sentence[: at if at > 0 else room].rstrip(',; ')}{ELLIPSIS}"
