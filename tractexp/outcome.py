@@ -21,8 +21,6 @@ from tractexp.errors import UserError
 from tractexp.progress import say
 
 MARK = "tractexp"  # the key by which a saved result is known
-# of types of fields: to plain data, and back
-FORMS: dict[Any, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {}
 COMPUTING = ("report", "predict", "write_results", "write_drawings")  # methods of results
 Drawing = Callable[[Path], Path]  # makes the file of this path
 
@@ -83,7 +81,7 @@ def _form(of: Field[Any]) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
     kind: Any = of.type
     if isinstance(kind, type) and issubclass(kind, Plain):
         return kind.to_dict, kind.from_dict
-    return FORMS.get(kind) or (_as_it_is, tuple if get_origin(kind) is tuple else _as_it_is)
+    return _as_it_is, tuple if get_origin(kind) is tuple else _as_it_is
 
 
 def _as_it_is(value: Any) -> Any:

@@ -23,7 +23,7 @@ from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.inference.model_error import ModelError
 from tractexp.inference.prior import departures
 from tractexp.inference.problem import Problem
-from tractexp.outcome import FORMS, Drawing, Written
+from tractexp.outcome import Drawing, Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell
 from tractexp.provenance import build_again_command, build_folder_command
@@ -46,7 +46,6 @@ USABILITY = {
     Grade.EFFECT_MISSING: DOUBTFUL,
     Grade.WRONG_MODEL: UNUSABLE,
 }
-FORMS[Result] = (asdict, lambda content: Result.from_content(content, "the saved result"))
 LEAST_TOLD_MOVE = 2.0  # standard errors from which a rival structure's move is told
 
 

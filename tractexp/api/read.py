@@ -12,7 +12,7 @@ from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Report, Table
 from tractexp.composition import choices
 from tractexp.errors import UserError, among
-from tractexp.outcome import FORMS, Tabulated
+from tractexp.outcome import Plain, Tabulated
 from tractexp.record import (
     Base,
     Event,
@@ -33,12 +33,21 @@ REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2", "U_angle")
 GROUP = "data"
 
 
-class Dips(Tabulated, list[Event]):
+class Dips(Plain, Tabulated, list[Event]):
     """Events in a list that prints as a table."""
 
     def __getitem__(self, k: Any) -> Any:
         """An event, or the dips of a slice."""
         return Dips(super().__getitem__(k)) if isinstance(k, slice) else super().__getitem__(k)
+
+    def to_dict(self) -> Any:
+        """The records, as plain data that JSON knows."""
+        return [record_to_dict(event.record) for event in self]
+
+    @classmethod
+    def from_dict(cls, content: Any) -> "Dips":
+        """What `to_dict` gave; the dips are found again."""
+        return cls(detect(record_from_dict(one)) for one in content)
 
     def look(self) -> Any:
         """A look (a `Look`) at the files that the events are from, and at the records that are from
@@ -320,9 +329,3 @@ def record_from_dict(content: Mapping[str, Any]) -> Record:
         digest=content.get("digest", ""),
         **arrays,
     )
-
-
-FORMS[Dips] = (  # the dips are found again
-    lambda events: [record_to_dict(event.record) for event in events],
-    lambda content: Dips(detect(record_from_dict(one)) for one in content),
-)

@@ -26,6 +26,7 @@ from tractexp.inference.model_error import in_percent, model_error
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
+from tractexp.outcome import Plain
 from tractexp.plugin import build
 from tractexp.record import Event, OwnBase, Record, find_dips
 from tractexp.record.identity import Identity
@@ -112,7 +113,7 @@ def explain_refusal(model: Model, values: np.ndarray, event: Event) -> str:
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(Plain):
     """The content of `result.json`. `model` and `before` are what it takes to simulate it again.
 
     Parameters, errors, intervals and verdicts belong to the estimate; `search` is where the
@@ -169,6 +170,15 @@ class Result:
     parameters_on_given_base: dict[str, float] = field(default_factory=dict)
     tractexp_version: str = ""
     commit: str = ""  # of the package's repository; "" for a wheel
+
+    def to_dict(self) -> dict[str, Any]:
+        """All fields, as plain data."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, content: Any) -> "Result":
+        """What `to_dict` gave. Raises `UserError` as `from_content` does."""
+        return cls.from_content(content, "the saved result")
 
     @classmethod
     def from_content(cls, content: Any, where: str) -> "Result":

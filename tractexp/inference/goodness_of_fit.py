@@ -52,16 +52,40 @@ def compare_with_draws(
     draws: Mapping[str, np.ndarray],
     scales: Mapping[str, "Scale"] | None = None,
 ) -> dict[str, float]:
-    """Return how often each statistic, (1,) or (1, k), is as large among its draws,
-    (b,) or (b, k).
+    """How often each statistic is as large among draws of it.
+
+    Parameters
+    ----------
+    values : {name: (1,) or (1, k)}
+        The statistics of a fit.
+    draws : {name: (b,) or (b, k)}
+        Those of draws under the null.
+    scales : {name: Scale}
+        What columns are measured in before the largest is taken; by default the draws' own.
+
+    Returns
+    -------
+    {name: float}
+        p of each.
     """
     scales = scales or {}
     return {name: tail(draws[name], value, scales.get(name)) for name, value in values.items()}
 
 
 def windows(problem: Problem, event: int) -> list[tuple[float, float]]:
-    """The windows [s since the first sample] of one event: before, both halves of the dip, then
-    ever longer ones.
+    """The windows of one event: before the dip, both halves of it, then ever longer ones.
+
+    Parameters
+    ----------
+    problem : Problem
+        Whose event it is.
+    event : int
+        Its number, from 0.
+
+    Returns
+    -------
+    list of (float, float) [s]
+        Since the event's first sample.
     """
     e = problem.events[event]
     start, end = e.t_start - e.record.t[0], e.t_end - e.record.t[0]
@@ -109,11 +133,28 @@ def statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
 
 
 def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> float:
-    """How often a statistic is at least as large as `value`, (1,) or (1, k), given draws (b,) or
-    (b, k).
+    """How often a statistic is at least as large as a value, given draws of it.
 
-    Of many columns the largest counts, each in its own `scale`: any is right, by default the draws'
-    own is taken.
+    Parameters
+    ----------
+    draws : (b,) or (b, k)
+        Under the null: a sum has a gamma tail, the largest of k columns an extreme value's.
+    value : (1,) or (1, k)
+        The statistic.
+    scale : Scale
+        What columns are measured in before the largest is taken; any is right, by default the
+        draws' own is taken.
+
+    Returns
+    -------
+    float
+        p, never 0.
+
+    Examples
+    --------
+    >>> draws = np.random.default_rng(1).chisquare(3, 2000)
+    >>> round(tail(draws, np.array([7.815])), 2)
+    0.05
     """
     from scipy.special import gammaincc
 
@@ -183,8 +224,18 @@ def residual_windows(problem: Problem) -> list[ResidualWindow]:
 
 
 def energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
-    """Energy of each residual (b, 2, N) in each cell, (b, cells), over that of a
-    sample in quiet.
+    """The energy of each residual in each window, over that of a sample in quiet.
+
+    Parameters
+    ----------
+    channels : (b, C, N)
+        Whitened, projected residuals.
+    problem : Problem
+        Whose windows and quiet stretches count.
+
+    Returns
+    -------
+    (b, cells) array
     """
     square = channels**2
     quiet = np.mean(

@@ -41,8 +41,22 @@ class Information:
         jacobian: np.ndarray,
         nuisances: np.ndarray,
     ) -> "Information":
-        """`jacobian` (R, d) per range of each parameter; `nuisances` (R, k) are left free beside
-        them.
+        """The information that sensitivities hold, nuisances left free beside them.
+
+        Parameters
+        ----------
+        names : names
+            Of the d parameters.
+        values, width : (d,)
+            Physical values, and the ranges of their boxes.
+        jacobian : (R, d)
+            Whitened sensitivities, per range of each parameter.
+        nuisances : (R, k)
+            Those to what is left free; columns of zeros do not count.
+
+        Returns
+        -------
+        Information
         """
         active = nuisances[:, np.any(nuisances != 0, axis=0)]
         basis, _ = np.linalg.qr(active)
@@ -79,10 +93,12 @@ class Information:
 
     @property
     def unseen(self) -> np.ndarray:
-        """Directions (k, d) that change nothing, as relative changes (d value / value), made
-        sparse.
+        """Directions that change nothing, as relative changes (d value / value), made sparse.
 
-        Each is scaled to a largest component of 1. Where a value is 0 the change is in ranges.
+        Returns
+        -------
+        (k, d) array
+            Each scaled to a largest component of 1. Where a value is 0 the change is in ranges.
         """
         _, null, blind = self._directions
         null = null * self.width / np.where(self.values == 0, self.width, self.values)
@@ -109,17 +125,39 @@ class Information:
         return np.divide(covariance, outer, out=np.eye(len(size)), where=outer > 0).clip(-1.0, 1.0)
 
     def relative_error(self, exponents: np.ndarray) -> float:
-        """Standard error of log(prod value^exponent), i.e. relative, for `exponents` (d,)."""
+        """The standard error of a product of powers of the parameters, relative.
+
+        Parameters
+        ----------
+        exponents : (d,)
+            log(prod value^exponent) is what has this standard error.
+
+        Returns
+        -------
+        float
+        """
         slope = exponents / np.where(self.values == 0, 1.0, self.values)
         return float(np.sqrt(slope @ self.covariance @ slope))
 
 
 def free_standard_errors(root: np.ndarray) -> np.ndarray:
-    """Return the standard error (d,) of each coordinate, all others free: in ranges, inf of one
-    that changes nothing.
+    """The standard error of each coordinate, all others free.
 
-    `root` (R, d) are rows whose inverse products are the covariance: whitened sensitivities, or
-    what stands for them.
+    Parameters
+    ----------
+    root : (R, d)
+        Rows whose inverse products are the covariance: whitened sensitivities, or what stands for
+        them.
+
+    Returns
+    -------
+    (d,) array
+        In ranges; inf of a coordinate that changes nothing.
+
+    Examples
+    --------
+    >>> free_standard_errors(np.array([[2.0, 0.0], [0.0, 0.0]])).tolist()
+    [0.5, inf]
     """
     seen = np.where(np.linalg.norm(root, axis=0) > BLIND, root, 0.0)
     ranges = np.ones(root.shape[1])

@@ -52,11 +52,31 @@ def normal(
     *,
     central: bool = False,
 ) -> tuple[np.ndarray, NormalMatrix]:
-    """Gradient (n, D) and Gauss-Newton matrix of half the sum of squares; `base` (n, R) are the
-    rows there.
+    """Gradient and Gauss-Newton matrix of half the sum of squares.
 
     Lanes are taken in groups, so that their differences stay in memory however long the records
     are.
+
+    Parameters
+    ----------
+    rows : (n, D), (n,) -> (n, R)
+        The function whose squares are summed, of coordinates and lanes.
+    unit : (n, D)
+        Coordinates of n lanes in the unit cube.
+    base : (n, R)
+        The rows there.
+    lanes : (n,) ints
+        Which lanes these are.
+    apart : SeparableColumns
+        Coordinates that act on one event each.
+    central : bool
+        Whether differences are central, which costs twice as many simulations.
+
+    Returns
+    -------
+    (n, D) array
+        The gradient.
+    NormalMatrix
     """
     n, parts = len(unit), []
     together = max(1, MOST_NUMBERS // (len(apart.moves(unit.shape[1])) * base.shape[1]))
@@ -103,19 +123,48 @@ def descend(
     *,
     central: bool = False,
 ) -> Descent:
-    """Levenberg-Marquardt in the unit cube from `start` (n, D); columns where `frozen` (n, D) is
-    True do not move.
+    """Levenberg-Marquardt in the unit cube, many lanes at once.
 
-    A lane ends when a step lowers its deviance by less than `tolerance` (absolute: rows are
-    whitened, so that 1 is one squared standard deviation) or when no damping helps. A coordinate on
-    a wall that would leave the box rests for that step. Source: Marquardt 1963, with several
-    dampings per step.
+    A lane ends when a step lowers its deviance by less than `tolerance`, or when no damping helps.
+    A coordinate on a wall that would leave the box rests for that step.
 
     Forward differences are enough for an estimate, whose standard errors are far wider than what
     they truncate. The minimum itself, to more than four digits, takes `central` ones.
 
     Not `polish.least_squares_from`: that is SciPy's, from one start, counted and stopped by the
     search loop.
+
+    Parameters
+    ----------
+    rows : (n, D), (n,) -> (n, R)
+        The function whose squares are summed, of coordinates and lanes.
+    start : (n, D)
+        Where the lanes begin.
+    frozen : (n, D) bools
+        Coordinates that do not move; None: all do.
+    iterations : int
+        At most so many.
+    tolerance : float
+        Absolute: rows are whitened, so that 1 is one squared standard deviation.
+    apart : SeparableColumns
+        Coordinates that act on one event each.
+    central : bool
+        Whether differences are central.
+
+    Returns
+    -------
+    Descent
+        Where each lane ended.
+
+    Notes
+    -----
+    Source: Marquardt 1963, with several dampings per step.
+
+    Examples
+    --------
+    >>> ends = descend(lambda unit, lanes: 10 * (unit - 0.3), np.array([[0.9], [0.1]]))
+    >>> ends.unit.round(4).tolist()
+    [[0.3], [0.3]]
     """
     unit = np.clip(start, 0.0, 1.0)
     n = len(unit)

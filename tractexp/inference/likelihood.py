@@ -81,8 +81,17 @@ class Likelihood(FitProblem):
         return replace(self, prior=0.0)
 
     def whiten(self, residuals: np.ndarray) -> np.ndarray:
-        """Residuals (n, 2, N) as rows (n, 2 N) of independent unit variance; samples that do not
-        count are 0.
+        """Residuals as rows of independent unit variance.
+
+        Parameters
+        ----------
+        residuals : (n, C, N) [pu]
+            Of n candidates.
+
+        Returns
+        -------
+        (n, C N) array
+            Samples that do not count are 0.
         """
         return self.noise.whiten(residuals, self.problem.drive, self.valid)
 
@@ -102,7 +111,20 @@ class Likelihood(FitProblem):
         return self.prior * departures(self.problem, self.values(unit))
 
     def jacobian(self, unit: np.ndarray) -> tuple[np.ndarray, Sensitivities]:
-        """Whitened rows (R,) at one point (D,) of the unit cube, and their central differences."""
+        """Whitened residuals, and their central differences.
+
+        Parameters
+        ----------
+        unit : (D,)
+            One point of the unit cube.
+
+        Returns
+        -------
+        (R,) array
+            The rows there; their sum of squares is the deviance.
+        Sensitivities
+            Per range of each coordinate.
+        """
         rows, J = central_differences(
             self.rows, unit[None], np.zeros(1, dtype=int), self.separable_columns
         )
@@ -115,5 +137,19 @@ class Likelihood(FitProblem):
         iterations: int = 40,
         tolerance: float = 1e-4,
     ) -> Descent:
-        """The ends of descents of the deviance from coordinates (n, D); see `descend`."""
+        """The ends of descents of the deviance; see `descend`.
+
+        Parameters
+        ----------
+        start : (n, D)
+            Coordinates in the unit cube.
+        frozen : (n, D) bools
+            Those that do not move.
+        iterations, tolerance
+            As of `descend`.
+
+        Returns
+        -------
+        Descent
+        """
         return descend(self.rows, start, frozen, iterations, tolerance, self.separable_columns)

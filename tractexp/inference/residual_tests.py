@@ -20,16 +20,47 @@ class ResidualTest:
 
 
 def autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
-    """(lags,) correlation of `rows` (n,) with themselves 1, 2, ... samples later."""
+    """The correlation of a row with itself later.
+
+    Parameters
+    ----------
+    rows : (n,)
+        Samples at even times.
+    lags : int
+        Up to so many samples later.
+
+    Returns
+    -------
+    (lags,) array
+        At 1, 2, ... samples; 0 where the row is constant.
+
+    Examples
+    --------
+    >>> autocorrelation(np.array([1.0, -1.0, 1.0, -1.0]), 2).tolist()
+    [-0.75, 0.5]
+    """
     centered = rows - rows.mean()
     power = centered @ centered
     return np.array([centered[k:] @ centered[:-k] for k in range(1, lags + 1)]) / (power or 1.0)
 
 
 def ljung_box(rows: np.ndarray, fitted: int = 0) -> ResidualTest:
-    """Whether `rows` (n,) are uncorrelated; `fitted` autoregressive coefficients cost as many
-    degrees of freedom.
+    """Whether a row is uncorrelated.
 
+    Parameters
+    ----------
+    rows : (n,)
+        Whitened residuals at even times.
+    fitted : int
+        Autoregressive coefficients that were fitted; they cost as many degrees of freedom.
+
+    Returns
+    -------
+    ResidualTest
+        Its statistic is n (n + 2) times the sum of r_k² / (n - k) over the lags.
+
+    Notes
+    -----
     Source: Ljung and Box 1978.
     """
     from scipy.special import chdtrc
@@ -45,10 +76,30 @@ def ljung_box(rows: np.ndarray, fitted: int = 0) -> ResidualTest:
 
 
 def jarque_bera(rows: np.ndarray) -> ResidualTest:
-    """Whether `rows` (n,) have the skewness and kurtosis of a normal distribution. Source: Jarque
-    and Bera 1987.
+    """Whether a row has the skewness and kurtosis of a normal distribution.
 
     As `scipy.stats.jarque_bera`, without the second that importing it takes.
+
+    Parameters
+    ----------
+    rows : (n,)
+        Whitened residuals.
+
+    Returns
+    -------
+    ResidualTest
+        Its statistic has two degrees of freedom.
+
+    Notes
+    -----
+    Source: Jarque and Bera 1987.
+
+    Examples
+    --------
+    >>> spiky = np.zeros(100)
+    >>> spiky[50] = 10.0
+    >>> jarque_bera(spiky).p < 0.001
+    True
     """
     from scipy.special import chdtrc
 

@@ -91,7 +91,17 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
 
 
 def off_walls(unit: np.ndarray) -> np.ndarray:
-    """Which coordinates (D,) rest on no bound."""
+    """Which coordinates rest on no bound.
+
+    Parameters
+    ----------
+    unit : (D,)
+        In the unit cube.
+
+    Returns
+    -------
+    (D,) array of bools
+    """
     return (unit > WALL) & (unit < 1 - WALL)
 
 
@@ -154,10 +164,28 @@ def moves_without_blocks(
     whole: np.ndarray,
     shifts: Sequence[np.ndarray | float] | None = None,
 ) -> np.ndarray:
-    """The change (G, k) of an estimate when each block of J (C, N, k) and rows (C, N) is left out.
+    """The change of an estimate when each block of samples is left out.
 
-    `whole` (k, k) is J'J with all that is never left out, such as a prior; `shifts` are what else
-    moves J'r then.
+    Parameters
+    ----------
+    J : (C, N, k)
+        Sensitivities.
+    rows : (C, N)
+        Residuals.
+    blocks : slices of samples
+        G of them.
+    whole : (k, k)
+        J'J with all that is never left out, such as a prior.
+    shifts : (k,) for each block
+        What else moves J'r where it is left out; None: nothing.
+
+    Returns
+    -------
+    (G, k) array
+
+    Notes
+    -----
+    Source: the jackknife of Bell and McCaffrey 2002, blocks in place of clusters.
     """
     k, scale = len(whole), np.sqrt(np.maximum(np.diag(whole), 1e-300))
     moves = []
@@ -173,12 +201,30 @@ def moves_without_blocks(
 
 
 def robust_root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Rows (k, d) whose inverse products are the covariance of what J (R, d) sees, and how that
-    compares with J's own.
+    """Rows whose inverse products are the covariance of an estimate under a wrong model.
 
-    `moved` (G, d) are the estimates without each block. Along the directions of J, in which
-    independent residuals of unit variance have unit variance, less is raised to it. The ratios are
-    those of `Scatter`.
+    Along the directions of J, in which independent residuals of unit variance have unit variance,
+    less is raised to it.
+
+    Parameters
+    ----------
+    J : (R, d)
+        Whitened sensitivities.
+    moved : (G, d)
+        By how much the estimate moves without each block.
+
+    Returns
+    -------
+    (k, d) array
+        The rows, of the k directions that J sees.
+    (d,) array
+        Each standard error over that of independent residuals.
+    float
+        The geometric mean of that over all directions.
+
+    Notes
+    -----
+    Source: White 1982.
     """
     size = np.linalg.norm(J, axis=0)
     scale = np.where(size > 0, size, 1.0)

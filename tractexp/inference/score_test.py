@@ -166,11 +166,33 @@ class ScoreTest:
 def signed_drop(
     block: np.ndarray, r: np.ndarray, signs: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Drop (b,) of |r|^2 by a least-squares multiple of the rows of `block` that keeps the signs,
-    and its p.
+    """By how much a least-squares multiple of some rows that keeps signs lowers squares.
 
-    A size on its bound loses half of its chi-square: p is that of a chi-bar-square (Self and Liang
-    1987).
+    Parameters
+    ----------
+    block : (k, R)
+        Whitened columns of a candidate, one a size, nuisances projected out.
+    r : (b, R)
+        Whitened residuals.
+    signs : (k,)
+        1 or -1 of a size that can go one way only, 0 of another.
+
+    Returns
+    -------
+    (b,) array
+        The drop of |r|².
+    (b,) array
+        Its p. A size on its bound loses half of its chi-square: p is that of a chi-bar-square.
+
+    Notes
+    -----
+    Source: Self and Liang 1987.
+
+    Examples
+    --------
+    >>> drop, p = signed_drop(np.array([[1.0, 0.0]]), np.array([[3.0, 1.0]]), np.array([0]))
+    >>> drop.tolist(), p.round(4).tolist()
+    ([9.0], [0.0027])
     """
     gram = block @ block.T
     top = np.diag(gram).max(initial=0.0)
