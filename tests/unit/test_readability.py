@@ -21,7 +21,7 @@ LIMITS = {
     "numbers' names with several homes": 0,
     "functions of complexity over 10, in percent": 6.0,
 }
-LEAST_DOCSTRINGS = 17.0  # percent of all lines
+LEAST_DOCSTRINGS = 17.3  # percent of all lines
 
 PARTICIPLE = re.compile(r"[a-z]+(ed|ing)")
 PREPOSITIONS = re.compile(
