@@ -46,6 +46,8 @@ USABILITY = {
     Grade.EFFECT_MISSING: DOUBTFUL,
     Grade.WRONG_MODEL: UNUSABLE,
 }
+# Hz: how far the frequency of a network strays around a fault, where nobody recorded it
+FREQUENCY_SWING = 0.2
 LEAST_TOLD_MOVE = 2.0  # standard errors from which a rival structure's move is told
 
 
@@ -55,6 +57,7 @@ class FitSpec(Setup):
 
     optimizer: Choice
     check_intervals: bool = True
+    frequency_swing: float = FREQUENCY_SWING
 
     def search_end(self, progress: Progress) -> SearchResult:
         """Where the search ends; raises `UserError` where the input is wrong, before anything is
@@ -562,6 +565,7 @@ def identify(
     target: float | None = None,
     seed: int = 0,
     check_intervals: bool = True,
+    frequency_swing: float = FREQUENCY_SWING,
     progress: Any = None,
 ) -> Identification:
     """Fit the free parameters of a load model to recorded dips, and judge the fit on these and on
@@ -601,6 +605,9 @@ def identify(
     check_intervals : bool
         Whether wide intervals are confirmed by profile likelihood, and structures that most loads
         may have are fitted as well, to tell by how much they would move each parameter.
+    frequency_swing : float [Hz]
+        Where records have no f: of a frequency that swings so far is told by how much it would move
+        each parameter; 0: it was nominal.
     progress : None, False or callable
         None shows how far the search is, False does not; a callable is told what is read and done,
         a sentence at a time.
@@ -650,6 +657,7 @@ def identify(
         target=target,
         optimizer=Choice.from_argument("optimizer", optimizer),
         check_intervals=check_intervals,
+        frequency_swing=frequency_swing,
     )
     end = None
     try:
@@ -670,6 +678,7 @@ def _conclude_identification(
     from tractexp.identification.grade import grade_estimate, grade_model
     from tractexp.identification.profile import check_by_profiles
     from tractexp.identification.rivals import with_rivals
+    from tractexp.identification.unrecorded import with_unrecorded
     from tractexp.identification.yardstick import yardstick
 
     problem = setup.problem
@@ -682,6 +691,7 @@ def _conclude_identification(
             uncertainty, counter("points at most on the profiles", progress)
         )
         uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
+    uncertainty = with_unrecorded(uncertainty, setup.frequency_swing)
     if not np.array_equal(uncertainty.values, graded.values):  # a profile led to a better optimum
         moved = replace(graded.estimation, uncertainty=uncertainty)
         graded = grade_estimate(problem, moved, setup.validate, shown)
@@ -700,6 +710,7 @@ def _conclude_identification(
     advice = [
         *advise(uncertainty, adequacy, together.odd if together else (), data=data),
         *_with_priors(problem, result),
+        *_with_frequency(uncertainty),
     ]
     beside = yardstick(fits, result.model_error)
     result = replace(
@@ -710,9 +721,21 @@ def _conclude_identification(
         next_dip=graded.next_dip,
         starts=starts,
         rival_structures=structures,
+        unrecorded=asdict(uncertainty.unrecorded) if uncertainty.unrecorded else {},
         advice=advice,
     )
     return result, FitDetails(fits, graded.estimation, uncertainty, together, adequacy)
+
+
+def _with_frequency(uncertainty: "Uncertainty") -> list[str]:
+    """To record what moves parameters beyond their intervals; [] where nothing does."""
+    missing = uncertainty.unrecorded
+    if missing is None or not missing.beyond:
+        return []
+    return [
+        f"record f or U_angle: without it a swing of {missing.swing:g} Hz moves"
+        f" {join_words(missing.beyond)} (task.frequency_swing=0 where it stood still)"
+    ]
 
 
 def _with_priors(problem: Problem, result: Result) -> list[str]:

@@ -92,6 +92,10 @@ class Domain(ABC):
         of P and Q.
         """
 
+    def lacks_frequency(self, events: Sequence[Event]) -> bool:
+        """Whether nothing recorded says how fast the voltage turned in one of the events."""
+        return False
+
     @abstractmethod
     def smooth_event(self, event: Event) -> SmoothedEvent:
         """The event with the noise taken out of its voltage, where that can be told from it."""

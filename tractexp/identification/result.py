@@ -153,6 +153,8 @@ class Result(Plain):
     next_dip: dict[str, Any] = field(default_factory=dict)
     # name, model_error, parameters
     rival_structures: list[dict[str, Any]] = field(default_factory=list)
+    # channel that the records lack, swing it may have, moves {parameter: by how much}; empty: none
+    unrecorded: dict[str, Any] = field(default_factory=dict)
     advice: list[str] = field(default_factory=list)  # what to do next, the most pressing first
     notes: list[str] = field(default_factory=list)
     # of which `parameters` holds the mean

@@ -25,6 +25,7 @@ from tractexp.noise.color import FEWEST_NOISE_SAMPLES
 
 if TYPE_CHECKING:
     from tractexp.identification.rivals import RivalStructure
+    from tractexp.identification.unrecorded import UnrecordedInput
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,7 @@ class Uncertainty:
     profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     local_minima: tuple[LocalMinimum, ...] = ()  # others that fit as well
     rivals: "tuple[RivalStructure, ...]" = ()  # structures that fit as well
+    unrecorded: "UnrecordedInput | None" = None  # an input that the records lack
 
     @property
     def elsewhere(self) -> np.ndarray:
@@ -157,7 +159,7 @@ class Uncertainty:
 
         Where another valley fits as well, they reach over it, too. Where more than noise is left,
         so do they over what each rival structure makes of a parameter, as far beyond it as beyond
-        the estimate.
+        the estimate, and over what an input that was not recorded moves it by.
         """
         ends = self.values[:, None] + self.half[:, None] * [-1.0, 1.0]
         for name, interval in self.profiled.items():
@@ -177,6 +179,9 @@ class Uncertainty:
             ends = np.stack(
                 [np.fmin(ends[:, 0], there[:, 0]), np.fmax(ends[:, 1], there[:, 1])], axis=1
             )
+        if self.unrecorded is not None and not self.exact:
+            moves = np.array([self.unrecorded.moves[name] for name in self.names])
+            ends = ends + moves[:, None] * [-1.0, 1.0]
         return np.clip(ends, self.lower[:, None], self.upper[:, None])
 
     @property

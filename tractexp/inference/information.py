@@ -83,6 +83,13 @@ class Information:
             name for name, blind in zip(self.names, self._directions[2], strict=True) if blind
         )
 
+    def find_steps(self, rows: np.ndarray) -> np.ndarray:
+        """Changes (b, d) of the parameters that come nearest to changes `rows` (b, R) of whitened
+        rows, along the directions that the records see.
+        """
+        seen = self._directions[0]
+        return rows @ self.J @ seen.T @ seen * self.width
+
     @property
     def covariance(self) -> np.ndarray:
         """(d, d) physical, of the directions that the records see. See `unseen` for those they do

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import DATA, UserError
+from tractexp.files import PACKAGE
 from tractexp.record.angle import measure_frequency
 from tractexp.record.gap import (
     bridge_values,
@@ -158,6 +159,13 @@ class Record:
     def file_base(self) -> Base:
         """The base in which its file was."""
         return self.original_base or self.base
+
+    @property
+    def is_shipped(self) -> bool:
+        """Whether it lies in an installed package: then it was made, and nothing happened that it
+        does not hold.
+        """
+        return self.source.startswith(PACKAGE)
 
     @property
     def where(self) -> str:

@@ -1,0 +1,107 @@
+"""What an input that nobody recorded could do to the parameters.
+
+A motor's slip is a few percent, and a frequency that swings by 0.2 Hz is 0.4 % of the nominal one:
+a tenth of the slip. Where no frequency was recorded the model takes it to be nominal, and what the
+swing does to the power moves the parameters. How far is computed for courses of the frequency as
+networks have them after a fault, to first order. A course that the fit would show is none: what of
+it no parameter takes up is no louder than what the fit leaves.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.identification.uncertainty import Uncertainty, threshold
+from tractexp.identification.verdict import IDENTIFIED_SHARE, UNIDENTIFIED, ParameterVerdict, size
+from tractexp.inference.information import Information
+from tractexp.record import Event
+
+# Hz: swings of one machine against others, and of areas against each other (Kundur 1994, ch. 12)
+SWINGS = (0.3, 0.7, 1.5)
+FALL = 1.0  # s: within which the frequency follows a lost balance of power
+
+
+@dataclass(frozen=True)
+class UnrecordedInput:
+    """A channel that was not recorded, how far it may swing [Hz], by how much that moves each
+    parameter, by name, and those that it moves beyond their intervals.
+    """
+
+    channel: str
+    swing: float
+    moves: dict[str, float]
+    beyond: tuple[str, ...] = ()
+
+
+def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
+    """The judgement with what a frequency that swings by so many Hz would move each parameter by,
+    where none was recorded; an identified parameter that it moves too far is one no longer.
+    """
+    problem = uncertainty.likelihood.problem
+    unknown = problem.domain.lacks_frequency(problem.events)
+    if swing <= 0 or not unknown or any(event.record.is_shipped for event in problem.events):
+        return uncertainty
+    moved = np.abs(_find_moves(uncertainty, swing))
+    if not moved.any():
+        return uncertainty
+    moves = dict(zip(uncertainty.names, moved.max(axis=0).tolist(), strict=True))
+    beside = replace(uncertainty, unrecorded=UnrecordedInput("f", swing, moves))
+    objections = dict(_find_moved(uncertainty, beside))
+    return replace(
+        beside,
+        unrecorded=UnrecordedInput("f", swing, moves, tuple(objections)),
+        verdicts=uncertainty.verdicts | objections,
+    )
+
+
+def _find_moves(uncertainty: Uncertainty, swing: float) -> np.ndarray:
+    """By how much each course of the frequency moves the parameters, (courses, d)."""
+    likelihood, unit = uncertainty.likelihood.of_records, uncertainty.unit
+    problem = likelihood.problem
+    left, sensitivities = uncertainty.sensitivities
+    driven = [
+        replace(likelihood, problem=problem.driven_by(events)).rows(unit[None])[0]
+        for events in _courses(problem.events, swing)
+    ]
+    changes = np.array([rows for rows in driven if np.isfinite(rows).all()]) - left
+    if not len(changes):
+        return np.zeros((1, len(uncertainty.names)))
+    taken_up = sensitivities.times(sensitivities.fit(-changes))
+    seen = np.sum((changes + taken_up) ** 2, axis=1)
+    hidden = threshold() if uncertainty.exact else max(float(left @ left), threshold())
+    shares = np.sqrt(np.minimum(1.0, hidden / np.maximum(seen, 1e-300)))
+    width = problem.upper - problem.lower
+    seen_by = Information(uncertainty.names, uncertainty.values, width, sensitivities.without_own)
+    return shares[:, None] * seen_by.find_steps(-changes)
+
+
+def _courses(events: Sequence[Event], swing: float) -> Iterator[list[Event]]:
+    """The events with each course of the frequency: one that falls from the dip on, and swings."""
+    since = [np.maximum(event.record.t - event.t_start, 0.0) for event in events]
+    shapes = [[1 - np.exp(-t / FALL) for t in since]]
+    shapes += [[np.sin(2 * np.pi * rate * t) for t in since] for rate in SWINGS]
+    for shape in shapes:
+        yield [_with_frequency(e, swing * x) for e, x in zip(events, shape, strict=True)]
+
+
+def _with_frequency(event: Event, deviation: np.ndarray) -> Event:
+    """An event whose frequency deviates so [Hz] from the nominal one."""
+    nominal = event.record.base.frequency
+    return replace(event, record=replace(event.record, f=nominal + deviation), f0=nominal)
+
+
+def _find_moved(own: Uncertainty, beside: Uncertainty) -> Iterator[tuple[str, ParameterVerdict]]:
+    """Verdicts of the parameters that the swing moves beyond their interval, or until that is
+    wide.
+    """
+    assert beside.unrecorded is not None
+    swing, moves = beside.unrecorded.swing, beside.unrecorded.moves
+    for j, (name, (low, high)) in enumerate(zip(own.names, own.intervals.tolist(), strict=True)):
+        value, verdict = float(own.values[j]), own.verdicts[name]
+        half = float(np.ptp(beside.intervals[j])) / 2
+        wide = max(half, moves[name]) > IDENTIFIED_SHARE * size(value, own.lower[j], own.upper[j])
+        known = verdict.word != UNIDENTIFIED
+        if known and (wide or moves[name] > (high - low) / 2):
+            why = f"f was not recorded, and a swing of {swing:g} Hz moves it by {moves[name]:.2g}"
+            yield name, verdict.add_objection(why)
