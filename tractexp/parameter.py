@@ -35,6 +35,9 @@ class Parameter:
         How the value goes with the base of power, whatever its unit: on a base of a k-th of the MVA
         the same load has k^power_exponent times the value. A power, a torque, an inertia or an
         admittance has 1, an impedance -1; shares, times and voltages have 0.
+    physical : (float, float) or None
+        The range of real devices, within the bounds, to which records from the field are held;
+        None: the bounds are.
 
     Examples
     --------
@@ -52,6 +55,7 @@ class Parameter:
     symbol: str = ""
     null: float | None = None
     power_exponent: int = field(default=0, kw_only=True)
+    physical: tuple[float, float] | None = field(default=None, kw_only=True)
     name: str = field(default="", compare=False)
 
     @property
@@ -88,6 +92,11 @@ class Parameter:
         if self.null is not None and not low <= self.null <= high:
             raise UserError(
                 f"{where}: the null {self.null:g} is outside the bounds [{low:g}, {high:g}]"
+            )
+        if self.physical is not None and not low <= self.physical[0] < self.physical[1] <= high:
+            raise UserError(
+                f"{where}: the physical range {list(self.physical)} must lie within the bounds"
+                f" [{low:g}, {high:g}], the lower end first"
             )
         if not isinstance(self.power_exponent, int):
             raise UserError(

@@ -31,6 +31,8 @@ class ModelConfig:
     window: Any = None
     # hold the motor to what machines usually are, where the records do not tell
     priors: bool = False
+    # keep machines within what machines are; null: of records from the field
+    physical: bool | None = None
     # add the effects that the records show, such as a current of zero sequence
     shown_effects: bool = False
 

@@ -4,6 +4,8 @@ Eq. (3).
 
 from tractexp.extend import Parameter, sites
 
+# Physical ranges, on the record's own base: machines of the seven types of the IEEE Task Force on
+# Load Representation 1995 have C of 0.89 and more; T_m leaves the static part a tenth of the load.
 PAPER = "Wu, Fan, Zou 2022, Energies 15(14) 5034"
 
 T_PRIME = Parameter(
@@ -17,8 +19,9 @@ X_PRIME = Parameter(
     f"{PAPER}, Eq. (2)",
     "X'",
     power_exponent=-1,
+    physical=(0.08, 1.5),
 )
-C = Parameter(0.9, (0.3, 0.99), "1", "(X - X')/X", f"{PAPER}, Eq. (1)")
+C = Parameter(0.9, (0.3, 0.99), "1", "(X - X')/X", f"{PAPER}, Eq. (1)", physical=(0.85, 0.99))
 M = Parameter(
     0.005,
     (0.0005, 0.03),
@@ -26,6 +29,7 @@ M = Parameter(
     "inertia, H = M omega_s/2",
     f"{PAPER}, Eq. (1)",
     power_exponent=1,
+    physical=(0.0005, 0.01),
 )
 T_M = Parameter(
     0.5,
@@ -34,6 +38,7 @@ T_M = Parameter(
     "load torque, the motor's power before the event",
     f"{PAPER}, Eq. (1)",
     power_exponent=1,
+    physical=(0.05, 0.9),
 )
 
 

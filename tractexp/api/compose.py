@@ -50,9 +50,12 @@ class LoadModel(Portable, Plain, Tabulated):
     domain: str = "phasors"
     window: float | str | None = None
     priors: bool = False
+    physical: bool | None = None
     shown_effects: bool = False
     # {effect that the records show: how they do}
     shown: Mapping[str, str] = field(default_factory=dict)
+    # {parameter that is held to what machines are: its range, which is in `bounds`}
+    held: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     @property
     def node(self) -> dict[str, Any]:
@@ -107,6 +110,17 @@ class LoadModel(Portable, Plain, Tabulated):
         shown = {**self.shown, **effects_shown(self.model, events)}
         return replace(self, effects=sorted({*self.effects, *shown}), shown=shown)
 
+    def hold_to_machines(self, events: Sequence["Event"]) -> "LoadModel":
+        """The model within the physical ranges of its parameters where `physical` says so, or where
+        it leaves that open and the events are from the field. Bounds that are given stay.
+        """
+        wanted, given = self.physical, {*self.bounds, *self.fixed}
+        if wanted is None:
+            wanted = all(event.record.is_from_field for event in events)
+        ranges = {p.name: p.physical for p in self.model.parameters if p.physical and wanted}
+        held = {name: list(each) for name, each in ranges.items() if name not in given}
+        return replace(self, bounds={**held, **self.bounds}, held=held) if held else self
+
     def table(self) -> Table:
         """Each parameter with its value or default, unit and bounds."""
         rows = [
@@ -147,6 +161,7 @@ def compose(
     domain: str | None = None,
     window: float | str | None = None,
     priors: bool | None = None,
+    physical: bool | None = None,
     shown_effects: bool | None = None,
 ) -> LoadModel:
     """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor
@@ -178,6 +193,8 @@ def compose(
         what the records say.
     priors : bool
         Whether a fit holds the motor to what machines usually are, where its records do not tell.
+    physical : bool
+        Whether a fit keeps the motor within what machines are; None: of records in kV and MW.
     shown_effects : bool
         Whether a fit has the effects that its records show.
 
@@ -215,6 +232,7 @@ def compose(
         "domain": domain,
         "window": window,
         "priors": priors,
+        "physical": physical,
         "shown_effects": shown_effects,
     }
     composed = composed.with_(bounds=bounds, fixed=fixed, **settings, **parts)

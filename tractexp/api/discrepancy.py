@@ -443,7 +443,7 @@ def investigate(
             " out"
         )
     train, held = dips_together(records, validate)
-    base = base.add_shown_effects(train)
+    base = base.add_shown_effects(train).hold_to_machines(train)
     question = Question(
         train=train,
         validate=held,

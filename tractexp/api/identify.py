@@ -558,6 +558,7 @@ def identify(
     substeps: int | None = None,
     domain: str | None = None,
     priors: bool | None = None,
+    physical: bool | None = None,
     objective: Any = None,
     optimizer: Any = None,
     budget: int | None = None,
@@ -592,6 +593,8 @@ def identify(
         With "waves" the records' sampled currents are fitted, not the power that phasors show.
     priors : bool
         Whether a motor is held to what machines usually are where more than noise is left.
+    physical : bool
+        Whether a motor is kept within what machines are; None: of records in kV and MW.
     objective, optimizer : name, mapping or None
         `{"name": "pso", "population": 100}` has settings; None: those of `conf/config.yaml`.
     budget : int
@@ -651,6 +654,7 @@ def identify(
         substeps=substeps,
         domain=domain,
         priors=priors,
+        physical=physical,
         seed=seed,
         budget=budget,
         time_limit=time_limit,
@@ -676,6 +680,7 @@ def _conclude_identification(
     from tractexp.identification.advice import advise
     from tractexp.identification.agreement import compare_events
     from tractexp.identification.grade import grade_estimate, grade_model
+    from tractexp.identification.physical import find_free_optimum, say_ranges
     from tractexp.identification.profile import check_by_profiles
     from tractexp.identification.rivals import with_rivals
     from tractexp.identification.unrecorded import with_unrecorded
@@ -692,6 +697,7 @@ def _conclude_identification(
         )
         uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
     uncertainty = with_unrecorded(uncertainty, setup.frequency_swing)
+    uncertainty = say_ranges(uncertainty, setup.model.held)
     if not np.array_equal(uncertainty.values, graded.values):  # a profile led to a better optimum
         moved = replace(graded.estimation, uncertainty=uncertainty)
         graded = grade_estimate(problem, moved, setup.validate, shown)
@@ -704,11 +710,19 @@ def _conclude_identification(
     fields = uncertainty.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
     fields["uncertainty"]["notes"] += together.notes if together else []
+    free = find_free_optimum(uncertainty, setup.model.held, fits, setup.validate)
+    fields["uncertainty"]["notes"] += [str(free)] if free else []
     starts = [s.to_dict(problem.space.names) for s in graded.estimation.starts]
     structures = [rival.to_dict() for rival in uncertainty.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
     advice = [
-        *advise(uncertainty, adequacy, together.odd if together else (), data=data),
+        *advise(
+            uncertainty,
+            adequacy,
+            together.odd if together else (),
+            data=data,
+            held=setup.model.held,
+        ),
         *_with_priors(problem, result),
         *_with_frequency(uncertainty),
     ]
@@ -721,6 +735,7 @@ def _conclude_identification(
         next_dip=graded.next_dip,
         starts=starts,
         rival_structures=structures,
+        free_optimum=free.to_dict() if free else {},
         unrecorded=asdict(uncertainty.unrecorded) if uncertainty.unrecorded else {},
         advice=advice,
     )

@@ -54,7 +54,8 @@ class Setup(Given):
             check_range(key, given.get(key), least)
         train, held = dips_together(records, validate)
         of_model = {key: given.pop(key) for key in OF_MODEL if key in given}
-        load = model_of(model, of_model.get("domain")).with_(**of_model).add_shown_effects(train)
+        load = model_of(model, of_model.get("domain")).with_(**of_model)
+        load = load.add_shown_effects(train).hold_to_machines(train)
         return cls(
             train=train,
             validate=held,

@@ -36,10 +36,11 @@ LOAD = (
     "model.integration",
     "model.domain",
     "model.priors",
+    "model.physical",
     "model.window",
 )
 # Arguments that the model's configuration holds
-OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain", "priors")
+OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain", "priors", "physical")
 ALWAYS = ("task", "experiment", "seed", "tracking", "sweep", "hydra")  # open to every task
 LABEL = "load"  # the tag with station, load and dips
 NAMED = ("optimizer", "data")  # choices that a run is named after anyway

@@ -168,6 +168,11 @@ class Record:
         return self.source.startswith(PACKAGE)
 
     @property
+    def is_from_field(self) -> bool:
+        """Whether it says how many kV and MVA its load takes, as records of instruments do."""
+        return self.file_base.in_mva and not self.is_shipped
+
+    @property
     def where(self) -> str:
         """What messages call this record: its source, else its name."""
         return self.source or self.name

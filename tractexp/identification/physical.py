@@ -1,0 +1,140 @@
+"""What it costs to hold a machine to what machines are, and what it would be without.
+
+Of waveforms the free optimum is often no machine: C at 0.3 magnetizes with twelve times the rated
+current, and a negative inductance beside it takes that away again. The pair is a linear network in
+disguise. So records from the field are fitted within the ranges that the parameters declare
+(`Parameter.physical`), and where one of these holds the estimate, the free optimum is told beside
+it as a diagnosis.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.identification.result import Fit, play
+from tractexp.identification.uncertainty import Uncertainty
+from tractexp.identification.verdict import BOUND, BOUND_DISTANCE, ParameterVerdict
+from tractexp.inference.model_error import model_error
+from tractexp.inference.problem import Problem
+from tractexp.parameter import even
+from tractexp.record import Event
+
+FREE_STARTS = 4  # of the free fit, beside the estimate
+FREE_ITERATIONS = 25
+
+
+@dataclass(frozen=True)
+class FreeOptimum:
+    """What a fit gives whose machine is held to no range: `parameters` that leave theirs, the
+    model's error beside that of the fit that is held, of the events fitted and held out.
+    """
+
+    parameters: dict[str, float]
+    error: float
+    held_error: float
+    predicted: float | None = None
+    held_predicted: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `result.json` has it."""
+        return {**vars(self), "sentence": str(self)}
+
+    def __str__(self) -> str:
+        away = ", ".join(f"{name} {value:.3g}" for name, value in self.parameters.items())
+        dips = ""
+        if self.predicted is not None and self.held_predicted is not None:
+            dips = f", of the held-out dips {self.held_predicted:.0%} for {self.predicted:.0%}"
+        return (
+            f"held to what machines are, the model leaves {self.held_error:.0%} of the response"
+            f" where free it leaves {self.error:.0%}{dips}; free it would have {away}, which is no"
+            " machine (model.physical=false fits so)"
+        )
+
+
+def find_free_optimum(
+    uncertainty: Uncertainty,
+    held: Mapping[str, Sequence[float]],
+    fits: Sequence[Fit],
+    validate: Sequence[Event],
+) -> FreeOptimum | None:
+    """The optimum without the ranges `held` {parameter: range}; None where none of these holds the
+    estimate, or where a free fit stays within them.
+    """
+    if not _names_at_range(uncertainty, held):
+        return None
+    problem = uncertainty.likelihood.problem
+    own = {p.name: p.bounds for p in problem.parameters if p.name not in held}
+    steps = int(problem.step.substeps.max())
+    try:
+        free = Problem(
+            problem.model,
+            problem.events,
+            own,
+            problem.fixed,
+            steps,
+            problem.per_event,
+            problem.loss,
+        )
+    except UserError:
+        return None
+    likelihood = replace(uncertainty.likelihood, problem=free)
+    known = free.space.to_unit(uncertainty.values)
+    starts = np.vstack([known, even(FREE_STARTS, len(known))])
+    coordinates = likelihood.place_parameters(np.clip(starts, 0.0, 1.0))
+    if uncertainty.exact:
+        coordinates[:, likelihood.free :] = uncertainty.unit[uncertainty.likelihood.free :]
+    ended = likelihood.descent(coordinates, iterations=FREE_ITERATIONS, tolerance=0.01)
+    if not ended.deviance.min() < uncertainty.deviance:
+        return None
+    values = likelihood.values(ended.best)
+    away = _outside(dict(zip(free.space.names, values.tolist(), strict=True)), held)
+    return _compare(play(free, values, validate), fits, len(free.events), away) if away else None
+
+
+def say_ranges(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) -> Uncertainty:
+    """The judgement that tells nobody to widen the range of what stands at its end."""
+    told = {
+        name: ParameterVerdict(BOUND, f"{value:.4g}, the end of what machines have")
+        for name, value in zip(uncertainty.names, uncertainty.values.tolist(), strict=True)
+        if name in _names_at_range(uncertainty, held) and uncertainty.verdicts[name].word == BOUND
+    }
+    return replace(uncertainty, verdicts=uncertainty.verdicts | told)
+
+
+def _compare(
+    free: Sequence[Fit], held: Sequence[Fit], fitted: int, away: dict[str, float]
+) -> FreeOptimum:
+    errors = [model_error(part).value for fits in (free, held) for part in (fits[:fitted],)]
+    predicted = [None, None]
+    if len(held) > fitted:
+        predicted = [model_error(fits[fitted:]).value for fits in (free, held)]
+    return FreeOptimum(away, errors[0], errors[1], predicted[0], predicted[1])
+
+
+def _names_at_range(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) -> list[str]:
+    """Parameters that stand at an end of the range that they are held to."""
+    width = uncertainty.upper - uncertainty.lower
+    near = np.minimum(
+        uncertainty.values - uncertainty.lower, uncertainty.upper - uncertainty.values
+    )
+    at = near < BOUND_DISTANCE * width
+    return [
+        name
+        for name, bound in zip(uncertainty.names, at, strict=True)
+        if bound and name.partition("[")[0] in held
+    ]
+
+
+def _outside(values: Mapping[str, float], held: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """Those of the values that lie outside the ranges of their parameters."""
+    ranges = {
+        name: held[name.partition("[")[0]] for name in values if name.partition("[")[0] in held
+    }
+    return {
+        name: values[name]
+        for name, (low, high) in ranges.items()
+        if not low * (1 - BOUND_DISTANCE) <= values[name] <= high * (1 + BOUND_DISTANCE)
+    }
