@@ -33,6 +33,8 @@ class ModelConfig:
     priors: bool = False
     # keep machines within what machines are; null: of records from the field
     physical: bool | None = None
+    # {domain: choices of model that are raced}: the simplest that predicts nearly best is fitted
+    candidates: dict[str, list[str]] = field(default_factory=dict)
     # add the effects that the records show, such as a current of zero sequence
     shown_effects: bool = False
 

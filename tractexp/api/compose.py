@@ -4,6 +4,7 @@ parameters beforehand.
 
 import dataclasses
 import functools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -51,11 +52,14 @@ class LoadModel(Portable, Plain, Tabulated):
     window: float | str | None = None
     priors: bool = False
     physical: bool | None = None
+    # {domain: choices of model that are raced before a fit}
+    candidates: Mapping[str, Sequence[str]] = field(default_factory=dict)
     shown_effects: bool = False
     # {effect that the records show: how they do}
     shown: Mapping[str, str] = field(default_factory=dict)
     # {parameter that is held to what machines are: its range, which is in `bounds`}
     held: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    race: Sequence[Mapping[str, Any]] = ()  # how the structures did of which this one won
 
     @property
     def node(self) -> dict[str, Any]:
@@ -109,6 +113,49 @@ class LoadModel(Portable, Plain, Tabulated):
             return self
         shown = {**self.shown, **effects_shown(self.model, events)}
         return replace(self, effects=sorted({*self.effects, *shown}), shown=shown)
+
+    def fit_for(self, events: Sequence["Event"]) -> "LoadModel":
+        """The model that is fitted to these events: the winner where structures are raced, with the
+        effects that they show where it asks for these, its machines within what machines are.
+        """
+        names = self.candidates.get(self.domain, ())
+        if not names:
+            return self.add_shown_effects(events).hold_to_machines(events)
+        return self._choose_structure(names, events)
+
+    def _choose_structure(self, names: Sequence[str], events: Sequence["Event"]) -> "LoadModel":
+        """The winner of a race, with what is said of its parameters here."""
+        from tractexp.identification.race import Candidate, Entry, race_structures
+
+        models, refused = dict[str, LoadModel](), list[Entry]()
+        for name in names:
+            try:
+                models[name] = self._prepare_choice(name).fit_for(events)
+                _ = models[name].model
+            except UserError as error:
+                models.pop(name, None)
+                refused.append(Entry(name, 0, math.inf, math.inf, str(error)))
+        candidates = [Candidate(name, one.model, one.bounds) for name, one in models.items()]
+        entries = race_structures(candidates, events, self.fixed)
+        race = [entry.to_dict() for entry in (*entries, *refused)]
+        return replace(models[entries[0].name], race=race)
+
+    def _prepare_choice(self, name: str) -> "LoadModel":
+        """A choice of model by name, in this one's domain, with what is known of its parameters."""
+        other = replace(
+            model_of(name),
+            domain=self.domain,
+            physical=self.physical,
+            priors=self.priors,
+            substeps=self.substeps,
+            window=self.window,
+        )
+        known = {p.name for p in other.model.parameters}
+        return other.with_(
+            bounds={key: value for key, value in self.bounds.items() if key in known},
+            fixed={key: value for key, value in self.fixed.items() if key in known},
+            per_event=[key for key in self.per_event if key in known],
+        )
 
     def hold_to_machines(self, events: Sequence["Event"]) -> "LoadModel":
         """The model within the physical ranges of its parameters where `physical` says so, or where

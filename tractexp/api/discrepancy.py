@@ -443,7 +443,7 @@ def investigate(
             " out"
         )
     train, held = dips_together(records, validate)
-    base = base.add_shown_effects(train).hold_to_machines(train)
+    base = base.fit_for(train)
     question = Question(
         train=train,
         validate=held,
@@ -517,6 +517,7 @@ def _estimate_extended_model(question: Question, steps: "Steps") -> Result:
         adequacy=graded.adequacy.to_dict(),
         next_dip=graded.next_dip,
         shown_effects=dict(base.shown),
+        race=[*base.race],
     )
 
 

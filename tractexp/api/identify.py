@@ -705,7 +705,7 @@ def _conclude_identification(
     result = conclude(
         problem, end, graded.values, fits, setup.seed, setup.model.node, setup.optimizer.name
     )
-    result = replace(result, shown_effects=dict(shown))
+    result = replace(result, shown_effects=dict(shown), race=[*setup.model.race])
     together = compare_events(uncertainty) if len(problem.events) > 1 else None
     fields = uncertainty.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}

@@ -55,7 +55,7 @@ class Setup(Given):
         train, held = dips_together(records, validate)
         of_model = {key: given.pop(key) for key in OF_MODEL if key in given}
         load = model_of(model, of_model.get("domain")).with_(**of_model)
-        load = load.add_shown_effects(train).hold_to_machines(train)
+        load = load.fit_for(train)
         return cls(
             train=train,
             validate=held,

@@ -37,6 +37,7 @@ LOAD = (
     "model.domain",
     "model.priors",
     "model.physical",
+    "model.candidates",
     "model.window",
 )
 # Arguments that the model's configuration holds

@@ -90,7 +90,7 @@ def find_free_optimum(
     if not ended.deviance.min() < uncertainty.deviance:
         return None
     values = likelihood.values(ended.best)
-    away = _outside(dict(zip(free.space.names, values.tolist(), strict=True)), held)
+    away = _find_outside(dict(zip(free.space.names, values.tolist(), strict=True)), held)
     return _compare(play(free, values, validate), fits, len(free.events), away) if away else None
 
 
@@ -128,7 +128,9 @@ def _names_at_range(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]
     ]
 
 
-def _outside(values: Mapping[str, float], held: Mapping[str, Sequence[float]]) -> dict[str, float]:
+def _find_outside(
+    values: Mapping[str, float], held: Mapping[str, Sequence[float]]
+) -> dict[str, float]:
     """Those of the values that lie outside the ranges of their parameters."""
     ranges = {
         name: held[name.partition("[")[0]] for name in values if name.partition("[")[0] in held

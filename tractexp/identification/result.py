@@ -153,6 +153,8 @@ class Result(Plain):
     next_dip: dict[str, Any] = field(default_factory=dict)
     # name, model_error, parameters
     rival_structures: list[dict[str, Any]] = field(default_factory=list)
+    # structures that were raced: name, parameters, fitted, predicted, why; the winner first
+    race: list[dict[str, Any]] = field(default_factory=list)
     # the optimum of a fit whose machine is held to no range; empty: none of these holds the fit
     free_optimum: dict[str, Any] = field(default_factory=dict)
     # channel that the records lack, swing it may have, moves {parameter: by how much}; empty: none

@@ -39,7 +39,7 @@ def narrow_bounds(
         low, high = map(float, pair)
         old = by_name[name]
         inside = min(max(old.default, low), high) if low < high else old.default
-        by_name[name] = replace(old, default=inside, bounds=(low, high))
+        by_name[name] = replace(old, default=inside, bounds=(low, high), physical=None)
         by_name[name].check(f"{MODEL.bounds}.{name}")
     return tuple(by_name.values())
 

@@ -7,8 +7,6 @@ and by how much the angle jumped is known only as well as the peak was sampled.
 
 import numpy as np
 
-from tractexp.record.curve import slopes
-
 
 def unwrap_angle(angle: np.ndarray, turn: float = 2 * np.pi) -> np.ndarray:
     """An angle (N,) without the whole turns it was wrapped by; over a gap (nan) as from one side to
@@ -24,9 +22,15 @@ def measure_frequency(angle: np.ndarray, step: float, nominal: float) -> np.ndar
     """Frequency (N,) [Hz] at which an angle (N,) [rad] turns beside its jumps, in a frame that
     turns at `nominal`.
 
-    At each sample it is the slope of the curve through the angle which leans on the flatter side:
-    before a jump the slope before it, after a jump that after it.
+    At each sample it is the slope of the curve through the angle which leans on the side that bends
+    less (Akima 1970): before a jump the slope before it, after a jump that after it.
     """
-    usual = float(np.median(np.diff(angle)))
-    turned = slopes(angle - usual * np.arange(len(angle))) + usual
+    usual = np.diff(angle)
+    m = np.concatenate([usual[:1], usual[:1], usual, usual[-1:], usual[-1:]])
+    bends = np.abs(np.diff(m))
+    left, right = bends[2:], bends[:-2]
+    total = left + right
+    both = (m[1:-2] + m[2:-1]) / 2
+    leaning = (left * m[1:-2] + right * m[2:-1]) / np.where(total > 0, total, 1.0)
+    turned = np.where(total > 0, leaning, both)
     return nominal + turned / (2 * np.pi * step)

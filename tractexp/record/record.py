@@ -278,7 +278,7 @@ class Record:
         usual = float(np.median(steps[steps > 0]))
         self._check_steps(steps, usual, place)
         if (np.abs(steps - usual) > 0.5 * usual).any():
-            grid = np.linspace(self.t[0], self.t[-1], round((self.t[-1] - self.t[0]) / usual) + 1)
+            grid = self._grid(steps, usual)
             note = self._uneven(steps, usual)
         else:
             note = (
@@ -289,6 +289,15 @@ class Record:
         moved["t"] = grid
         more = {name: np.interp(grid, self.t, values) for name, values in self.more.items()}
         return replace(self, **moved, more=more, notes=(*self.notes, note))
+
+    def _grid(self, steps: np.ndarray, usual: float) -> np.ndarray:
+        """Uniform times by the usual step. What a simulator writes the instant of jumps halfway
+        between two of them: there a curve through the samples has it.
+        """
+        instants = self.t[1:][steps < 0.5 * usual]
+        late = (instants[:1] - self.t[0]) / usual - 0.5
+        first = self.t[0] + usual * float(np.mod(late, 1.0).sum())
+        return first + usual * np.arange(int((self.t[-1] - first) / usual + 1e-6) + 1)
 
     def _check_steps(self, steps: np.ndarray, usual: float, place: Callable[[int], str]) -> None:
         """Refuse rows that are missing, and times that stand still other than at an event."""

@@ -24,6 +24,7 @@ from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.provenance import command
 from tractexp.record.identity import Identity, describe_identities, title
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
+from tractexp.report.race import tabulate_race
 from tractexp.report.sliders import add_sliders
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, spectrum_chart, wave_chart
@@ -77,7 +78,7 @@ def summary(fit: "Identification") -> Report:
     report = Report()
     if fit.headline:
         report.text(as_sentence(fit.headline))
-    report.add(parameters(fit))
+    report.add(parameters(fit), *tabulate_race(result.race))
     report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(
         errors(fit)
     )
@@ -167,6 +168,7 @@ def report(fit: "Identification") -> Report:
     _add_next_dip(page, fit)
     page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
     _parameters(page, fit, uncertainty)
+    page.add(*tabulate_race(result.race))
     page.heading("Moved by hand")
     add_sliders(page, fit)
     page.heading("How well it fits").add(errors(fit)).text(*map(as_sentence, samples(fit)))

@@ -1,0 +1,148 @@
+"""Which structure a load has: base models raced by what they predict and were not fitted to.
+
+Of several dips each is predicted by a fit to the others. Of one dip the samples from its start on
+are cut into stretches in which the load answers equally much, and each is predicted by a fit to the
+rest: a static law follows the fault and misses the recovery, a motor too few knows neither. The
+simplest structure that predicts nearly as well as the best is chosen. It is chosen by the fitted
+dips alone: those held out judge it.
+"""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.multistart import distinct, explore_minima, screen_points
+from tractexp.inference.problem import Problem
+from tractexp.model.model import Model
+from tractexp.noise.color import SMALLEST_DEVIATION
+from tractexp.progress import Counting, make_silent_counter
+from tractexp.record import Event
+
+STRETCHES = 5  # of a single dip
+AS_GOOD = 1.05  # times the least error: a simpler structure within it wins
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A structure that takes part: the name of its choice, its model and what bounds it."""
+
+    name: str
+    model: Model
+    bounds: Mapping[str, Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """How a structure did: its number of free parameters, what it leaves of the load's response
+    where it is fitted and where it predicts, as fractions (inf: it cannot be simulated, `why`).
+    """
+
+    name: str
+    parameters: int
+    fitted: float
+    predicted: float
+    why: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `result.json` has it; errors that do not exist are None."""
+        return {
+            key: None if isinstance(value, float) and not np.isfinite(value) else value
+            for key, value in vars(self).items()
+        }
+
+
+def race_structures(
+    candidates: Sequence[Candidate],
+    events: Sequence[Event],
+    fixed: Mapping[str, float] | None = None,
+    parts: Any = make_silent_counter,
+) -> list[Entry]:
+    """The entries of the candidates, the winner first, the others by what they predict. Raises
+    `UserError` where none can be fitted.
+    """
+    entries = []
+    counting: Counting = parts(len(candidates))
+    with counting as ended:
+        for candidate in candidates:
+            entries.append(_enter(candidate, events, fixed or {}))
+            ended()
+    entries.sort(key=lambda entry: entry.predicted)
+    if not entries or not np.isfinite(entries[0].predicted):
+        raise UserError(
+            f"none of the structures can be fitted: {entries[0].why if entries else ''}"
+        )
+    near = [e for e in entries if e.predicted <= AS_GOOD * entries[0].predicted]
+    winner = min(near, key=lambda entry: (entry.parameters, entry.predicted))
+    return [winner, *(entry for entry in entries if entry is not winner)]
+
+
+def _enter(candidate: Candidate, events: Sequence[Event], fixed: Mapping[str, float]) -> Entry:
+    own = {name: value for name, value in fixed.items() if name in candidate.model.names}
+    try:
+        problem = Problem(candidate.model, events, candidate.bounds, own)
+    except UserError as error:
+        return Entry(candidate.name, len(candidate.model.names), np.inf, np.inf, str(error))
+    points, least = screen_points(problem)
+    level = max(float(np.sqrt(least)), SMALLEST_DEVIATION)
+    likelihood = Likelihood.of_squares(problem, level)
+    ends = explore_minima(likelihood, points)
+    if not np.isfinite(ends.deviance.min(initial=np.inf)):
+        why = "nothing in its bounds can be simulated"
+        return Entry(candidate.name, problem.space.dimension, np.inf, np.inf, why)
+    starts, counted = distinct(ends, likelihood.free), _mark_compared(problem)
+    size = _response(problem, counted)
+    fitted = likelihood.residuals(ends.best[None])[0]
+    predicted = 0.0
+    for held in _folds(problem, counted):
+        rest = replace(likelihood, valid=likelihood.valid & ~held)
+        best = rest.descent(starts).best
+        left = likelihood.residuals(best[None])[0]
+        predicted += float(np.sum(np.where(held & counted, left, 0.0) ** 2))
+    inside = float(np.sum(np.where(counted, fitted, 0.0) ** 2))
+    shares = [float(np.sqrt(np.nan_to_num(e / size, nan=np.inf))) for e in (inside, predicted)]
+    return Entry(candidate.name, problem.space.dimension, shares[0], shares[1])
+
+
+def _mark_compared(problem: Problem) -> np.ndarray:
+    """Which samples (C, N) are compared: those from each dip on."""
+    counted = problem.drive.weights > 0
+    for e, event in enumerate(problem.events):
+        counted[:, problem.drive.part(e).start :][:, : event.start] = False
+    return counted
+
+
+def _deviations(problem: Problem) -> np.ndarray:
+    """How far what is compared (C, N) is from its mean before each dip."""
+    measured = np.array(problem.drive.measurements)
+    for e, event in enumerate(problem.events):
+        part = measured[:, problem.drive.part(e)]
+        part -= part[:, event.steady].mean(axis=1, keepdims=True)
+    return measured
+
+
+def _response(problem: Problem, counted: np.ndarray) -> float:
+    """The load's response from each dip on: the sum of its squares [pu²]."""
+    return max(float(np.sum(_deviations(problem)[counted] ** 2)), SMALLEST_DEVIATION**2)
+
+
+def _folds(problem: Problem, counted: np.ndarray) -> Iterator[np.ndarray]:
+    """What is left out in turn, masks (1, N): each event, or stretches of the only one in which the
+    load answers equally much.
+    """
+    samples, drive = np.arange(problem.drive.samples), problem.drive
+    if drive.events > 1:
+        for e in range(drive.events):
+            part = drive.part(e)
+            yield ((samples >= part.start) & (samples < part.stop))[None]
+        return
+    answer = np.cumsum(np.sum(np.where(counted, _deviations(problem), 0.0) ** 2, axis=0))
+    ends = np.searchsorted(answer, answer[-1] * np.arange(1, STRETCHES) / STRETCHES)
+    first = int(np.argmax(counted.any(axis=0)))
+    edges = [first, *ends.tolist(), len(samples)]
+    for begin, end in itertools.pairwise(edges):
+        yield ((samples >= begin) & (samples < end))[None]
