@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # for editors and type checkers; a test holds it to PUBLIC
     from tractexp.api.compose import compose as compose
     from tractexp.api.convert import convert as convert
     from tractexp.api.discrepancy import investigate as investigate
+    from tractexp.api.examples import examples as examples
     from tractexp.api.export import export as export
     from tractexp.api.generalise import generalise as generalise
     from tractexp.api.identify import identify as identify
@@ -42,6 +43,7 @@ PUBLIC = {
     "compare": "tractexp.studies.api.compare",
     "compose": "tractexp.api.compose",
     "convert": "tractexp.api.convert",
+    "examples": "tractexp.api.examples",
     "export": "tractexp.api.export",
     "generalise": "tractexp.api.generalise",
     "identify": "tractexp.api.identify",

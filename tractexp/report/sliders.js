@@ -1,6 +1,9 @@
 const box = document.currentScript.previousElementSibling;
 const canvas = box.querySelector("canvas"), told = box.querySelector("p"), rows = box.querySelector("div");
-const step = content.event[STEP], samples = content.inputs.U.length;
+const step = content.event[STEP], {samples} = content;
+Object.entries(content.inputs).forEach(([name, row]) => {
+  if (!Array.isArray(row)) content.inputs[name] = new Array(samples).fill(row);
+});
 content.inputs.t = content.inputs.U.map((_, i) => i * step);
 const fitted = content.places.map(place => content.given[place]), moved = [...fitted];
 const COLORS = ["#D55E00", "#0072B2"], MEASURED = "#9A9A9A", HEIGHT = 360, LEFT = 56, GAP = 26;

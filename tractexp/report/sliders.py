@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tractexp.api.identify import Identification
 
 MOST_PAGE_STEPS = 20_000  # Runge-Kutta steps of the event: a browser takes some ten milliseconds
-DIGITS = 9  # after the point, of what the page carries
+DIGITS = 7  # after the point, of what the page carries
 
 
 def add_sliders(page: Report, fit: "Identification") -> None:
@@ -79,7 +79,8 @@ def _collect(fit: "Identification") -> dict[str, Any]:
         "bounds": [list(estimates[name].bounds) for name in free],
         "given": [estimates[name].value for name in names] + drive.before[0].tolist(),
         "event": np.nan_to_num(drive.event[0]).tolist(),
-        "inputs": {name: _round(row) for name, row in rows.items() if name != "t"},
+        "samples": len(record.t),
+        "inputs": {name: _pack(row) for name, row in rows.items() if name != "t"},
         "first": float(record.t[0]),
         "measured": [
             [x if np.isfinite(x) else None for x in _round(getattr(record, c))] for c in "PQ"
@@ -87,6 +88,11 @@ def _collect(fit: "Identification") -> dict[str, Any]:
         "substeps": substeps,
         "scale": own.power if own.in_mva else None,
     }
+
+
+def _pack(row: np.ndarray) -> list[float] | float:
+    """A row of the inputs; one number where it stands still."""
+    return float(row[0]) if np.all(row == row[0]) else _round(row)
 
 
 def _round(values: np.ndarray) -> list[float]:
