@@ -6,6 +6,7 @@ Whatever the text holds, what is read back is the text, and nothing of it is obe
 
 import html as _html
 import json
+import os
 import re
 import shlex
 from collections.abc import Mapping
@@ -13,6 +14,8 @@ from typing import Any
 
 # what OmegaConf replaces, and the backslashes that keep it from that
 INTERPOLATION = re.compile(r"(\\*)\$\{")
+# what neither cmd.exe nor PowerShell reads as more than letters
+WINDOWS_WORD = re.compile(r"[\w.=:/\\+-]+")
 MARKDOWN = frozenset("\\`*_<>[]|$~&#")
 # what begins a formula where a spreadsheet opens a table
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
@@ -116,8 +119,26 @@ def comment(text: str) -> str:
 
 
 def shell(*words: str) -> str:
-    """A command as a shell takes it."""
-    return shlex.join(words)
+    """A command as a shell of this system takes it."""
+    return windows_shell(*words) if os.name == "nt" else shlex.join(words)
+
+
+def windows_shell(*words: str) -> str:
+    """A command as cmd.exe and PowerShell take it, both: single quotes are letters to the one, and
+    a comma ends a word for the other.
+
+    A backslash is one but before a quote. What cmd.exe puts in for %NAME%, and PowerShell for
+    $NAME, no quotes of both keep from that.
+    """
+    return " ".join(map(_quote_for_windows, words))
+
+
+def _quote_for_windows(word: str) -> str:
+    if WINDOWS_WORD.fullmatch(word):
+        return word
+    escaped = re.sub(r'(\\*)"', r'\1\1\\"', word)
+    closed = re.sub(r"(\\+)$", r"\1\1", escaped)
+    return f'"{closed}"'
 
 
 def csv(text: str) -> str:

@@ -104,3 +104,20 @@ def test_a_row_of_csv_keeps_the_name_in_its_cell(name):
     ((first, second),) = csv.reader(io.StringIO(f"{quoting.csv(name)},1\r\n", newline=""))
     assert (first.removeprefix("'") if first != name else first, second) == (name, "1")
     assert not first.startswith(quoting.FORMULA)
+
+
+@pytest.mark.parametrize(
+    ("word", "quoted"),
+    [
+        ("data.path=C:\\records\\a.cfg", "data.path=C:\\records\\a.cfg"),
+        ("data.voltages=[4,5,6]", '"data.voltages=[4,5,6]"'),
+        ("data.path=C:\\my records\\", '"data.path=C:\\my records\\\\"'),
+        ('say "so"', '"say \\"so\\""'),
+        ('a\\"b', '"a\\\\\\"b"'),
+        ("it's", '"it\'s"'),
+        ("", '""'),
+    ],
+)
+def test_a_word_for_both_shells_of_windows(word, quoted):
+    """As the C runtime of Windows reads its command line: 2n backslashes before a quote are n."""
+    assert quoting.windows_shell("tractexp", word) == f"tractexp {quoted}"
