@@ -330,11 +330,18 @@ def test_a_page_logged_elsewhere_is_told_how_to_be_seen(tmp_path, empty_store):
     assert set(run.metrics) == {"median issa population:30", "median issa population:50"}
 
 
-def test_a_store_without_runs_opens_on_the_plain_page(uri):
-    assert comparison_view(uri) == ""
+def test_a_store_without_identifications_opens_on_what_it_has(uri):
+    """Never on MLflow's plain address, which opens a page on language models."""
+    assert comparison_view(uri) == "#/experiments?workflowType=machine_learning"
+    tracking.log(tracking.TrackedRun("discrepancy", "r"), uri)
+    assert re.fullmatch(
+        r"#/experiments/\d+/runs\?viewStateShareKey=tractexp&compareRunsMode=TABLE"
+        "&workflowType=machine_learning",
+        comparison_view(uri),
+    )
 
 
-def test_a_view_that_cannot_be_stored_opens_on_the_plain_page(monkeypatch, capsys):
+def test_a_view_that_cannot_be_stored_opens_on_the_list_of_experiments(monkeypatch, capsys):
     from tractexp.cli import ui
     from tractexp.tracking import view
 
@@ -342,7 +349,7 @@ def test_a_view_that_cannot_be_stored_opens_on_the_plain_page(monkeypatch, capsy
         raise UserError("the store is of another version")
 
     monkeypatch.setattr(view, "comparison_view", refuse)
-    assert ui._page("sqlite:///x.db") == ""
+    assert ui._page("sqlite:///x.db") == view.EXPERIMENTS
     assert (
         "because the comparison view could not be stored: the store is of another version"
         in capsys.readouterr().out

@@ -55,7 +55,7 @@ def test_the_page_tells_of_what_has_ended_while_the_sweep_goes_on(watched):
     done = run_command(*ASKED, CALLBACK, "optimizer=pso,ssa", "seed=3,4", cwd=watched)
     assert done.returncode == 0, done.stderr
     page = watched / "sweep" / "sweep.html"
-    assert f"to watch it: {page}" in done.stdout
+    assert f"to watch it: {page.as_uri()}" in done.stdout
     before, first, *_, third = [(watched / f"page{k}.html").read_text() for k in range(4)]
     for text, told in ((before, "0 of 4 jobs"), (first, "1 of 4 jobs"), (third, "3 of 4 jobs")):
         assert told in text

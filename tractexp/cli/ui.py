@@ -29,14 +29,17 @@ def ui(arguments: list[str]) -> int:
 
 
 def _page(uri: str) -> str:
-    """The view of the comparison; the plain page where the store cannot keep it."""
-    from tractexp.tracking.view import comparison_view
+    """The view of the comparison; the list of experiments where the store cannot keep it.
+
+    MLflow's plain address opens a page on language models.
+    """
+    from tractexp.tracking.view import EXPERIMENTS, comparison_view
 
     try:
         return comparison_view(uri)
     except UserError as error:
         print(
-            "tractexp ui: opens on MLflow's plain page, because the comparison view could not be"
-            f" stored: {error}"
+            "tractexp ui: opens on the list of experiments, because the comparison view could not"
+            f" be stored: {error}"
         )
-        return ""
+        return EXPERIMENTS

@@ -99,7 +99,7 @@ class Grid(Sweeper):
                 for name in PAGES:
                     (folder / name).unlink(missing_ok=True)
             files.write(folder / MULTIRUN, OmegaConf.to_yaml(self.config))
-            say(f"  to watch it: {folder / PAGE}")
+            say(f"  to watch it: {(folder / PAGE).absolute().as_uri()}")
             self.page = LivePage(folder)
             self.page.add(jobs, remaining)
             with (

@@ -19,6 +19,7 @@ KEY = "tractexp"
 # Else MLflow's page is one for language models: in earlier versions by this tag of an experiment,
 # in later ones by the address.
 WORKFLOW = "workflowType=machine_learning"
+EXPERIMENTS = f"#/experiments?{WORKFLOW}"  # the address of their list within MLflow's page
 KIND, MODELS = "mlflow.experimentKind", "custom_model_development"
 TAG = f"mlflow.sharedViewState.{KEY}"
 SECTION = "tractexp-charts"
@@ -178,14 +179,18 @@ def comparison_view(uri: str) -> str:
     """Store the view in the experiment that has the newest identification, and return its page for
     `serve`.
 
-    "" where nothing was identified yet.
+    Where nothing was identified yet, it is the table of the newest runs; without any, the list of
+    experiments.
     """
     client = open_store(uri)
     with sentences(uri):
         names = {one.experiment_id: one.name for one in client.search_experiments()}
-        newest = client.search_runs(list(names), RUNS, max_results=1, order_by=["start_time DESC"])
+        newest, others = (
+            client.search_runs(list(names), runs, max_results=1, order_by=["start_time DESC"])
+            for runs in (RUNS, "")
+        )
         if not newest:
-            return ""
+            return page(others[0].info.experiment_id, "TABLE") if others else EXPERIMENTS
         experiment_id = newest[0].info.experiment_id
         runs = client.search_runs(
             [experiment_id], RUNS, max_results=1000, order_by=["start_time DESC"]
