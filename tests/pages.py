@@ -66,10 +66,16 @@ def read(path) -> Reader:
 
 def charts(text):
     """What the charts of a page's text draw, from the top."""
-    return [
+    made = [
         json.loads(data)
         for data in re.findall(r'<script type="application/json">([^<]*)</script>', text)
     ]
+    for chart in made:
+        for trace in chart["data"]:
+            for key in ("x", "y"):
+                if isinstance(trace.get(key), dict) and "array" in trace[key]:
+                    trace[key] = chart["arrays"][trace[key]["array"]]
+    return made
 
 
 def unpacked(packed):

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from pages import unpacked
+from pages import charts, unpacked
 
 from tractexp.blocks.chart import MOST_LINE_POINTS, Chart
 
@@ -107,3 +107,14 @@ def test_a_shade_may_have_a_word_at_its_top():
     layout = Chart("t", ["a", "b"]).shade(1.0, 2.0, BLUE, text="dip <1>").plain()["layout"]
     (note,) = layout["annotations"]
     assert (note["text"], note["x"], note["yref"]) == ("dip &lt;1&gt;", 1.0, "paper")
+
+
+def test_curves_of_one_record_have_their_times_once():
+    t = np.arange(0, 1, 0.001)
+    chart = Chart("t [s]", ["P", "Q"]).line("P", t, t, BLUE).line("Q", t, 2 * t, BLUE, 1)
+    element = chart.element("two")
+    assert element.count('"dtype":"f8"') == 1
+    first, second = charts(element)[0]["data"]
+    assert np.array_equal(unpacked(first["x"]), t)
+    assert np.array_equal(unpacked(second["x"]), t)
+    assert np.array_equal(unpacked(second["y"]), (2 * t).astype("f4"))

@@ -94,7 +94,10 @@ const zoomed = chart => {
   Plotly.restyle(chart, {x: made.map(m => m.x), y: made.map(m => m.y)}, picked);
 };
 const draw = chart => {
-  const {data, layout, cursor} = JSON.parse(chart.nextElementSibling.textContent);
+  const {data, layout, cursor, arrays} = JSON.parse(chart.nextElementSibling.textContent);
+  data.forEach(trace => ["x", "y"].forEach(key => {
+    if (trace[key] && trace[key].array !== undefined) trace[key] = {...arrays[trace[key].array]};
+  }));
   const sampled = data.filter(trace => trace.samples);
   const [from, to] = (layout.xaxis.range || [-Infinity, Infinity]).map(Number);
   sampled.forEach(trace => { unpack(trace.samples); Object.assign(trace, seen(trace.samples, from, to)); });

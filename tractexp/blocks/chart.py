@@ -515,7 +515,7 @@ class Chart:
 
     def element(self, label: str) -> str:
         """The chart as HTML, told to screen readers as `label`."""
-        data = quoting.script(self.plain())
+        data = quoting.script(_share_arrays(self.plain()))
         kind = "readout arrows" if any("phasor" in trace for trace in self._data) else "readout"
         above = "" if self._cursor is None else f'<div class="{kind}"></div>'
         return (
@@ -543,6 +543,26 @@ class Chart:
         }
         self._data.append(trace | more)
         return self
+
+
+def _share_arrays(plain: dict[str, Any]) -> dict[str, Any]:
+    """A chart whose traces name their packed arrays by number: curves of one record have their
+    times once.
+    """
+    arrays: list[dict[str, str]] = []
+
+    def share(value: Any) -> Any:
+        if not (isinstance(value, dict) and "bdata" in value):
+            return value
+        if value not in arrays:
+            arrays.append(value)
+        return {"array": arrays.index(value)}
+
+    traces = [
+        {key: share(value) if key in ("x", "y") else value for key, value in trace.items()}
+        for trace in plain["data"]
+    ]
+    return {**plain, "data": traces, "arrays": arrays}
 
 
 def _short(name: str) -> str:
