@@ -24,6 +24,7 @@ LARGEST_JITTER = 0.01  # of a step: times closer than this to a uniform grid cou
 # s: at coarser sampling a dip of 100 ms has fewer than two samples, and a transient time constant
 # T' of 50 to 300 ms cannot be identified. The slowest phasor units that record dips send 25 per
 # second.
+LEAST_STEP_OF_MS = 0.5  # s: where steps are longer, t may be in ms
 LONGEST_STEP = 0.05
 SELDOM = 0.05  # of the steps: where more than these are odd, a simulator chose them
 # of a step: a step so close to a multiple of the usual one is of missing rows
@@ -403,16 +404,15 @@ class Record:
         if span < 1 / self.base.frequency:
             raise UserError(
                 f"{self.where}: the record lasts {span:.3g} s, less than one cycle of"
-                f" {self.base.frequency:g} Hz; t "
-                f"must be in seconds ({DATA.units}={{t: ms}} says else)"
+                f" {self.base.frequency:g} Hz; t must be in seconds, or its heading say its unit"
             )
         if self.step > LONGEST_STEP:
+            in_ms = self.step >= LEAST_STEP_OF_MS
+            hint = f"; t must be in seconds (where it is in ms: {DATA.units}={{t: ms}})"
             raise UserError(
                 f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a"
-                " dip within 50 to "
-                f"300 ms, so at least {1 / LONGEST_STEP:g} samples per second are needed; t must be"
-                " in "
-                f"seconds (where a table has ms: {DATA.units}={{t: ms}})"
+                f" dip within 50 to 300 ms, so at least {1 / LONGEST_STEP:g} samples per second are"
+                f" needed{hint if in_ms else ''}"
             )
 
     def _check_per_unit(self) -> None:

@@ -268,7 +268,10 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     """The loads of a recording as they are proposed, each with what happened to it; `reader` is
     that of its file.
     """
-    feeders = propose(recording)
+    feeders = [
+        replace(feeder, reverse_current=feeder.reverse_current != reader.reverse_current)
+        for feeder in propose(recording)
+    ]
     if not feeders:
         return [sight(reader, recording, bus) for bus in buses_alone(recording)]
     loaded = any(feeder.loaded for feeder in feeders)
@@ -312,7 +315,8 @@ def sight(
     """
     bus = bus or _Bus()
     phasors, changes, said, dead, brief = [], [], [], list[int](), list[bool]()
-    blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
+    settings = {**feeder.settings, "reverse_current": feeder.reverse_current}
+    blank = Sight(feeder.name or "load", feeder=feeder, settings=settings)
     if feeder.currents and any(
         in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)
     ):
