@@ -361,10 +361,11 @@ def sight(
     unexamined = "; ".join(said) if said and (not phasors or TOO_SHORT in said) else ""
     if events and phasors and (slow := _describe_slow_segments(recording)):
         unexamined = unexamined or ("" if changes else f"{slow}; the rest shows nothing")
-        said.append(f"{slow}: not examined")
+        feeder = replace(feeder, why=(*feeder.why, f"{slow}: not examined"))
     secondary = secondary_of(recording, feeder.channels)
     shown = replace(
         blank,
+        feeder=feeder,
         phasors=tuple(phasors),
         events=tuple(numbered),
         said=tuple(said),

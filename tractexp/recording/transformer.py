@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 
 LEAST_RATIO = 1.5  # of the two currents: what is nearer has the same voltage
 SAME_CURRENT = "no load here: the same current"
+MAYBE_SAME = "at all times the same current"
+OR_ALIKE = (
+    ": a load just like it, or that load itself on the other side of a transformer, where its MW at"
+    " these voltages are wrong"
+)
 # of the larger current: what a magnetizing current and two recorders leave at most where names say
 # the sides; where only the waves do, next to nothing may be left
 LARGEST_REST = {True: 0.05, False: 0.003}
@@ -31,6 +36,7 @@ LARGEST_DISTRIBUTION = 60.0  # kV: where sizes do not decide, up to it the low s
 HIGH = r"hv|high|hs|os|prim|primary|ht|at|вн|高压|高侧"
 LOW = r"lv|low|us|sec|secondary|bt|mv|нн|сн|低压|低侧|中压"
 SIDE = re.compile(rf"(?<![^\W\d_])(?:({HIGH})|({LOW}))(?![^\W\d_])|(高压|高侧)|(低压|低侧|中压)")
+WINDING = re.compile(r"(?<![^\W\d_])(?:w|wdg|winding|wicklung|side|seite)[ _-]?\d|обмотк|侧")
 FEEDER = re.compile(
     r"(?<![^\W\d_])[fl]\d|feeder|line|lign|linie|línea|linea|abgang|load|last|线|фидер|отход|вл"
 )
@@ -44,7 +50,7 @@ def mark_other_sides(
     load, and both say so.
     """
     marked = list(feeders)
-    for high, low in _find_same_currents(recording, phasors, feeders):
+    for high, low, sure in _find_same_currents(recording, phasors, feeders):
         if not (marked[high].loaded and marked[low].loaded):
             continue
         kept, other = (
@@ -54,10 +60,13 @@ def mark_other_sides(
         )
         ratio = _size(phasors, marked[low]) / _size(phasors, marked[high])
         share = ratio if other == low else 1 / ratio
+        if not sure:
+            said = f"{MAYBE_SAME} as that of {marked[kept].name} times {share:.3g}{OR_ALIKE}"
+            marked[other] = replace(marked[other], why=(*marked[other].why, said))
+            continue
         said = (
             f"{SAME_CURRENT} as that of {marked[kept].name} times {share:.3g}, on the other side of"
-            " a transformer, whose voltage is not recorded (a load just like it is read by its own"
-            " channels)"
+            " a transformer, whose voltage is not recorded"
         )
         marked[other] = replace(marked[other], why=(*marked[other].why, said), loaded=False)
         said = (
@@ -75,12 +84,12 @@ def _size(phasors: Snapshots, feeder: "Feeder") -> float:
 
 def _find_same_currents(
     recording: Recording, phasors: Snapshots, feeders: "Sequence[Feeder]"
-) -> list[tuple[int, int]]:
+) -> list[tuple[int, int, bool]]:
     """Pairs (high, low side) of feeders at the same voltages whose currents are one at all times,
-    but for a ratio and the turn of a vector group.
+    but for a ratio and the turn of a vector group, and whether that is sure.
 
-    Where no name says the sides, a turn of 30 degrees tells them from feeders of like loads, or a
-    turn of 180 degrees, or that there are no more than the two and no name calls them feeders.
+    Where no name says the sides, nor calls them windings, a turn of 30 degrees tells them from
+    feeders of like loads. The only two of a bus that no name calls feeders may be either.
     """
     buses: dict[tuple[int, ...], list[int]] = {}
     for k, f in enumerate(feeders):
@@ -97,22 +106,14 @@ def _find_same_currents(
             named = _find_sides(recording, feeders[high], feeders[low]) is not None
             alike = rest[a, b] < LARGEST_REST[named]
             alike &= abs(turned[a, b] - 30 * steps) < LARGEST_TURN[named]
-            told = named or steps % 2 or _is_one_of_two(recording, feeders, bus, steps)
-            if alike and UNLOADED * large < small < large / LEAST_RATIO and told:
-                pairs.append((high, low))
+            if not (alike and UNLOADED * large < small < large / LEAST_RATIO):
+                continue
+            texts = [recording.channels[feeders[k].currents[0]].name.lower() for k in (high, low)]
+            windings = all(WINDING.search(text) for text in texts)
+            sure = bool(named or steps % 2 or (windings and steps % 6 == 0))
+            if sure or (len(bus) == 2 and not any(FEEDER.search(text) for text in texts)):
+                pairs.append((high, low, sure))
     return pairs
-
-
-def _is_one_of_two(
-    recording: Recording, feeders: "Sequence[Feeder]", bus: np.ndarray, steps: int
-) -> bool:
-    """Whether the only two currents of a bus, turned by so many times 30 degrees, can be but one:
-    opposite, or not called feeders.
-    """
-    if len(bus) != 2 or steps % 6:
-        return False
-    texts = [recording.channels[feeders[k].currents[0]].name.lower() for k in bus]
-    return bool(steps) or not any(FEEDER.search(text) for text in texts)
 
 
 def _compare_currents(

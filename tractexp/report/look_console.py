@@ -10,7 +10,7 @@ from typing import Any
 from tractexp.blocks import Report, Table
 from tractexp.recording.excursion import HYSTERESIS
 from tractexp.recording.happening import OF_LOADS, name_fallen_phases
-from tractexp.recording.transformer import SAME_CURRENT
+from tractexp.recording.transformer import MAYBE_SAME, SAME_CURRENT
 from tractexp.report import unfitted
 from tractexp.report.look import (
     NO_LOAD,
@@ -93,7 +93,7 @@ def summary(content: Entry) -> Report:
                 f"{feeder['name']}: {said}"
                 for feeder in entry["feeders"]
                 for said in feeder["why"]
-                if said.startswith(SAME_CURRENT)
+                if said.startswith(SAME_CURRENT) or (_worth(feeder) and said.startswith(MAYBE_SAME))
             ]
         )
         page.items(
@@ -132,7 +132,8 @@ def _answer(files: Sequence[Entry]) -> str:
     feeders = [feeder for entry in files for feeder in entry["feeders"]]
     promising = [feeder for feeder in feeders if _worth(feeder)]
     if promising:
-        best = max(promising, key=lambda feeder: _measure_answer(_worth(feeder)[0]))
+        sure = [each for each in promising if not _may_be_another(each)] or promising
+        best = max(sure, key=lambda feeder: _measure_answer(_worth(feeder)[0]))
         # the one fitted by it
         best = next(feeder for feeder in promising if feeder["command"] == best["command"])
         first = _worth(best)[0]
@@ -141,6 +142,11 @@ def _answer(files: Sequence[Entry]) -> str:
         worth = f"is worth fitting{_reservation(first['why'])}{secondary}"
         return f"{_event(first)} of {best['name']} {worth}{command}"
     return "; ".join([_refuse(files), *filter(None, (entry.get("proposed") for entry in files))])
+
+
+def _may_be_another(feeder: Entry) -> bool:
+    """Whether a load may be another one, seen on the other side of a transformer."""
+    return any(said.startswith(MAYBE_SAME) for said in feeder["why"])
 
 
 def _refuse(files: Sequence[Entry]) -> str:
