@@ -117,6 +117,13 @@ def test_the_grade_says_whether_the_model_may_be_used(grade, word):
         tractexp.export(sound, "andes", playback=False)
 
 
+def test_a_value_that_a_bound_holds_is_why_a_model_that_fits_is_unusable():
+    adequacy = {"grade": "adequate", "sentence": "noise alone leaves as much", "p": 0.5}
+    fit = fitted(adequacy=adequacy, verdicts={"T_m": "at its bound: 1"})
+    told = " ".join(" ".join(print_at(fit.screen(), WIDTH)).split())
+    assert "unusable: T_m is held by a bound alone; noise alone leaves as much." in told
+
+
 def test_a_narrow_console_gets_a_sentence_for_each_row():
     table = Table(["parameter", "value", "verdict"], [["T_prime", 0.12345, "identified"]])
     wide, narrow = print_at(Report().add(table), 60), print_at(Report().add(table), 24)

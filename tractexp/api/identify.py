@@ -291,7 +291,13 @@ class Identification(Written):
         """
         if not self.grade:
             return ""
-        return UNUSABLE if self.doubts else USABILITY[Grade(self.grade)]
+        return UNUSABLE if self.doubts else USABILITY.get(self.grade, "")
+
+    @property
+    def usability_reason(self) -> str:
+        """Why it is so: what speaks against it as a load first, then what it is good for."""
+        headline = self.headline
+        return "; ".join(filter(None, [*(d for d in self.doubts if d not in headline), headline]))
 
     @property
     def own_parameters(self) -> list[Estimate]:

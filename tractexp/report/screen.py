@@ -24,8 +24,8 @@ def screen(fit: "Identification") -> Report:
     result = fit.result
     names = [event["name"] for event in result.events if event["role"] == "train"]
     page = Report().text(describe_load(result, names))
-    if fit.headline:
-        page.text(shorten(f"{fit.usability}: {fit.headline}."))
+    if fit.usability:
+        page.text(shorten(f"{fit.usability}: {fit.usability_reason}."))
     page.text("").add(tabulate_parameters(fit))
     if len(rows := fit.own_parameters) > MOST_PARAMETERS:
         page.text(f"{count_noun(len(rows) - MOST_PARAMETERS, 'parameter')} more: --all prints all")

@@ -47,7 +47,7 @@ def sheet(fit: "Identification") -> Report:
         as_sentence(describe_load(result, names).removeprefix("load: ")),
     )
     page.verdict(
-        f"{fit.usability.upper()}. {as_sentence(fit.headline)}".removeprefix(". "),
+        f"{fit.usability.upper()}. {as_sentence(fit.usability_reason)}".removeprefix(". "),
         USES[fit.usability],
         kind={"usable": "good", "unusable": "bad"}.get(fit.usability, "plain"),
     )
