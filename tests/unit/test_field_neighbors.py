@@ -335,3 +335,24 @@ def test_a_table_of_a_direct_voltage_alone_is_said_to_be_one(tmp_path, volts, ri
     with pytest.raises(tractexp.UserError, match=words) as refused:
         tractexp.look(write_table(tmp_path / "u.csv", "t,U [V]", rows), progress=False)
     assert float(re.search(words, str(refused.value))[1]) == pytest.approx(volts, rel=1e-3)
+
+
+def test_a_heading_with_more_names_than_cells_is_told_as_such(tmp_path):
+    rows = [[f"{x:.4f}" for x in row] for row in zip(*slow(), strict=True)]
+    path = write_table(tmp_path / "t.csv", "t,U, kV,P, MW,Q, Mvar", rows)
+    with pytest.raises(
+        tractexp.UserError, match=r"names 7 columns, and line 2 has 4 cells.*quotes"
+    ):
+        tractexp.read(path)
+
+
+@pytest.mark.parametrize("names", ["PhV.phs{}.mag", "V_PH_{}", "MMXU1.PhV.phs{}"])
+def test_names_of_iec_61850_are_phases_to_ground(tmp_path, names):
+    t, U, P, Q = slow()
+    header = ",".join(
+        ["t", *(names.format(p) + " (kV)" for p in "ABC"), "TotW (MW)", "TotVAr (Mvar)"]
+    )
+    E = U / np.sqrt(3)
+    rows = [[f"{x:.6f}" for x in row] for row in zip(t, E, E, E, P, Q, strict=True)]
+    [load], _, _ = loads_of(write_table(tmp_path / "t.csv", header, rows))
+    assert (load["U"], load["P"], load["Q"]) == pytest.approx((110, 20, 8), rel=1e-3)

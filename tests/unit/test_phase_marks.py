@@ -2,12 +2,15 @@
 come out.
 """
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import tractexp
 from tractexp.filetypes import comtrade
-from tractexp.filetypes.columns import role
+from tractexp.filetypes.columns import order_of, role
 from tractexp.recording import Channel, Recording, Segment
 
 ORDERS = ["ABC", "RST", "RYB", "RWB", "UVW", ("L1", "L2", "L3"), "АВС"]
@@ -52,6 +55,46 @@ def read(path, header, columns):
 
 def pairs(order):
     return [(order[k], order[(k + 1) % 3]) for k in range(3)]
+
+
+def test_the_table_of_the_docs_is_true_in_each_order():
+    """Each form of docs/records.md is what its column says, in the letters of each order."""
+    page = (Path(__file__).parents[2] / "docs" / "records.md").read_text()
+    names = page.partition("## Names of phases")[2]
+    row = re.search(r"^\| ABC.*$", names, re.MULTILINE)[0]
+    orders, two, ground, *_ = (cell.strip() for cell in row.strip("|").split("|"))
+    assert {"ABC", "RST", "RYB", "RWB", "UVW"} <= {*re.findall(r"[A-Z]{3}", orders)}
+    told = {True: re.findall(r"`([^`]+)`", two), False: re.findall(r"`([^`]+)`", ground)}
+    assert (len(told[True]), len(told[False])) == (7, 4)
+    for line, forms in told.items():
+        for form in forms:
+            name = form if len(form) > 2 else f"U {form}"
+            for letters in ("ABC", "RST", "RYB", "RWB", "L1L2L3"):
+                marks = re.findall(r"[A-Z]\d?", letters)
+                spelled = _spell(name, marks)
+                units = ["kV"] * len(spelled)
+                roles = [role(one, "kV", order_of(spelled, units)) for one in spelled]
+                assert all(one is not None and one.line is line for one in roles), spelled
+
+
+def _spell(name, marks):
+    """A form of the table in three phases of another order; a form without marks by itself."""
+    first = next(
+        (
+            p
+            for p in (("L1", "L2"), ("R", "Y"), ("a", "b"), ("A", "B"), ("1", "2"))
+            if p[0] in name and (p[1] in name or name[-1:] in "nNG")
+        ),
+        None,
+    )
+    if first is None or name in ("U LL", "U LN") or (first[0] == "1" and len(marks[0]) > 1):
+        return [name]
+    spelled = []
+    for k in range(3):
+        here, there = marks[k], marks[(k + 1) % 3]
+        parts = re.split(f"({first[0]}|{first[1]})", name)
+        spelled.append("".join({first[0]: here, first[1]: there}.get(p, p) for p in parts))
+    return spelled
 
 
 @pytest.mark.parametrize("order", ORDERS, ids="".join)

@@ -241,7 +241,13 @@ class TextTable(TableFile):
             self.notes += (f"line {short[0]}, the last one, is cut short and not used",)
 
     def _describe_ragged_line(self, line: int, cells: int) -> UserError:
-        """The error of a line with more or fewer cells than the others."""
+        """The error of a line with more or fewer cells than the others, or than the names."""
+        named = len(self.heading.names)
+        if cells == self.width != named:
+            return UserError(
+                f"{self.source}: the header line names {named} columns, and line {line} has"
+                f" {count_noun(cells, 'cell')}: put a name that holds '{self.delimiter}' in quotes"
+            )
         return UserError(
             f"{self.source}: line {line} has {count_noun(cells, 'cell')} where the others have"
             f" {self.width}; a "

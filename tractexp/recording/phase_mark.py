@@ -23,6 +23,10 @@ GROUND = r"n|g|e|pe|gnd|neutral|ground|earth|neutro|tierra|terre|erde"
 SAID = (  # what is said in words, and the word that stands for it
     (r"^(?:phase[- ]?voltage|voltage[- ]phase|[uv][ _]?(?:phase|ф))$", "voltage ln"),
     (r"^[uv][ _]?(?:line|лин|л)$", "voltage ll"),
+    # PhV.phsA, PPV.phsAB of IEC 61850, V_PH_A
+    (r"(?<![a-z])phv(?![a-z])", "voltage ln"),
+    (r"(?<![a-z])ppv(?![a-z])", "voltage ll"),
+    (r"(?<![a-z])phs?[ _.]?(?=[abc]{1,2}(?![a-z]))", "phase "),
     (r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:l|line|ph|phase)(?![a-z\d])", " ll "),
     (
         r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:n|g|neutral|ground|earth)(?![a-z\d])",
