@@ -67,7 +67,7 @@ def test_without_it_the_swing_is_told_by_parameter(blind, still):
     assert not low <= TRUTH["T_m"] <= high
     assert still.parameters["T_m"].verdict == "identified"
     assert off <= 1.2 * told["moves"]["T_m"]
-    assert (told["channel"], told["beyond"]) == ("f", ("T_m",))
+    assert (told["channel"], told["beyond"]) == ("f", ["T_m"])
     assert T_m.verdict.startswith("weakly identified: f was not recorded, and a swing of 0.2 Hz")
 
 

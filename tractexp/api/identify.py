@@ -742,7 +742,7 @@ def _conclude_identification(
         starts=starts,
         rival_structures=structures,
         free_optimum=free.to_dict() if free else {},
-        unrecorded=asdict(uncertainty.unrecorded) if uncertainty.unrecorded else {},
+        unrecorded=uncertainty.unrecorded.to_dict() if uncertainty.unrecorded else {},
         advice=advice,
     )
     return result, FitDetails(fits, graded.estimation, uncertainty, together, adequacy)

@@ -9,6 +9,7 @@ it no parameter takes up is no louder than what the fit leaves.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,10 @@ class UnrecordedInput:
     swing: float
     moves: dict[str, float]
     beyond: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `result.json` has it."""
+        return {**vars(self), "beyond": list(self.beyond)}
 
 
 def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
