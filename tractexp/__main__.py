@@ -102,11 +102,13 @@ def _run_with_refusals(arguments: list[str]) -> int:
 
 
 def _print_refusal(sentence: str, code: int = 2) -> int:
+    """Print why a command was refused; its exit code."""
     print(f"tractexp: {one_line(sentence)}", file=sys.stderr)
     return code
 
 
 def _dispatch_command(arguments: list[str]) -> int:
+    """Run a command beside the tasks, or a task; the exit code."""
     for argument in arguments:
         key, equals, _ = argument.partition("://")[0].rpartition("=")
         credentials.check(key if equals else "what is given", argument)
@@ -133,6 +135,7 @@ def _dispatch_command(arguments: list[str]) -> int:
 
 
 def _command(place: str, arguments: list[str]) -> int:
+    """Run the function of a command; the exit code."""
     module, _, function = place.partition(":")
     return getattr(importlib.import_module(module), function)(arguments)
 
@@ -156,6 +159,7 @@ def end_on_signal(*_: object) -> None:
 
 
 def _run(arguments: list[str]) -> int:
+    """Compose the configuration and run its task; the exit code."""
     signal.signal(signal.SIGTERM, end_on_signal)
     if not any(argument.startswith(UNLOGGED) for argument in arguments):
         from tractexp.tracking.process import start_ahead

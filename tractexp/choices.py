@@ -282,6 +282,7 @@ def _tree(module: str) -> ast.Module:
 
 
 def _source(module: str) -> Path | None:
+    """The file of a module; None where it is not there."""
     package, _, name = module.rpartition(".")
     own = [folder / "__init__.py" for folder in _folders(module)]
     return next(

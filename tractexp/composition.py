@@ -101,10 +101,12 @@ def folders() -> list[Path]:
 
 
 def _file(group: str, name: str, places: Iterable[Path]) -> Path | None:
+    """The file of a choice in the first place that has one; None where none has."""
     return next((f for folder in places if (f := folder / group / f"{name}.yaml").is_file()), None)
 
 
 def _content(group: str, file: Path) -> dict[str, Any]:
+    """What a configuration's file holds. Raises `UserError` where it cannot be read."""
     import yaml
 
     try:

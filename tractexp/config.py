@@ -33,6 +33,7 @@ class PluginSearchPath(SearchPathPlugin):
     own: ClassVar[list[Path]] = []  # folders that `-cd` names; Hydra itself would put them last
 
     def manipulate_search_path(self, search_path: Any) -> None:
+        """Add the configurations of plugins, model files and a user's own folders."""
         for folder in plugin.configuration_folders():
             search_path.prepend("tractexp", f"file://{folder}", "main")
         search_path.prepend("tractexp", f"{ModelFiles.scheme()}://", "main")
@@ -47,23 +48,29 @@ class ModelFiles(ConfigSource):
 
     @staticmethod
     def scheme() -> str:
+        """The scheme by which Hydra finds this source."""
         return "tractexp-model"
 
     def load_config(self, config_path: str) -> ConfigResult:
+        """The configuration of a model's file."""
         content = OmegaConf.create(read_model_file(config_path.removeprefix(f"{MODEL}/")))
         return ConfigResult(self.provider, self.full_path(), content, {"package": None})
 
     def is_config(self, config_path: str) -> bool:
+        """Whether a path is that of a model's file."""
         group, _, name = config_path.partition("/")
         return group == MODEL and is_model_path(name) and Path(name).is_absolute()
 
     def is_group(self, config_path: str) -> bool:
+        """False: there are no groups."""
         return False
 
     def available(self) -> bool:
+        """True: files are always there to be read."""
         return True
 
     def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
+        """[]: nothing is listed."""
         return []
 
 
@@ -120,6 +127,7 @@ def _list_offered() -> dict[str, set[str]]:
 
 
 def _schema_of(group: str, name: str) -> type:
+    """The dataclass that a plugin's configuration is checked against."""
     return plugin.schema(plugin.get(group, name))
 
 

@@ -42,6 +42,7 @@ def check_kind(name: str, value: Any, annotation: Any) -> None:
 
 
 def _is(value: Any, kind: Any) -> bool:
+    """Whether a value is of a kind, as annotations write it."""
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
         return any(_is(value, one) for one in inner)
@@ -57,6 +58,7 @@ def _is(value: Any, kind: Any) -> bool:
 
 
 def _word(kind: Any) -> str:
+    """A kind in words."""
     origin = get_origin(kind)
     if origin in (Sequence, list, tuple):
         return f"a list, each {_word(get_args(kind)[0])}"
@@ -71,4 +73,5 @@ def _kind(value: Any) -> str:
 
 
 def _article(name: str) -> str:
+    """A name with its article."""
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"

@@ -18,6 +18,7 @@ class Outlet(io.FileIO):
     fault: OSError | None = None
 
     def write(self, data: object, /) -> int:
+        """Write what is printed; where that fails, keep why and go on."""
         if self.fault is None:
             try:
                 return super().write(data)  # type: ignore[arg-type]

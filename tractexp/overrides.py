@@ -275,6 +275,7 @@ def _bare(value: str) -> bool:
 
 
 def _plain(value: object) -> str:
+    """A value as Hydra reads it, with quotes where it needs some."""
     if isinstance(value, Mapping):
         return f"{{{','.join(f'{key}:{_plain(inner)}' for key, inner in value.items())}}}"
     if isinstance(value, str):
@@ -291,10 +292,12 @@ def _read_by_hydra(argument: str, value: str) -> bool:
 
 
 def _names_a_file(value: str) -> bool:
+    """Whether a value is the path of a file that is there."""
     return bool(value) and files.exists(value)
 
 
 def _parses(argument: str) -> bool:
+    """Whether Hydra can read an argument."""
     from hydra.core.override_parser.overrides_parser import OverridesParser
     from hydra.errors import HydraException
 
@@ -313,6 +316,7 @@ def _quote_override_value(value: str) -> str:
 
 
 def _element(text: str) -> str:
+    """An element of a list, with quotes where it needs some."""
     quoted = len(text) > 1 and text[0] == text[-1] and text[0] in "'\""
     return text if quoted or PLAIN.fullmatch(text) else _quote_override_value(text)
 

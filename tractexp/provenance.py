@@ -44,6 +44,7 @@ def commit(folder: Path = PACKAGE) -> str:
 
 
 def _git(folder: Path, *command: str) -> str:
+    """What git prints for a command in a folder."""
     done = subprocess.run(
         ["git", *command], cwd=folder, capture_output=True, text=True, timeout=5, check=True
     )
@@ -155,6 +156,9 @@ def _not_taken_over(argument: str) -> bool:
 
 
 def _repeat_settings(settings: Collection[str], of: Collection[str]) -> str:
+    """The arguments of this run that another command repeats, for groups `of` and without those set
+    anew.
+    """
     arguments, others = _started[1:], {setting.partition("=")[0] for setting in settings}
     if {"-m", "--multirun"} & {*arguments}:
         arguments = []

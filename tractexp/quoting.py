@@ -34,6 +34,7 @@ def python(text: str) -> str:
 
 
 def _code(point: int) -> str:
+    """A character as an escape of Python."""
     return (
         f"\\x{point:02x}"
         if point < 0x100
@@ -106,6 +107,7 @@ def yaml(content: Mapping[str, Any]) -> str:
 
 
 def _literal(content: Any) -> Any:
+    """Plain data whose texts OmegaConf does not interpolate."""
     if isinstance(content, Mapping):
         return {key: _literal(value) for key, value in content.items()}
     if isinstance(content, list | tuple):

@@ -70,6 +70,7 @@ def _of_hydra(error: BaseException) -> bool:
 
 
 def _unforeseen(error: BaseException) -> str:
+    """What an error of Hydra's says that no rule of ours knows."""
     if isinstance(error, RecursionError):
         return (
             "an argument has brackets within brackets, or a reference to itself, deeper than can be"
@@ -98,11 +99,13 @@ def _argument(error: BaseException | None) -> str | None:
 
 
 def _short(text: object) -> str:
+    """A text on one line, cut where it is long."""
     text = " ".join(str(text).split())
     return text if len(text) <= LONGEST_REPEATED_VALUE else f"{text[:LONGEST_REPEATED_VALUE]}…"
 
 
 def _describe_missing_choice(error: Any) -> str:
+    """That a choice is not there, with those that are."""
     name = str(error.missing_cfg_file or "")
     group, _, choice = name.rpartition("/")
     options = [o for o in error.options or () if not o.startswith("_")]
@@ -115,6 +118,7 @@ def _describe_missing_choice(error: Any) -> str:
 
 
 def _sentence(error: BaseException) -> str:
+    """The sentence of an error, by what caused it."""
     chain = [error]
     while (
         cause := chain[-1].__cause__ or chain[-1].__context__
@@ -135,6 +139,7 @@ def _sentence(error: BaseException) -> str:
 
 
 def _key_of(error: BaseException) -> str:
+    """The key of the argument that an error is about."""
     return (_argument(error) or "").lstrip("+~").partition("=")[0]
 
 
@@ -200,6 +205,7 @@ def _plain(error: BaseException) -> str:
 
 
 def _unknown_key(key: str, error: Any) -> str:
+    """That a key is not there, with those that are."""
     parent = getattr(error, "parent_node", None)
     try:
         keys = sorted(map(str, parent.keys())) if parent is not None else []
@@ -211,10 +217,12 @@ def _unknown_key(key: str, error: Any) -> str:
 
 
 def _groups() -> list[str]:
+    """The groups that a choice can be made in."""
     from tractexp.plugin import discover
 
     return sorted({*discover(), "model", "experiment"})
 
 
 def _first_line(error: BaseException) -> str:
+    """The first line of an error, or its class."""
     return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__

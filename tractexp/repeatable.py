@@ -47,4 +47,5 @@ def refusal(setting: str) -> str:
 
 
 def _is_listed(key: str) -> bool:
+    """Whether a key is one that may be repeated."""
     return key in (*CHOICES, *VALUES) or key.startswith(PARTS)

@@ -108,6 +108,7 @@ class RunFolder:
             shutil.rmtree(self.folder, ignore_errors=True)
 
     def _commit(self) -> None:
+        """Say which results of an earlier run go, then move the new ones in."""
         new = {path.name for path in self.next.iterdir()}
         keeps = {path.name for path in self.read if path.parent == self.folder.absolute()}
         goes = [name for name in RESULTS if CONFIGURATION in new and name not in new | keeps]
@@ -169,6 +170,7 @@ def find_holder(folder: Path) -> str:
 
 
 def _describe_process() -> str:
+    """This process, for whoever finds its lock."""
     return f"process {os.getpid()} on {socket.gethostname()}, "
 
 

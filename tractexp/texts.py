@@ -40,6 +40,7 @@ def text_in(module: str, settings: str, generate: Callable[[], str], what: str) 
 
 
 def _store_text(key: str, generate: Callable[[], str]) -> str:
+    """The text of that key, made once."""
     return TEXTS.get(key, lambda: generate().encode()).decode()
 
 

@@ -76,6 +76,7 @@ Values are changed by KEY=VALUE
 
 
 def usage() -> str:
+    """What `tractexp --help` prints."""
     options = choices()
     tasks = {
         name: re.split("[:;] ", options["task"][name].about)[0]
@@ -214,6 +215,7 @@ def _summary(group: str, names: Mapping[str, Option]) -> str:
 
 
 def _order_groups(options: Mapping[str, object]) -> list[str]:
+    """The groups, those that a person chooses in first."""
     return [*(group for group in GROUPS if group in options), *sorted(options.keys() - GROUPS)]
 
 

@@ -156,6 +156,7 @@ class Workers:
 
 
 def _number_result(function: Callable[[Any], Any], k: int, item: Any) -> tuple[int, Any]:
+    """The position of an item, and what a function gives for it."""
     return k, function(item)
 
 
@@ -201,6 +202,7 @@ def end_with_parent() -> None:
 
 
 def _end_with(parent: Any) -> None:
+    """Wait for the parent's end, and end."""
     if os.name == "nt":
         parent.join()
     # elsewhere loky hands down nothing to wait for

@@ -152,6 +152,7 @@ def _name(entry: zipfile.ZipInfo) -> str:
 
 
 def _decode(raw: bytes) -> str:
+    """A name in the encoding that it most likely has."""
     for encoding in ("utf-8", "gbk"):
         with contextlib.suppress(UnicodeError):
             return raw.decode(encoding)
@@ -159,6 +160,7 @@ def _decode(raw: bytes) -> str:
 
 
 def _is_link(entry: zipfile.ZipInfo) -> bool:
+    """Whether an entry is a symbolic link."""
     return stat.S_ISLNK(entry.external_attr >> 16)
 
 
@@ -170,6 +172,7 @@ def size(archive: Path, name: str) -> int:
 
 
 def _entry(archive: Path, name: str) -> zipfile.ZipInfo:
+    """The entry of that name. Raises FileNotFoundError where there is none."""
     entry = members(archive).get(name)
     if entry is None:
         raise FileNotFoundError(2, "there is no such file", os.path.join(archive, name))

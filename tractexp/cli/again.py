@@ -88,6 +88,7 @@ def merge_settings(arguments: Iterable[str], settings: Iterable[str], folder: Pa
 
 
 def _key(text: str) -> str:
+    """The key of a setting."""
     return text.partition("=")[0].lstrip("+~").partition("@")[0]
 
 

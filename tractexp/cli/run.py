@@ -54,6 +54,7 @@ def run(config: Any) -> None:
 
 
 def _how(stop: KeyboardInterrupt) -> str:
+    """How a run was ended."""
     return "ended by SIGTERM" if getattr(stop, "code", 130) == TERMINATED else "interrupted"
 
 

@@ -38,6 +38,7 @@ class Later(ConfigNode):
     """A node of the store that is made when it is read."""
 
     def __init__(self, name: str, group: str, schema: Callable[[], type]):
+        """A configuration whose schema is made when it is asked for."""
         self.name, self.group, self.package, self.provider, self.schema = (
             name,
             group,
@@ -47,6 +48,7 @@ class Later(ConfigNode):
         )
 
     def __getattr__(self, name: str) -> Any:
+        """The node, made at its first use."""
         if name != "node":
             raise AttributeError(name)
         self.node = OmegaConf.structured(self.schema())

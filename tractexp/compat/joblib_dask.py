@@ -21,15 +21,18 @@ class Dask(DaskDistributedBackend):
     """
 
     def configure(self, *args: Any, **settings: Any) -> int:
+        """Two workers at least: with one joblib would run calls in this process."""
         return max(2, super().configure(*args, **settings))
 
     def submit(self, func: Any, callback: Any = None) -> Any:
+        """Submit a call; the callback hears of a failed one, too."""
         future = super().submit(func, callback)
         if callback is not None:
             future.add_done_callback(lambda done: done.exception() and callback(done))
         return future
 
     def retrieve_result_callback(self, out: Any) -> Any:
+        """The result of a call; [None] where its worker was killed."""
         if not isinstance(out, Future):
             return super().retrieve_result_callback(out)
         if type(out.exception()).__name__ == "KilledWorker":

@@ -25,6 +25,7 @@ class OwnOrigin:
     """A web application (ASGI) that answers pages of some origins only."""
 
     def __init__(self, app: Callable[..., Awaitable[None]], origins: frozenset[str]):
+        """An application that answers requests from these origins only."""
         self.app, self.origins = app, origins
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:

@@ -59,6 +59,7 @@ class AllEvents:
 
     @functools.cached_property
     def context(self) -> Context:
+        """The context of all events, those held out among them."""
         records = self.fitted.records
         return self.fitted.move_to_records(
             Records.from_events((*records.recorded, *self.events), records.window)
@@ -66,6 +67,9 @@ class AllEvents:
 
     @functools.cached_property
     def quiet(self) -> QuietNoise:
+        """The noise of all events' quiet stretches, beside the base model as it was fitted
+        alone.
+        """
         return QuietNoise.from_context(
             self.context, self.context.coordinates.widen_coordinates(self.bare.unit)
         )
@@ -150,6 +154,9 @@ class AllEvents:
         return disagreement(fitted_from(self.context, wide, wide[1:]), seed).p_left
 
     def _refit(self, alone: Refit, *, anew: bool) -> list[Refit]:
+        """A set fitted to all events, from where it was fitted alone; `anew` from every setting of
+        its scanned parameters, too.
+        """
         at, settings = self.context.coordinates, list[Mapping[str, float]]([{}])
         if anew:  # from every setting of the scanned parameters of one of the effects, too
             settings += itertools.chain.from_iterable(
@@ -162,9 +169,13 @@ class AllEvents:
         return (wide_refit if anew else refit)(self.context, self.level, wanted, self.faults)
 
     def _narrow(self, fit: Refit) -> np.ndarray:
+        """The coordinates of a fit without the held-out events' own."""
         return fit.unit[: self.fitted.coordinates.dimension]
 
     def _measure(self, fit: Refit, alone: Refit, seed: int) -> JointFit:
+        """A set on all events: how much louder it is there than on the fitted ones, and p of what
+        it leaves.
+        """
         louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
         p_left = examine_fit(self.quiet, fit, self.level, seed, plain=True).p_left
         return JointFit(replace(fit, unit=self._narrow(fit)), louder, p_left)

@@ -29,6 +29,7 @@ NAMING_SHARE = 0.4
 def _criterion(
     default: float, bounds: tuple[float, float], about: str, origin: str, why: str
 ) -> Any:
+    """A threshold with its bounds, its meaning, and where its value comes from."""
     return dataclasses.field(
         default=default, metadata={"bounds": bounds, "about": about, "origin": origin, "why": why}
     )
@@ -104,6 +105,7 @@ class Criteria:
     )
 
     def __post_init__(self) -> None:
+        """Raise `UserError` for a threshold out of range."""
         for item in dataclasses.fields(self):
             section = "task" if item.name == "false_alarms" else "task.criteria"
             check_range(

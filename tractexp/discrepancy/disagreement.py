@@ -55,6 +55,7 @@ class Disagreement:
 
     @property
     def context(self) -> Context:
+        """The events and models that it was found on."""
         return self.tangent.context
 
     def score_fit(self, context: Context, fit: Refit, noise: Noise) -> "Disagreement":
@@ -65,6 +66,7 @@ class Disagreement:
 
     @property
     def criteria(self) -> Criteria:
+        """The thresholds that decide."""
         return self.context.criteria
 
     @functools.cached_property
@@ -140,6 +142,7 @@ class Disagreement:
 
 
 def disagreement(base: BaseFit, seed: int) -> Disagreement:
+    """The disagreement of the base model with the records."""
     return examine_fit(base.quiet, base.fit, base.noise, seed)
 
 

@@ -159,6 +159,7 @@ def gaps(investigation: Findings) -> dict[str, Any]:
 
 
 def _graded_gap(before: Misfit, after: Misfit, ranked: GapTest | None) -> dict[str, Any]:
+    """The gap between two graded models, with the deviance of the ranked fits beside it."""
     was, now = (
         (None, None)
         if ranked is None
@@ -173,6 +174,7 @@ def _graded_gap(before: Misfit, after: Misfit, ranked: GapTest | None) -> dict[s
 
 
 def _misfit(misfit: Misfit, chi2: float | None) -> dict[str, Any]:
+    """The errors of a graded model."""
     own = {} if misfit.epsilon_i is None else {"epsilon_i": misfit.epsilon_i}
     errors = {"epsilon_p": misfit.epsilon_p, "epsilon_q": misfit.epsilon_q}
     return files.plain(
@@ -181,6 +183,7 @@ def _misfit(misfit: Misfit, chi2: float | None) -> dict[str, Any]:
 
 
 def _gap(before: Curves, after: Curves) -> dict[str, Any]:
+    """The gap between two curves."""
     return {
         "before": _curves(before),
         "after": _curves(after),
@@ -251,6 +254,7 @@ def _best_term(investigation: Findings) -> dict[str, Any] | None:
 
 
 def _error(error: ModelError) -> dict[str, Any]:
+    """A model's error with its interval, and where it stalls."""
     own = {"stalls": error.stalls} if error.stalls else {}
     return files.plain({"value": error.value, "interval": error.interval} | own)
 
@@ -272,12 +276,14 @@ def write_left(investigation: Findings, path: Path) -> Path:
 
 
 def write_plugin(investigation: Findings, path: Path) -> Path:
+    """Write the proposed term as an effect that runs."""
     proposal = investigation.proposed.proposal
     assert proposal is not None
     return files.write(path, proposal.source)
 
 
 def _curves(curves: Curves) -> dict[str, Any]:
+    """The errors of calculated curves."""
     own = {} if curves.epsilon_i is None else {"epsilon_i": curves.epsilon_i}
     errors = {"epsilon_p": curves.epsilon_p, "epsilon_q": curves.epsilon_q}
     return (

@@ -89,6 +89,9 @@ class PredictedDeviance:
 
     @property
     def excess(self) -> float:
+        """What is left of the held-out events beyond chance; 0 where that is no more than `least`,
+        inf where the model stalls.
+        """
         if not np.isfinite(self.curves.error.value):
             return np.inf
         return self.beyond_chance if self.beyond_chance > self.least else 0.0

@@ -52,6 +52,7 @@ class Nearest:
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The effects of the set that comes nearest."""
         return self.row.fit.names
 
     @property
@@ -145,6 +146,7 @@ def explain(
 def _explain_word(
     verdict: Verdict, evidence: Evidence, nearest: Nearest | None, context: Context
 ) -> str:
+    """Why the verdict is what it is, in a sentence."""
     sets = verdict.sets
     if evidence.there is not None:
         return (
@@ -199,6 +201,7 @@ def label_effects(names: Sequence[str], context: Context) -> list[str]:
 
 
 def _describe_name(names: Sequence[str], evidence: Evidence, context: Context) -> str:
+    """What explains the disagreement, and what it was set against."""
     labels = label_effects(names, context)
     if len(labels) > 1:
         sets = {row.fit.names for row in evidence.rows if len(row.fit.names) == len(names)}
@@ -393,6 +396,7 @@ def _explain_denial(word: str, seemed: str, best: SetEvidence, context: Context)
 
 
 def _describe_objection(best: SetEvidence, context: Context) -> str:
+    """Why the best set is not kept, by what the held-out events say."""
     assert best.gap is not None
     if best.gap.is_denied:
         return "there it fits no better than the base model"

@@ -72,6 +72,7 @@ class Explanations:
 
     @property
     def chosen(self) -> Refit:
+        """The set that the search ended at."""
         return self.last.fit
 
     @property

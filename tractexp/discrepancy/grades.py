@@ -81,6 +81,7 @@ class Grader:
         return starts[int(np.argmin(problem.objective(np.array(starts))))]
 
     def _extend_base(self, names: Sequence[str], window: float | str | None) -> Model:
+        """The base model with further effects, behind a recorder's window."""
         base, own = self.base, {effect.name for effect in self.base.effects}
         added = [self.catalogue[name].effect for name in names if name not in own]
         return compose(

@@ -74,10 +74,12 @@ class Findings:
 
     @property
     def context(self) -> Context:
+        """The events and models of the fit that was examined first."""
         return self.first.context
 
     @property
     def catalogue(self) -> Catalogue:
+        """The effects that could be tested, and those that could not."""
         return self.context.catalogue
 
     @property
@@ -307,6 +309,7 @@ class Findings:
         return f"{whose}{where}: {shapes[0]}"
 
     def _find_remainder(self, overlays: Sequence[Overlay]) -> list[Remainder]:
+        """The shapes in what is left of the fitted events, else of those held out."""
         noise, level = self.last.noise, self.context.criteria.false_alarms
         fitted, beyond = ([o for o in overlays if o.held_out == there] for there in (False, True))
         return find_remainder(fitted, noise, level) or find_remainder(

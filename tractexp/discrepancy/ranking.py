@@ -61,6 +61,9 @@ def rank_sets(evidence: Evidence, criteria: Criteria) -> list[SetEvidence]:
 
 
 def _rank(row: SetEvidence) -> tuple[float, int, Names]:
+    """What sets are ranked by: what they leave of the held-out events, then their size and
+    names.
+    """
     left = float("inf") if row.prediction is None else row.held_out_prediction.excess
     return left, len(row.fit.names), row.fit.names
 

@@ -61,6 +61,7 @@ class Remainder:
     share: float
 
     def __str__(self) -> str:
+        """What is left, where, from when on, and whether it dies away."""
         size = f"{abs(self.size):.2g} pu ({self.times} the noise)"
         what, when = (
             f"{self.channel} of {self.event}",
@@ -94,6 +95,7 @@ class Remainder:
 
     @property
     def _ends(self) -> str:
+        """How it ends."""
         if self.time_constant is None:
             return ", and does not die away" if self.kind == "ringing" else ", and stays so"
         damping = "" if self.damping is None else f" (damping ratio {self.damping:.2g})"
@@ -157,6 +159,7 @@ class _Stretch:
 
     @property
     def size(self) -> int:
+        """How many values are judged there."""
         return domain_of(self.event).values(self.drive)
 
     def white(self, rows: np.ndarray) -> np.ndarray:

@@ -83,6 +83,7 @@ def _labels(rows: Sequence[CandidateRow]) -> dict[CandidateRow, str]:
 def _bars(
     findings: Findings, rows: Sequence[CandidateRow], labels: Mapping[CandidateRow, str]
 ) -> Chart:
+    """Each candidate's drop of the deviance as a bar, colored by its status."""
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
     entries = [_describe_bar(row) for row in rows]
     chance = chance_level(findings)
@@ -100,6 +101,7 @@ def _describe_bar(row: CandidateRow) -> str:
 
 
 def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
+    """What the colors mean."""
     colors = []
     if findings.names:
         colors.append("green: added")
@@ -118,6 +120,7 @@ def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
 
 
 def _sets(page: Report, findings: Findings) -> None:
+    """Add the table of sets that were refitted."""
     rows = [
         [
             join_words(r.fit.names) or "the base model",

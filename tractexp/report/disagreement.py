@@ -44,6 +44,7 @@ def places(page: Report, findings: Findings) -> None:
 
 
 def noise(page: Report, findings: Findings) -> None:
+    """Add what is known of the noise, and where that comes from."""
     context, fit = findings.context, findings.last
     quiet = fit.noise.loudest_input_mode <= BLURRED
     about = context.domain.about_noise(findings.catalogue.of_measurement, quiet)

@@ -268,6 +268,7 @@ def _add_remainder_section(page: Report, findings: Findings) -> None:
 
 
 def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose: str) -> None:
+    """Add the shapes of what is left by `whose` model."""
     if not shapes:
         page.text(
             f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse."
@@ -352,4 +353,5 @@ def _share(closed: float) -> str:
 
 
 def _number(value: float | None) -> str:
+    """A number with three digits; "" for none."""
     return "" if value is None else f"{value:.3g}"

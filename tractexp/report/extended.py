@@ -52,6 +52,7 @@ def laws(page: Report, findings: Findings) -> None:
 
 
 def _curve(fitted: FittedLaw) -> Chart:
+    """The law found with its band, beside the catalogue's."""
     law = fitted.curve
     chart = Chart(law.x_label, [law.y_label], pixels=320)
     chart.band("", law.x, fitted.band[0], fitted.band[1], CURVE)
@@ -130,9 +131,11 @@ def equations(page: Report, findings: Findings) -> None:
 
 
 def value(estimate: ParameterEstimate) -> str:
+    """An estimate with its error, and whether it is at its bound."""
     bound = "" if np.isfinite(estimate.error) else ", at its bound"
     return f"{with_error(estimate.value, estimate.error)}{bound}"
 
 
 def interval(low: float, high: float) -> str:
+    """ "0.1 to 0.2"; "" where an end is open."""
     return f"{low:.4g} to {high:.4g}" if np.isfinite([low, high]).all() else ""

@@ -114,6 +114,7 @@ def response(
 
 
 def _check_lengths(path: Path, **columns: np.ndarray) -> None:
+    """Raise `UserError` for columns of other lengths than the times."""
     samples = len(columns["t"])
     if samples < 2:
         raise UserError(f"{path}: a figure needs at least 2 samples, there are {samples}")
@@ -151,6 +152,7 @@ def _page(width: float, height: float, title: str, notes: Sequence[str]) -> "tup
 
 
 def _legend_above(panel: "Axes") -> None:
+    """Put a panel's legend above it."""
     panel.legend(
         loc="lower right",
         bbox_to_anchor=(1.0, 0.97),

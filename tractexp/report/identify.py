@@ -63,6 +63,7 @@ SAME_END_SHARE = 0.01  # of the deviance: starts closer than this ended in the s
 
 
 def digits(value: float) -> str:
+    """A number with four digits."""
     return f"{value:.4g}"
 
 
@@ -122,6 +123,7 @@ def name_verdicts(result: Any) -> dict[str, str]:
 
 
 def own_verdicts(result: Any) -> dict[str, str]:
+    """{name: verdict} without nuisances."""
     return {
         name: verdict for name, verdict in result.verdicts.items() if name not in result.nuisances
     }
@@ -240,6 +242,7 @@ def headline(result: Any) -> str:
 
 
 def _curves(page: Report, fits: Sequence[Any], uncertainty: Uncertainty) -> None:
+    """Add measured and calculated curves with the band of the noise."""
     problem = uncertainty.likelihood.problem
     waves, deviation = problem.model.waves, uncertainty.of_noise.noise.deviation(problem.drive)
     page.text(*[IN_WAVES] * waves).text(CAPTION)
@@ -427,6 +430,7 @@ def correlations(fit: "Identification") -> list[str]:
 
 
 def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
+    """Estimates and intervals in their bounds, beside where the search ended."""
     lower, width = uncertainty.lower, uncertainty.upper - uncertainty.lower
     at, spans = (
         (uncertainty.values - lower) / width,
@@ -462,6 +466,7 @@ def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
 
 
 def _fitness(history: History, result: Any) -> Chart:
+    """The best objective [pu²] by simulations."""
     valid = history.objective < REFUSED
     chart = Chart("simulations", ["best objective [pu²]"], log_y=True, pixels=300)
     best = np.maximum(history.objective[valid], 1e-30)
@@ -582,6 +587,7 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
 
 
 def _conclusion(speaking: Sequence[dict[str, Any]], tests: int) -> str:
+    """What the tests of the residual say, in a sentence."""
     if not tests:
         return "There are too few samples to test what is left."
     if not speaking:
@@ -654,4 +660,5 @@ def _events(page: Report, uncertainty: Uncertainty, together: EventAgreement) ->
 
 
 def _wider(ratio: float) -> str:
+    """By how much a parameter's own value in each event widens its interval."""
     return f"{ratio:.2f}" if ratio < 1000 else "not identifiable"

@@ -48,6 +48,7 @@ def numbers(fit: "NetworkFit") -> Table:
 
 
 def errors(fit: "NetworkFit") -> Table:
+    """The errors of the network on each event."""
     keys = [key for key in fit.content["events"][0] if key.startswith("epsilon_")]
     return error_table(fit.content["events"], fit.content["model_error"]["events"], keys)
 

@@ -28,6 +28,7 @@ NO_LOAD = "no load here: what happens to the voltage is listed with the loads of
 
 
 def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
+    """The page of a look: what each file holds, its loads and what happened."""
     files = content["files"]
     page = Report(f"A look at {', '.join(Path(f['file']).name for f in files)}", _lead(files))
     for view, entry in zip(views, files, strict=True):
@@ -99,6 +100,7 @@ def events(entry: Mapping[str, Any]) -> Table:
 
 
 def _lead(files: Sequence[Mapping[str, Any]]) -> str:
+    """How many loads and events there are, and how many are worth fitting."""
     loads = sum(len(f["feeders"]) for f in files)
     events = [e for f in files for feeder in f["feeders"] for e in feeder["events"]]
     worth = sum(e["worth"] for e in events)
@@ -108,6 +110,7 @@ def _lead(files: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
+    """Add the commands that fit, or why there is nothing to fit."""
     commands = [(f["name"], f["command"]) for f in entry["feeders"] if f["command"]]
     if not entry["feeders"]:
         page.verdict(f"{as_sentence(explain_unnamed(entry))} The channels are listed below.")
@@ -125,6 +128,7 @@ def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
 
 
 def _facts(entry: Mapping[str, Any]) -> list[list[str]]:
+    """Rows on the file: samples, frequency, station, notes."""
     segments = [
         f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s"
         for s in entry["segments"]
@@ -143,6 +147,7 @@ def _facts(entry: Mapping[str, Any]) -> list[list[str]]:
 
 
 def frequency(entry: Mapping[str, Any]) -> str:
+    """ "50 Hz nominal, 49.98 Hz measured"."""
     measured = entry["measured_frequency"]
     return f"{entry['frequency']:g} Hz nominal" + (
         "" if measured is None else f", {measured:.3f} Hz measured"
@@ -158,6 +163,7 @@ def size(entry: Mapping[str, Any]) -> str:
 
 
 def _channel(c: Mapping[str, Any]) -> list[str]:
+    """A channel's cells."""
     noise, thd = (None if c[key] is None else 100 * c[key] for key in ("noise_share", "thd"))
     return [
         str(c["number"]),
@@ -174,6 +180,7 @@ def _channel(c: Mapping[str, Any]) -> list[str]:
 
 
 def _summary(entry: Mapping[str, Any]) -> list[str]:
+    """A load's cells."""
     sizes = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
     channels = ", ".join(map(str, (*entry["voltages"], *entry["currents"])))
     worth = [e for e in entry["events"] if e["worth"]]
@@ -200,6 +207,7 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
 
 
 def _describe_entry(entry: Mapping[str, Any]) -> list[str]:
+    """A load's channels and what speaks for them, in sentences."""
     sentences = []
     if entry["channels"]:
         numbers = [*entry["voltages"], *entry["currents"]]
@@ -257,6 +265,7 @@ def starts(event: Mapping[str, Any], unit: str = "") -> str:
 
 
 def event_row(e: Mapping[str, Any]) -> list[str]:
+    """An event's cells."""
     powers = [change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"]
     return [
         "" if e["dip"] is None else str(e["dip"]),

@@ -50,6 +50,7 @@ CAPTION = (
 
 
 def charts(page: Report, view: View, shown: Sight) -> None:
+    """Add a load's record, or its phasors and waveforms."""
     if shown.record is not None:
         page.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
     elif shown.phasors and view.recording is not None:
@@ -120,6 +121,7 @@ def _mark_events(chart: Chart, shown: Sight) -> Chart:
 
 
 def _of_record(shown: Sight) -> Chart:
+    """A record's columns over time."""
     record = shown.record
     assert record is not None
     panels = {"U": ("U", "U2"), "P, Q": ("P", "Q"), "f [Hz]": ("f",)}
@@ -219,6 +221,7 @@ def _waves(
     every: int,
     span: tuple[float, float] | None,
 ) -> None:
+    """Add the waveforms of a segment, every so many samples."""
     assert shown.feeder is not None
     waves = FeederWaves.from_recording(
         recording, shown.feeder, segment if span is None else segment.between(*span)
@@ -248,6 +251,7 @@ def _waves(
 
 
 def _colors(phases: int) -> tuple[str, ...]:
+    """Colors of so many phases."""
     return COLORS if phases > 1 else (VOLTAGE,)
 
 
@@ -293,10 +297,12 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> N
 
 
 def _read(channel: Channel, segment: Segment, a: int, b: int) -> np.ndarray:
+    """A channel's values within a part of a segment."""
     return channel.values(segment.first + a, segment.first + b)
 
 
 def _row(waves: FeederWaves, k: int, a: int, b: int) -> np.ndarray:
+    """One sum of a feeder's channels within a part of a segment."""
     return waves[k : k + 1, a:b][0]
 
 

@@ -177,14 +177,17 @@ def _measure_answer(event: Entry) -> float:
 
 
 def _worth(feeder: Entry) -> list[Entry]:
+    """The events that are worth fitting."""
     return [event for event in feeder["events"] if event["worth"]]
 
 
 def _label(event: Entry) -> str:
+    """ "dip 2"."""
     return event["kind"] if event["dip"] is None else f"{event['kind']} {event['dip']}"
 
 
 def _event(event: Entry) -> str:
+    """An event in a phrase: kind, time, depth, duration, phases."""
     fallen = name_fallen_phases(event.get("phases") or ())
     size = [f"{event['depth']:.1%}", f"{1000 * event['duration']:.0f} ms", fallen]
     return f"{_label(event)} at {starts(event, ' s')} ({', '.join(filter(None, size))})"
@@ -205,6 +208,7 @@ def _clause(why: str, after: str) -> str:
 
 
 def _about(entry: Entry) -> str:
+    """Where and by what a file was recorded."""
     rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(entry["rates"]))
     about = [
         entry["station"],
@@ -224,6 +228,7 @@ def _buses(feeders: Sequence[Entry]) -> list[list[Entry]]:
 
 
 def _same(event: Entry) -> tuple[Any, ...]:
+    """What two loads' views of one event share."""
     return event["kind"], event["start"], event["end"]
 
 
@@ -274,6 +279,7 @@ def _beside_voltage(event: Entry) -> bool:
 
 
 def _overlap(a: Entry, b: Entry) -> bool:
+    """Whether two events overlap in time."""
     return a["start"] <= b["end"] and b["start"] <= a["end"]
 
 

@@ -73,6 +73,7 @@ def section(page: Report, choice: NextEvent) -> None:
 
 
 def _caption(choice: NextEvent) -> str:
+    """What the chart shows."""
     decided = f"Dashed: the {DECIDED:.0%} from which an event is recommended as sure."
     return (
         "Probability that one dip more tells all rivals apart, by its depth and duration."
@@ -94,6 +95,7 @@ def _chart(choice: NextEvent) -> Chart:
 
 
 def _kind(tried: EventTrial) -> str:
+    """The kind of an event that was tried."""
     event = tried.event
     if event.unbalance:
         return KINDS[3]
@@ -105,6 +107,7 @@ def _kind(tried: EventTrial) -> str:
 
 
 def _best(choice: NextEvent, kind: str) -> list[EventTrial]:
+    """The surest events of a kind."""
     ranked = sorted(
         (t for t in choice.tried if _kind(t) == kind),
         key=lambda t: (-t.chances.least, t.event.burden),
@@ -113,4 +116,5 @@ def _best(choice: NextEvent, kind: str) -> list[EventTrial]:
 
 
 def _row(tried: EventTrial) -> list[str]:
+    """An event's cells."""
     return [tried.event.words, f"{100 * tried.chances.least:.0f}"]

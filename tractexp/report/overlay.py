@@ -37,6 +37,7 @@ def overlaid(page: Report, overlays: Sequence[Overlay]) -> Report:
 
 
 def _add_overlay(page: Report, overlay: Overlay, role: str) -> None:
+    """Add an event, measured and calculated before and after."""
     event = overlay.event
     page.heading(f"{event.record.name}, {role}", level=3)
     if not isinstance(event, WaveEvent):
@@ -94,4 +95,5 @@ def _models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:
 
 
 def _best(overlay: Overlay) -> np.ndarray:
+    """What the best model calculates."""
     return overlay.before if overlay.after is None else overlay.after

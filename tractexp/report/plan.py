@@ -85,6 +85,7 @@ def scan(content: Mapping[str, Any], label: str, rows: int = ROWS) -> Table:
 
 
 def report(planned: Planned, content: Mapping[str, Any]) -> Report:
+    """The page of a plan: how deep a dip is needed, and each interval against its shape."""
     needed = planned.needed
     title = f"How deep a dip tells {needed.parameter}"
     page = Report(
@@ -120,6 +121,7 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
 
 
 def _caption(needed: Needed) -> str:
+    """What the chart shows."""
     met = "" if needed.depth is None else ", met at the dotted line"
     return (
         "Half of the 95 % interval of each parameter, in percent of its value, by the depth of the"

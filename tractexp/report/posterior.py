@@ -97,6 +97,7 @@ def _describe_chain_length(drawn: PosteriorSample) -> str:
 
 
 def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
+    """A parameter's draws as a histogram, with both intervals."""
     draws, value, half = drawn.draws[:, j], uncertainty.values[j], uncertainty.half[j]
     low, high = drawn.intervals[j]
     density, edges = np.histogram(draws, HISTOGRAM_BINS, density=True)
@@ -114,6 +115,7 @@ def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
 
 
 def _closest(drawn: PosteriorSample) -> tuple[int, int]:
+    """The two parameters that go together most."""
     r = np.abs(np.atleast_2d(np.corrcoef(drawn.draws.T)))
     np.fill_diagonal(r, -1.0)
     a, b = np.unravel_index(r.argmax(), r.shape)
@@ -121,6 +123,7 @@ def _closest(drawn: PosteriorSample) -> tuple[int, int]:
 
 
 def _pair(uncertainty: Uncertainty, drawn: PosteriorSample, a: int, b: int) -> Chart:
+    """Draws of two parameters."""
     some = drawn.draws[:: max(1, len(drawn.draws) // DOTS)][:DOTS]
     chart = Chart(
         axis(uncertainty, drawn.names[a]), [axis(uncertainty, drawn.names[b])], pixels=420

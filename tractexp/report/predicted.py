@@ -89,12 +89,14 @@ def _describe_stalls(findings: Findings) -> list[str]:
 
 
 def _label(findings: Findings, row: SetEvidence) -> str:
+    """A set's names."""
     if row is findings.evidence.term:
         return term(row.names[0]).words
     return join_words(row.names) or "the base model"
 
 
 def _bars(findings: Findings, rows: Sequence[SetEvidence]) -> Chart:
+    """The error that each set leaves of the held-out events."""
     errors = [100 * row.held_out_prediction.error for row in rows]
     chart = Chart("model error, held out [%]", [""], pixels=130 + BAR * len(rows))
     labels, colors = (
@@ -109,6 +111,7 @@ def _bars(findings: Findings, rows: Sequence[SetEvidence]) -> Chart:
 
 
 def _color(findings: Findings, row: SetEvidence) -> str:
+    """The color of a set by its place in the verdict."""
     if row is findings.evidence.base:
         return BASE
     if row is findings.verdict.chosen:
@@ -117,6 +120,7 @@ def _color(findings: Findings, row: SetEvidence) -> str:
 
 
 def _status(findings: Findings, row: SetEvidence) -> str:
+    """A set's place in the verdict, in words."""
     if row is findings.evidence.base:
         return ""
     if row is findings.evidence.term:

@@ -86,6 +86,7 @@ def report(scan: Profiles, grade: str = "") -> Report:
 
 
 def _row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[str]:
+    """A profile's cells: value, both intervals, verdict."""
     value, half = _curvature(scan, profile.name)
     about = find_declared_parameter(scan.uncertainty, profile.name)
     by_curvature = span(value - half, value + half) if np.isfinite(half) else "none"
@@ -159,6 +160,7 @@ def _where(says: Mapping[str, str]) -> list[str]:
 
 
 def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
+    """ "good" where every parameter is identified, else "plain"."""
     return (
         "good"
         if exact and all(verdict.word == IDENTIFIED for verdict in verdicts.values())
@@ -167,6 +169,7 @@ def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
 
 
 def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
+    """What is not identified, in words."""
     poor = [
         f"{name} is {verdict.word}"
         for name, verdict in verdicts.items()
@@ -204,6 +207,7 @@ def _chart(scan: Profiles, profile: LikelihoodProfile, title: str) -> Chart:
 
 
 def _marks(threshold: float) -> list[str]:
+    """Labels of a profile's axis: the threshold's multiples."""
     return [f"{times * threshold:.2f}".rstrip("0").rstrip(".") for times in range(3)]
 
 
@@ -232,4 +236,5 @@ def axis(uncertainty: Uncertainty, name: str) -> str:
 
 
 def span(low: float, high: float) -> str:
+    """ "0.1 .. 0.2"."""
     return f"{low:.4g} .. {high:.4g}"

@@ -59,6 +59,7 @@ def add_proposal_section(page: Report, findings: Findings) -> None:
 
 
 def _numbers(page: Report, proposal: Proposal) -> None:
+    """Add the term's parameters."""
     rows = [
         [
             p.name,
@@ -92,6 +93,7 @@ def _numbers(page: Report, proposal: Proposal) -> None:
 
 
 def _add_explanation(page: Report, proposal: Proposal) -> None:
+    """Add what the term explains, fitted and held out."""
     rows = [
         [
             role,
@@ -124,6 +126,7 @@ def _plot_term(page: Report, proposal: Proposal) -> None:
 
 
 def _plot_missed_part(judged: GapTest, e: int) -> Chart:
+    """What the base model misses of an event, beside what the term adds."""
     bench = judged.context
     assert bench is not None
     event = bench.events[e]
@@ -142,6 +145,7 @@ def _plot_missed_part(judged: GapTest, e: int) -> Chart:
 
 
 def _rivals(page: Report, proposal: Proposal) -> None:
+    """Add the terms that cannot be told from it."""
     if proposal.ties:
         page.table(
             ["also possible", "explained of the fitted events", "of the held-out events"],

@@ -79,6 +79,7 @@ def kinds(content: Mapping[str, Any]) -> Table:
 
 
 def report(content: Mapping[str, Any]) -> Report:
+    """The page of a survey: a table that sorts and filters itself."""
     keys = [key for key in (*(c[0] for c in COLUMNS), *FURTHER) if key not in ("P", "Q")]
     rows = [{key: row[key] for key in keys} for row in content["rows"]]
     data = {
@@ -117,6 +118,7 @@ SIEVE = (
 
 
 def _heads() -> str:
+    """The table's heads."""
     heads = []
     for key, label, kind, _ in COLUMNS:
         css = ' class="words"' if kind in ("name", "words", "why") else ""

@@ -45,16 +45,19 @@ class Batches(BaseSubmititLauncher):
     """
 
     def __init__(self, jobs_per_task: int, **params: Any):
+        """A launcher of tasks of so many jobs each."""
         super().__init__(**params)
         self.jobs_per_task = jobs_per_task
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
+        """Raise `UserError` for fewer jobs a task than one."""
         check_range("hydra.launcher.jobs_per_task", self.jobs_per_task, 1)
         super().setup(hydra_context=hydra_context, task_function=task_function, config=config)
 
     def launch(
         self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
     ) -> Sequence[JobReturn]:
+        """Submit the jobs in tasks, and return what each came to."""
         numbered = enumerate(job_overrides, start=initial_job_idx)
         jobs = [json.dumps([number, list(overrides)]) for number, overrides in numbered]
         size = self.jobs_per_task
@@ -70,6 +73,7 @@ class Batches(BaseSubmititLauncher):
         job_id: str,
         singleton_state: Any,
     ) -> Any:
+        """Run one task: its jobs one after the other, in one process."""
         run = super().__call__
         returned = []
         for number, overrides in map(json.loads, sweep_overrides):
@@ -77,6 +81,7 @@ class Batches(BaseSubmititLauncher):
         return returned
 
     def __reduce__(self) -> Any:
+        """How another process makes it again."""
         return _restore, (type(self).__name__, vars(self))
 
 

@@ -23,6 +23,7 @@ class Composer:
     """
 
     def __init__(self, loader: Any, master: DictConfig):
+        """Compose the jobs of a sweep; what they share is composed once."""
         from hydra.core.override_parser.overrides_parser import OverridesParser
 
         self.loader, self.master = loader, master
@@ -69,10 +70,12 @@ class Composer:
         return not (added or self._is_group(override.key_or_group) or override.is_hydra_override())
 
     def _composed_base(self, overrides: tuple[str, ...]) -> tuple[DictConfig, DictConfig]:
+        """The configuration that some overrides give, and the task's part of it."""
         whole = self._compose_config(overrides)
         return whole, _without_hydra(whole)
 
     def _compose_config(self, overrides: Iterable[str]) -> DictConfig:
+        """Hydra's own composition."""
         return self.loader.load_sweep_config(self.master, list(overrides))
 
 
@@ -87,6 +90,7 @@ def _number(whole: DictConfig, number: int) -> None:
 
 
 def _without_hydra(whole: DictConfig) -> DictConfig:
+    """A configuration without Hydra's part."""
     task = copy.deepcopy(whole)
     with read_write(task), open_dict(task):
         del task["hydra"]
@@ -94,5 +98,6 @@ def _without_hydra(whole: DictConfig) -> DictConfig:
 
 
 def _plain(task: DictConfig) -> dict[str, Any]:
+    """A configuration as plain data, interpolations resolved."""
     plain: Any = OmegaConf.to_container(task, resolve=True)
     return plain

@@ -30,6 +30,7 @@ def inputs(config: Mapping[str, Any]) -> str:
 
 
 def _digest(content: bytes) -> str:
+    """The SHA-256 of a content."""
     return hashlib.sha256(content).hexdigest()
 
 

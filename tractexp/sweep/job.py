@@ -250,6 +250,9 @@ def read_shared_events(data: Mapping[str, Any], inputs: str) -> Any:
 
 @functools.lru_cache(MOST_KEPT_RECORDS)
 def _read_once(data: str, inputs: str) -> Any:
+    """The events of a configuration of data, read once in a process while the files stay as they
+    are.
+    """
     return read_events(json.loads(data))
 
 

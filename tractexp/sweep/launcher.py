@@ -56,6 +56,7 @@ class Cores(Launcher):
     """
 
     def __init__(self, backend: str, n_jobs: int, address: str | None, tries: int):
+        """A launcher that runs jobs on the workers of a joblib backend."""
         self.workers, self.tries = (
             Workers(n_jobs, SPELLINGS.get(backend, backend), address, apart=True),
             tries,
@@ -65,6 +66,7 @@ class Cores(Launcher):
         self.page: LivePage | None = None
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
+        """Raise `UserError` for a backend or numbers that cannot be."""
         self.hydra_context, self.config = hydra_context, config
         check_choice("hydra.launcher.backend", self.workers.backend, backends())
         if self.workers.n_jobs != -1:
@@ -201,6 +203,7 @@ class Ended(JobReturn):
 
     @property
     def return_value(self) -> Any:
+        """What the job returned; what it raised is raised where it failed."""
         if self.status == JobStatus.FAILED:
             raise self._return_value
         return self._return_value

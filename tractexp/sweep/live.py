@@ -44,6 +44,7 @@ class Standing:
 
     @property
     def rank(self) -> tuple[bool, float, str]:
+        """What variants are ranked by on the page: the best end, none last."""
         return not self.ends, min(self.ends, default=0.0), self.name
 
 
@@ -51,6 +52,7 @@ class LivePage:
     """The page of a sweep's folder; `add` tells it of jobs."""
 
     def __init__(self, folder: Path):
+        """The page of a sweep's folder, of no jobs yet."""
         self.folder, self.pace = folder, Tally(())
         self.jobs: dict[Path, SweepJob] = {}
         self.ends: dict[Path, Status] = {}
@@ -123,6 +125,7 @@ class LivePage:
         return sorted(standings, key=lambda standing: standing.rank)
 
     def _curve(self, job: SweepJob | None) -> Curve | None:
+        """The curve of a job, read once."""
         if job is None:
             return None
         if job.folder not in self.curves:
@@ -163,6 +166,7 @@ def keep_live(page: LivePage, more: bool = False) -> Iterator[None]:
 
 
 def _add_standings(page: Report, standings: Sequence[Standing]) -> None:
+    """Add the table of variants."""
     if not standings:
         return
     rows = [
@@ -186,6 +190,7 @@ def _draw_curves(curves: Sequence[tuple[str, Curve]]) -> Chart:
 
 
 def _shorten(texts: Sequence[str], most: int) -> list[str]:
+    """The first texts, and how many more there are."""
     if (more := len(texts) - most) > 0:
         return [*texts[:most], f"and {more} more"]
     return list(texts)

@@ -17,9 +17,11 @@ class _ByThread:
     """
 
     def __init__(self, usual: Any):
+        """A stream that each thread may have another one of."""
         self.usual = usual
 
     def __getattr__(self, name: str) -> Any:
+        """What the stream of this thread has."""
         main = threading.main_thread().ident or 0
         return getattr(
             _outputs.get(threading.get_ident()) or _outputs.get(main) or self.usual, name

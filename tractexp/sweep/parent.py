@@ -80,6 +80,7 @@ def _open_parent_run(folder: Path, run: Any, uri: str, afresh: bool) -> str | No
 
 
 def _close_parent_run(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
+    """Log what the whole sweep came to, and end its run."""
     try:
         entry = save(folder, run, uri, sweep=True)
         if run_id is not None:
@@ -124,6 +125,7 @@ def shared_settings(configs: Sequence[Mapping[str, Any]]) -> dict[str, str]:
 
 
 def _describe_sweep(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
+    """The parent's run: settings that all jobs share, tags and folder."""
     first = Job(jobs[0].config, jobs[0].choices, folder)
     return tracking.TrackedRun(
         experiment=first.experiment,

@@ -106,6 +106,7 @@ def _of_jobs(folder: Path) -> list[Path]:
 
 
 def _holds_something(folder: Path) -> bool:
+    """Whether a folder holds more than hidden files."""
     return folder.exists() and not (
         folder.is_dir() and all(p.name.startswith(".") for p in folder.iterdir())
     )

@@ -18,6 +18,7 @@ class Tally:
     """Counts the ends of a sweep's jobs."""
 
     def __init__(self, jobs: Sequence[SweepJob]):
+        """Count the jobs of a sweep as they end."""
         self.total, self.done, self.failed = len(jobs), 0, 0
         self.common = find_shared_overrides(jobs)
         self.jobs: dict[str, int] = {}  # done, by variant
@@ -25,6 +26,7 @@ class Tally:
         self.first = time.perf_counter()
 
     def add(self, job: SweepJob, end: Status) -> None:
+        """Count a job that has ended."""
         variant = job.variant(self.common)
         self.done += 1
         if self.done == 1:
@@ -36,6 +38,7 @@ class Tally:
             self.best[variant] = min(value, self.best.get(variant, value))
 
     def rank_variants(self) -> list[tuple[str, float]]:
+        """(variant, best objective), the best first."""
         return sorted(self.best.items(), key=lambda item: item[1])
 
     @property
@@ -47,6 +50,7 @@ class Tally:
         return f"about {spent * (self.total - self.done) / (self.done - 1):.0f} s left"
 
     def line(self) -> str:
+        """ "3 of 12 jobs, 1 failed, best objectives ..."."""
         parts = [f"{self.done} of {self.total} jobs"]
         if self.failed:
             parts.append(f"{self.failed} failed")
@@ -80,6 +84,7 @@ def progress(jobs: Sequence[SweepJob]) -> Iterator[Callable[[SweepJob, Status], 
 
 @contextmanager
 def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
+    """Within it, a bar counts the jobs, in a terminal."""
     from rich.console import Group
     from rich.live import Live
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn

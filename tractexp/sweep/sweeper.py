@@ -67,11 +67,13 @@ class Grid(Sweeper):
         comparison: Mapping[str, Any],
         open: bool,
     ):
+        """A sweep over every combination of values, as `hydra.sweeper` says."""
         self.params, self.redo, self.open = params or {}, redo, open
         self.comparison = {**comparison} if compare else None
         self.page: LivePage | None = None  # None where there is nothing to run
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
+        """Take Hydra's loader and make the launcher."""
         self.loader = hydra_context.config_loader
         self.config: Any = config
         self.launcher: Any = Plugins.instance().instantiate_launcher(
@@ -79,6 +81,7 @@ class Grid(Sweeper):
         )
 
     def sweep(self, arguments: list[str]) -> None:
+        """Compose all jobs, run those that are not done, and compare what they came to."""
         arguments = [*(f"{key}={values}" for key, values in self.params.items()), *arguments]
         folder = Path(self.config.hydra.sweep.dir).absolute()
         comparison = self._comparison(folder)  # refused before the jobs, not after
@@ -89,6 +92,7 @@ class Grid(Sweeper):
             self._conclude(jobs, comparison)
 
     def _perform(self, jobs: list[SweepJob], folder: Path, arguments: list[str]) -> None:
+        """Run what remains of the jobs, and say what is kept."""
         remaining = [job for job in jobs if self.redo or not is_finished(job)]
         say(f"sweep: {len(jobs)} jobs in {folder}")
         if done := len(jobs) - len(remaining):
@@ -150,6 +154,7 @@ class Grid(Sweeper):
             show(page)
 
     def _run(self, jobs: Sequence[SweepJob], recorder: Recorder) -> None:
+        """Run the jobs by the launcher; each has an end, whatever happens to its worker."""
         for job in jobs:
             await_end(job)
         end, problem = FAILED, "it ended without a word: its worker was killed or never started"

@@ -65,6 +65,7 @@ def find(
 
 
 def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
+    """The runs that a filter finds. Raises `UserError` for a filter that MLflow cannot read."""
     from mlflow.exceptions import MlflowException
 
     try:
@@ -80,6 +81,7 @@ def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
 
 
 def _read_logged_run(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> Logged:
+    """A run as it was logged, with the curves asked for."""
     read = {
         name: _curve(client, run.info.run_id, name) for name in curves if name in run.data.metrics
     }
@@ -111,6 +113,7 @@ def _files(client: Any, run_id: str) -> dict[str, str]:
 
 
 def _curve(client: Any, run_id: str, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Steps and values of a metric, in order."""
     points = np.array(
         [(m.step, m.value) for m in client.get_metric_history(run_id, name)], dtype=float
     )

@@ -113,11 +113,13 @@ class Predictor:
     """
 
     def __init__(self, model: Any):
+        """Predict with an identified model."""
         self.model = model
 
     def predict(
         self, frame: "pd.DataFrame", params: dict[str, Any] | None = None
     ) -> "pd.DataFrame":
+        """P and Q for a frame of t [s] and U [pu]."""
         import pandas as pd
 
         for name in ("t", "U"):

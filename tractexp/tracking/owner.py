@@ -30,6 +30,7 @@ def _machine() -> tuple[str, str, str]:
 
 
 def _read(path: Path) -> str:
+    """What a file of the system says; "-" where it is not there."""
     try:
         return path.read_text().strip() or "-"
     except OSError:
@@ -81,6 +82,7 @@ def close_stale(client: Any) -> list[str]:
 
 
 def list_running(client: Any) -> list[Any]:
+    """The runs of a store that are said to be running."""
     experiments = [experiment.experiment_id for experiment in client.search_experiments()]
     return search(client, experiments, "attributes.status = 'RUNNING'") if experiments else []
 

@@ -58,6 +58,7 @@ class Logger:
     """
 
     def __init__(self, uri: str = ""):
+        """Start the process that logs into a store."""
         self._process = subprocess.Popen(
             interpreter.command("-c", f"from {__name__} import main; main()"),
             stdin=subprocess.PIPE,
@@ -70,6 +71,7 @@ class Logger:
             self.open(uri)
 
     def __enter__(self) -> "Logger":
+        """The logger."""
         return self
 
     def open(self, uri: str) -> None:
@@ -80,6 +82,7 @@ class Logger:
         self._opened = True
 
     def _tell(self, message: Any) -> None:
+        """Send a message to the process."""
         assert self._process.stdin is not None
         try:
             pickle.dump(message, self._process.stdin)
@@ -111,6 +114,7 @@ class Logger:
     def __exit__(
         self, kind: type | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        """End the process."""
         self.close()
 
 

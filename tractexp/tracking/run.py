@@ -102,6 +102,7 @@ def flatten(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
 
 
 def _text(value: Any) -> str:
+    """A value as MLflow stores a parameter."""
     if isinstance(value, str):
         return value
     if hasattr(value, "tolist"):  # an array, or a number of one
@@ -271,6 +272,7 @@ def tag_experiment(experiment: str, tags: Mapping[str, str], uri: str) -> str:
 
 
 def _create(client: Any, run: TrackedRun, uri: str) -> str:
+    """Create a run with its tags; its id."""
     tags = {
         "mlflow.user": _user(),
         "mlflow.source.name": "tractexp",
@@ -291,6 +293,7 @@ def _create(client: Any, run: TrackedRun, uri: str) -> str:
 
 
 def _write(client: Any, run_id: str, run: TrackedRun) -> None:
+    """Write parameters, metrics and curves of a run."""
     from mlflow.entities import Metric, Param
 
     now = _milliseconds(run.ended)
@@ -355,6 +358,7 @@ def _input(record: Mapping[str, str]) -> Any:
 
 
 def _chunks(items: list[Any], size: int) -> list[list[Any]]:
+    """Items in lists of at most `size`."""
     return [items[i : i + size] for i in range(0, len(items), size)]
 
 
@@ -395,10 +399,12 @@ def _create_experiment(client: Any, name: str, location: str | None) -> str:
 
 
 def _milliseconds(time_of: float | None = None) -> int:
+    """A time, by default now, as MLflow counts it."""
     return round(1000 * (time.time() if time_of is None else time_of))
 
 
 def _user() -> str:
+    """Who runs this; "" where the system does not know."""
     try:
         return getpass.getuser()
     except (OSError, KeyError):  # a container without an entry for this user

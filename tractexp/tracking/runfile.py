@@ -141,6 +141,7 @@ def _thin(steps: Line, values: Line) -> list[list[float]]:
 
 
 def _relative(path: Path, folder: Path) -> str:
+    """A path as it is called within a folder, else whole."""
     path = Path(path).absolute()
     return (
         path.relative_to(folder.absolute()).as_posix()
@@ -158,6 +159,7 @@ def _texts(content: Mapping[str, Any], *names: str) -> list[str]:
 
 
 def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
+    """The run that a file holds. Raises ValueError for what no run has."""
     content = {"model_metrics": [], **content}  # which earlier versions did not write
     key, *_ = _texts(content, "key", "experiment", "name", "status", "description")
     if not KEY.fullmatch(key):

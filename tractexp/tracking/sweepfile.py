@@ -31,6 +31,7 @@ def waits(folder: Path) -> bool:
 
 
 def _content(folder: Path) -> dict[str, Any]:
+    """What the file of a sweep's folder holds; {} where it is none of ours."""
     try:
         content = files.read_json(folder / FILE, files.CONFIGURATION)
     except (OSError, UserError):

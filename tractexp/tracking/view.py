@@ -73,6 +73,7 @@ def _plot_comparison(metric_x: str, metric_y: str) -> dict[str, Any]:
 
 
 def _chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
+    """A chart of a metric on MLflow's page of runs."""
     return {
         "type": kind,
         "uuid": f"tractexp-{metric}",

@@ -105,6 +105,7 @@ def written(kind: str, name: str, folder: Path, source: Path | None = None) -> P
 
 
 def _copy_example(kind: str, name: str, title: str) -> str:
+    """The example's code under another name."""
     code = Path(__file__).with_name(f"{kind}.py").read_text(encoding="utf-8")
     return code.replace("Example", title).replace("example", name)
 

@@ -115,6 +115,7 @@ class NextEvent:
         }
 
     def _row(self, tried: EventTrial) -> dict[str, Any]:
+        """What `discrepancy.json` holds of an event that was tried."""
         return {
             **tried.event.to_dict(),
             "words": tried.event.words,
@@ -125,6 +126,7 @@ class NextEvent:
         }
 
     def _recommend_event(self) -> str:
+        """The event to record and how sure it tells the rivals apart, as a sentence."""
         first, *others = self.rivals
         them = (
             f"{first} from {others[0]}" if len(others) == 1 else f"these {len(self.rivals)} apart"

@@ -41,6 +41,7 @@ class Same:
 
     @property
     def reason(self) -> str:
+        """Why two rivals cannot be told apart by any dip."""
         return (
             f"over {self.events} voltages, dips and phase jumps of many sizes, the changes that the"
             " parameters of"

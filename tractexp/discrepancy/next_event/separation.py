@@ -67,6 +67,7 @@ class EventView:
 
     @property
     def survives(self) -> bool:
+        """Whether a load can be simulated through the event."""
         return bool(np.isfinite(self.f).all() and np.isfinite(self.K).all())
 
 
@@ -88,6 +89,7 @@ class Chances:
 
     @property
     def least(self) -> float:
+        """The probability that the truth alone is left, the least over all rivals as the truth."""
         return float(self.alone.min())
 
 
@@ -174,6 +176,7 @@ class Separation:
     def __init__(
         self, sides: Sequence[Side], criteria: Criteria, draws: int = DRAWS, seed: int = 0
     ):
+        """Reduce what the records say of each rival to a few rows, from which draws are decided."""
         self.sides, self.criteria, self.draws, self.seed = sides, criteria, draws, seed
         rows = _reduce_blocks([np.vstack([x.r, x.J]) for x in sides])
         self.r, self.J = [x[0] for x in rows], [x[1:] for x in rows]

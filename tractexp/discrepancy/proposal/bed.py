@@ -38,9 +38,11 @@ class Terms(Family):
     """
 
     def with_effects(self, names: Iterable[str]) -> Model:
+        """The model with the libraries that hold these terms."""
         return super().with_effects({kind_of(n) for n in names})
 
     def key(self, names: Iterable[str], beside: str = "") -> Key:
+        """The key of that model: terms of one kind share it."""
         load = {*names, beside} - {"", *self.catalogue.of_measurement}
         return frozenset(map(kind_of, load)), frozenset()
 
@@ -96,6 +98,7 @@ def with_terms(context: Context, chosen: Sequence[Term]) -> Context:
 
 
 def _candidate(context: Context, chosen: Term) -> Candidate:
+    """A term as a candidate: its sizes are those of its balance, its shapes those of its signal."""
     declared = {p.name: p for p in context.problem.parameters}
     sizes = tuple(declared[label] for _, label in sizes_of(chosen))
     shapes = tuple(declared[label] for label in shapes_of(chosen).values())
@@ -107,6 +110,7 @@ class _Part(Effect):
     """One term within the library: what a fit needs to know of it."""
 
     def __init__(self, name: str, parameters: tuple[Parameter, ...], relevant: dict[str, float]):
+        """A part with a name, parameters and relevant sizes, in place of a plugin."""
         self.name, self.parameters, self.relevant = name, parameters, relevant  # type: ignore[misc]
 
     def edit(self, eq: object, **parameters: object) -> None:  # type: ignore[override]

@@ -28,6 +28,7 @@ class Library(Effect):
     order = 2
 
     def __init__(self, kind: str):
+        """All terms of one kind of signal, in one model."""
         self.name = kind  # type: ignore[misc]
         self.signals = tuple(s for s in SIGNALS if s.kind == kind)
         self.clocks = CLOCKS if kind == TIMED else ()
@@ -35,9 +36,11 @@ class Library(Effect):
         self.parameters = tuple(self._parameters())  # type: ignore[misc]
 
     def __repr__(self) -> str:
+        """ "Library('static')"."""
         return f"Library({self.name!r})"
 
     def _parameters(self) -> Any:
+        """A size for each balance, and a switch for each signal and clock."""
         for balance in self.balances:
             for size in balance.sizes:
                 yield size.parameter(size_of(self.name, balance, size), f"size in {balance.words}")
@@ -51,6 +54,7 @@ class Library(Effect):
                 yield shape.parameter(shape_of(signal, shape))
 
     def edit(self, eq: Any, **parameters: Any) -> None:
+        """Add to each balance its size times the signals that are switched on."""
         clock = {"clock": self._clock(eq, parameters)} if self.clocks else {}
         total = 0
         for signal in self.signals:
@@ -66,6 +70,7 @@ class Library(Effect):
                 balance.build(eq, g, **own)
 
     def _clock(self, eq: Any, parameters: dict[str, Any]) -> Any:
+        """The time since what the chosen clock begins with."""
         times = (parameters[pick_of(self.name, c.name)] * c.build(eq) for c in self.clocks)
         return eq.define(f"{self.name}_clock", sum(times), "t")
 

@@ -107,6 +107,7 @@ def _copy_source(function: Callable[..., object], name: str) -> str:
 
 
 def _declare_parameters(term: Term, values: Mapping[str, float]) -> list[str]:
+    """The lines of the effect that declare its parameters."""
     lines = []
     for p in term.parameters(values, PREFIX):
         null = "" if p.null is None else f", null={p.null}"
@@ -118,6 +119,7 @@ def _declare_parameters(term: Term, values: Mapping[str, float]) -> list[str]:
 
 
 def _body(term: Term) -> list[str]:
+    """The lines of the effect that edit the equations."""
     shaped = [f"{s.name}={PREFIX}{s.name}" for s in term.signal.shapes]
     clock = ["clock=clock(eq)"] if term.clock else []
     sized = [f"{s.name}={PREFIX}{s.name}" for s in term.balance.sizes]

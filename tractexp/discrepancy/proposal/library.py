@@ -57,6 +57,7 @@ class Signal:
 
     @property
     def build(self) -> Callable[..., Any]:
+        """The function that writes it into equations."""
         return getattr(shapes, self.name)
 
     @property
@@ -79,6 +80,7 @@ class Clock:
 
     @property
     def build(self) -> Callable[..., Any]:
+        """The function that writes it into equations."""
         return getattr(shapes, self.name)
 
 
@@ -130,6 +132,7 @@ class Balance:
 
     @property
     def build(self) -> Callable[..., Any]:
+        """The function that adds a signal to it."""
         return getattr(balances, self.name)
 
     def places_in(self, eq: Equations) -> tuple[sites.Site, ...]:
@@ -147,6 +150,7 @@ class Term:
 
     @property
     def name(self) -> str:
+        """Kind, balance, signal and clock, by which it is known."""
         return ":".join(
             (
                 self.signal.kind,
@@ -172,6 +176,7 @@ class Term:
 
     @property
     def words(self) -> str:
+        """What it is, in words."""
         text = self.signal.words + (f" {self.clock.words}" if self.clock else "")
         return f"{text}, in {self.balance.words}"
 
@@ -200,18 +205,22 @@ def pick_of(kind: str, name: str) -> str:
 
 
 def _level(low: float, high: float, grid: Grid, latex: str) -> Shape:
+    """A level of a signal, over its value before the event."""
     return Shape("level", grid, (low, high), "1", "level, over the value before the event", latex)
 
 
 def _time(grid: Grid) -> Shape:
+    """A time constant [s]."""
     return Shape("time", grid, (0.002, 3.0), "s", "time constant", "T")
 
 
 def _spread(first: float, last: float, step: float) -> Grid:
+    """Values in even steps."""
     return tuple(round(first + k * step, 6) for k in range(round((last - first) / step) + 1))
 
 
 def _instant(grid: Grid) -> Shape:
+    """An instant [s] at which a signal begins."""
     return Shape("instant", grid, (0.0, 30.0), "s", "instant at which it begins", "t_1")
 
 
@@ -416,10 +425,12 @@ BALANCES = (
 
 @functools.cache
 def terms() -> tuple[Term, ...]:
+    """Every term of the library."""
     return tuple(_terms())
 
 
 def _terms() -> Iterator[Term]:
+    """Each signal in each balance that may have it, by each clock where it is one of time."""
     for balance, signal in itertools.product(BALANCES, SIGNALS):
         if signal.kind not in balance.kinds or signal.name in balance.without:
             continue
@@ -428,4 +439,5 @@ def _terms() -> Iterator[Term]:
 
 
 def term(name: str) -> Term:
+    """The term of that name."""
     return next(t for t in terms() if t.name == name)

@@ -60,6 +60,7 @@ class Proposal:
 
     @property
     def values(self) -> dict[str, float]:
+        """{parameter: value} of the terms."""
         return {k.parameter.name: k.value for k in self.estimates}
 
 
@@ -117,6 +118,7 @@ def propose(
 def _proposal(
     result: TermFits, first: Disagreement, standing: Sequence[TermAssessment], ground: Ground
 ) -> Proposal:
+    """The proposal of the best term that stands, with those that it cannot be told from."""
     chosen, *others = standing
     term, values = result.term(chosen.fit), result.values(chosen.fit)
     errors = standard_errors(result, chosen.fit)

@@ -54,6 +54,7 @@ class TermFits:
     fits: tuple[Refit, ...]
 
     def term(self, fit: Refit) -> Term:
+        """The term that was fitted."""
         return term(fit.names[0])
 
     def values(self, fit: Refit) -> dict[str, float]:

@@ -124,6 +124,7 @@ def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[TermS
 
 
 def _key(setting: Setting) -> tuple:
+    """What tells two settings apart: all but the phase."""
     return tuple(sorted((k, v) for k, v in setting.items() if k != "phase"))
 
 
@@ -155,10 +156,12 @@ def _batches(wanted: Sequence[tuple[Term, Setting]]) -> list[Batch]:
 
 
 def _kind(members: Members) -> str:
+    """The kind of signal that all members have."""
     return members[0][0].signal.kind
 
 
 def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermScore, np.ndarray]]:
+    """The scores of terms that are simulated together."""
     at, index = ground.context.coordinates, {}
     points, spans = [], []
     blocks = []

@@ -37,6 +37,7 @@ def chance(p: float) -> str:
 
 
 def _numbers(parameters: Mapping[str, Mapping[str, Any]]) -> str:
+    """ "size = 0.12 ± 0.01, time = 0.03 ± 0.002"."""
     each: Sequence[str] = [
         f"{n} = "
         + with_error(
