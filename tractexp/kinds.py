@@ -47,14 +47,35 @@ def _is(value: Any, kind: Any) -> bool:
     if origin in (Union, types.UnionType):
         return any(_is(value, one) for one in inner)
     if kind in (int, float):
-        return isinstance(value, Integral if kind is int else Real) and not isinstance(value, bool)
+        return _is_number(value, kind)
     if origin in (Sequence, list, tuple):
-        listed = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-        return listed and all(_is(one, inner[0]) for one in value)
-    if origin is Mapping or origin is dict:
-        return isinstance(value, Mapping) and all(_is(one, inner[1]) for one in value.values())
+        return _is_list(value, inner[0])
+    if origin in (Mapping, dict):
+        return _is_mapping(value, inner[1])
     kind = origin or kind
-    return not isinstance(kind, type) or kind in (Any, Parameter.empty) or isinstance(value, kind)
+    if not isinstance(kind, type) or kind in (Any, Parameter.empty):
+        return True
+    return isinstance(value, kind)
+
+
+def _is_number(value: Any, kind: type) -> bool:
+    """Whether a value is an integer or a real number; no truth value is."""
+    number = Integral if kind is int else Real
+    return isinstance(value, number) and not isinstance(value, bool)
+
+
+def _is_list(value: Any, kind: Any) -> bool:
+    """Whether a value is a list whose items are of a kind; no text is."""
+    if not isinstance(value, Sequence) or isinstance(value, str | bytes):
+        return False
+    return all(_is(one, kind) for one in value)
+
+
+def _is_mapping(value: Any, kind: Any) -> bool:
+    """Whether a value is a mapping whose values are of a kind."""
+    if not isinstance(value, Mapping):
+        return False
+    return all(_is(one, kind) for one in value.values())
 
 
 def _word(kind: Any) -> str:

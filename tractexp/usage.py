@@ -4,7 +4,7 @@ import argparse
 import re
 import shutil
 import textwrap
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from tractexp.choices import (
@@ -96,6 +96,21 @@ def print_choices(arguments: list[str]) -> int:
 
     Of a NAME that has variants these are printed. Raises `UserError` for what is neither.
     """
+    given = _parse_list_arguments(arguments)
+    options = choices([] if given.config_dir is None else [given.config_dir])
+    chosen = _select_groups(given.group, options)
+    options, refused = _import_choices(options)
+    width = min(WIDEST_HELP, shutil.get_terminal_size((WIDEST_HELP, 24)).columns)
+    print("\n\n".join(_describe(name, options, width) for name in chosen or _order_groups(options)))
+    for why in refused:
+        print(f"\nleft out: {why}")
+    return 0
+
+
+def _parse_list_arguments(arguments: list[str]) -> argparse.Namespace:
+    """`group` and `config_dir` of a command line. Raises `UserError` for a folder that is not
+    there.
+    """
     about = (
         "Show what can be chosen: every name of a group with a line on each; without GROUP, of all"
         " groups."
@@ -114,20 +129,21 @@ def print_choices(arguments: list[str]) -> int:
         raise UserError(
             f"tractexp list: there is no folder {given.config_dir}; -cd names one of configurations"
         )
-    options = choices([] if given.config_dir is None else [given.config_dir])
-    # `static`, as `tractexp new static` has it
+    return given
+
+
+def _select_groups(typed: Sequence[str], options: Mapping[str, Mapping[str, Option]]) -> list[str]:
+    """The groups and names that are meant. Raises `UserError` for what is neither.
+
+    `static` is `model/static`, as `tractexp new static` has it.
+    """
     short = {group.rpartition("/")[2]: group for group in options}
-    names: list[str] = [group.rstrip("/=") for group in given.group]
+    names = [group.rstrip("/=") for group in typed]
     chosen = [short.get(name) or name for name in names]
     for name in chosen:
         if name not in options and not _find_group_of_variants(name, options):
             raise UserError(f"there is no group '{name}'{_describe_holders(name, options)}")
-    options, refused = _import_choices(options)
-    width = min(WIDEST_HELP, shutil.get_terminal_size((WIDEST_HELP, 24)).columns)
-    print("\n\n".join(_describe(name, options, width) for name in chosen or _order_groups(options)))
-    for why in refused:
-        print(f"\nleft out: {why}")
-    return 0
+    return chosen
 
 
 def _describe(name: str, options: Mapping[str, Mapping[str, Option]], width: int) -> str:
