@@ -224,28 +224,23 @@ class CSV(Tabular, Reader):
         """What one per unit is: given, that of the record before, or the steady state of values in
         kV and MW.
         """
-        voltage = (
-            self.base_voltage or (sidecar.base and sidecar.base.voltage) or (same and same.voltage)
-        )
-        power = self.base_power or (sidecar.base and sidecar.base.power) or (same and same.power)
-        if (
-            voltage is None
-            and power is None
-            and quantities.absolute["U"]
-            and quantities.absolute["P"] is None
-        ):
+        earlier = sidecar.base or same
+        voltage = self.base_voltage or (earlier and earlier.voltage)
+        power = self.base_power or (earlier and earlier.power)
+        absolute_U, absolute_P = quantities.absolute["U"], quantities.absolute["P"]
+        if voltage is None and power is None and absolute_U and absolute_P is None:
             raise UserError(
                 f"{record.where}: U is in kV, and the unit of P and Q is not told; say"
                 f" {DATA.units}={{P: MW, Q: Mvar}} "
                 f"or {DATA.units}={{P: pu, Q: pu}}, or the base, {DATA.base_voltage} and"
                 f" {DATA.base_power}"
             )
-        chosen_by = None if self.base_power else sidecar.base or same
+        chosen_by = None if self.base_power else earlier
         origin = chosen_by.origin if chosen_by else DECLARATION
         sources = []
-        if (voltage is None and quantities.absolute["U"]) or (
-            power is None and quantities.absolute["P"]
-        ):
+        lacks_voltage = voltage is None and absolute_U
+        lacks_power = power is None and absolute_P
+        if lacks_voltage or lacks_power:
             U, S = level(record)
             if S < 1e-9:
                 raise UserError(
@@ -253,17 +248,15 @@ class CSV(Tabular, Reader):
                     " give no base; say it: "
                     f"{DATA.base_power} (MVA)"
                 )
-            if quantities.absolute["U"]:
-                check_load(record.where, U, S if quantities.absolute["P"] else 0.0)
-            if voltage is None and quantities.absolute["U"]:
+            if absolute_U:
+                check_load(record.where, U, S if absolute_P else 0.0)
+            if lacks_voltage:
                 voltage = U
                 sources.append(f"{U:.4g} kV line to line")
-            if power is None and quantities.absolute["P"]:
+            if lacks_power:
                 power, origin = S, LOAD
                 sources.append(f"{S:.4g} MVA")
-        note = (
-            [f"base: {' and '.join(sources)}, the steady state before the first dip"]
-            if sources
-            else []
-        )
-        return Base(voltage or 1.0, power or 1.0, quantities.frequency, origin), note
+        base = Base(voltage or 1.0, power or 1.0, quantities.frequency, origin)
+        if not sources:
+            return base, []
+        return base, [f"base: {' and '.join(sources)}, the steady state before the first dip"]

@@ -9,6 +9,7 @@ made otherwise is taken whole.
 import hashlib
 import importlib.util
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from tractexp.errors import UserError
@@ -55,30 +56,39 @@ def select_needed_modules(whole: str) -> str:
         m.start() for m in re.finditer(rf"(?<=[;\n])var [\w$]+={re.escape(common[1])}\(\(", whole)
     ]
     parts = [whole[a:b] for a, b in zip(begins, [*begins[1:], len(whole)], strict=True)]
-    where = {
-        name: k
-        for k, part in enumerate(parts)
-        for name in re.findall(rf"([\w$]+)=(?:{wraps})\(", part)
-    }
+    where: dict[str, int] = {}
+    for k, part in enumerate(parts):
+        where |= dict.fromkeys(re.findall(rf"([\w$]+)=(?:{wraps})\(", part), k)
     registered = REGISTERED.search(parts[-1]) if parts else None
-    calls = {
-        k: {where[name] for name in CALLED.findall(part) if name in where}
-        for k, part in enumerate(parts)
-    }
-    kinds = registered[1].rstrip(",").split(",") if registered else []
-    bars = [
-        kind for kind in kinds if any(TRACE in parts[k] for k in calls[where.get(kind[:-2], -1)])
-    ]
-    if registered is None or len(bars) != 1:
+    if registered is None:
+        return whole
+    calls = [_list_called_modules(part, where) for part in parts]
+    bars = []
+    for kind in registered[1].rstrip(",").split(","):
+        called = calls[where[kind[:-2]]] if kind[:-2] in where else ()
+        if any(TRACE in parts[k] for k in called):
+            bars.append(kind)
+    if len(bars) != 1:
         return whole
     parts[-1] = parts[-1].replace(registered[0], f".register([{bars[0]}])")
-    calls[len(parts) - 1] = {where[name] for name in CALLED.findall(parts[-1]) if name in where}
+    calls[-1] = _list_called_modules(parts[-1], where)
     head = whole[: begins[0]]
-    modules, todo = (
-        set[int](),
-        {len(parts) - 1, *(where[name] for name in CALLED.findall(head) if name in where)},
-    )
+    todo = {len(parts) - 1, *_list_called_modules(head, where)}
+    return head + "".join(parts[k] for k in _list_needed_modules(calls, todo))
+
+
+def _list_called_modules(part: str, where: Mapping[str, int]) -> set[int]:
+    """The modules that a part of the library calls, by their places {name: place}."""
+    return {where[name] for name in CALLED.findall(part) if name in where}
+
+
+def _list_needed_modules(calls: Sequence[set[int]], first: set[int]) -> list[int]:
+    """The modules that the first ones need, themselves among them, in order; `calls` are those that
+    each one calls.
+    """
+    needed, todo = set[int](), {*first}
     while todo:
-        modules.add(k := todo.pop())
-        todo |= calls[k] - modules
-    return head + "".join(parts[k] for k in sorted(modules))
+        k = todo.pop()
+        needed.add(k)
+        todo |= calls[k] - needed
+    return sorted(needed)

@@ -128,27 +128,49 @@ def _families(variants: Sequence[Variant], optimizer: str, plain: str) -> list[d
     """Variants of `optimizer` by the switches that are on, one dictionary for each set of other
     settings.
     """
-    own = sorted((v for v in variants if v.settings.get("name") == optimizer), key=lambda v: v.name)
-    without = [v for v in variants if plain and v.settings.get("name") == plain]
-    flags = {k for v in own for k, value in v.settings.items() if isinstance(value, bool)}
-    switches = {k for k in flags if len({v.settings.get(k) for v in own}) > 1}
-    if without:
-        switches |= flags - {k for v in without for k in v.settings}
-
-    def list_switches_on(v: Variant) -> On:
-        return frozenset(k for k in switches if v.settings.get(k))
-
-    def rest(v: Variant) -> set[tuple[str, str]]:
-        return {(k, repr(x)) for k, x in v.settings.items() if k not in switches and k != "name"}
-
+    own = _select_optimizer(variants, optimizer)
+    own.sort(key=lambda v: v.name)
+    without = _select_optimizer(variants, plain) if plain else []
+    switches = _find_switches(own, without)
     groups: dict[frozenset[tuple[str, str]], dict[On, Variant]] = defaultdict(dict)
     for v in own:
-        groups[frozenset(rest(v))].setdefault(list_switches_on(v), v)
+        settings = frozenset(_list_other_settings(v, switches))
+        groups[settings].setdefault(_list_switches_on(v, switches), v)
     for v in without:
         for settings, family in groups.items():
-            if rest(v) <= settings:
-                family.setdefault(list_switches_on(v), v)
+            if _list_other_settings(v, switches) <= settings:
+                family.setdefault(_list_switches_on(v, switches), v)
     return list(groups.values())
+
+
+def _select_optimizer(variants: Sequence[Variant], optimizer: str) -> list[Variant]:
+    """The variants of an optimizer, by its name."""
+    return [v for v in variants if v.settings.get("name") == optimizer]
+
+
+def _find_switches(own: Sequence[Variant], without: Sequence[Variant]) -> set[str]:
+    """The switches that differ among variants; beside an optimizer `without` them all that it
+    lacks.
+    """
+    flags: set[str] = set()
+    for v in own:
+        flags |= {k for k, value in v.settings.items() if isinstance(value, bool)}
+    switches = {k for k in flags if len({v.settings.get(k) for v in own}) > 1}
+    if without:
+        known = {k for v in without for k in v.settings}
+        switches |= flags - known
+    return switches
+
+
+def _list_switches_on(variant: Variant, switches: set[str]) -> On:
+    """The switches that are on in a variant."""
+    return frozenset(k for k in switches if variant.settings.get(k))
+
+
+def _list_other_settings(variant: Variant, switches: set[str]) -> set[tuple[str, str]]:
+    """(setting, value) of a variant without its switches and its name."""
+    others = {*variant.settings} - switches - {"name"}
+    return {(k, repr(variant.settings[k])) for k in others}
 
 
 @dataclass(frozen=True)

@@ -245,21 +245,30 @@ def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
         for run, shift in _spread_runs(v)
         if run in polished.reached
     ]
+    elsewhere = [(run, x) for run, x in dots if polished.in_valley(run) is False]
+    inside = [(run, x) for run, x in dots if polished.in_valley(run) is True]
     for panel, name in enumerate(names):
-        for inside, label, color in (
-            (False, "elsewhere", OUTSIDE),
-            (True, "in the floor's valley", INSIDE),
-        ):
-            some = [(run, x) for run, x in dots if polished.in_valley(run) is inside]
-            labels = [
-                f"{run.optimizer}, seed {run.seed}: {name} {run.parameters[name]:.4g}"
-                for run, _ in some
-            ]
-            values = [run.parameters[name] for run, _ in some]
-            chart.points(label, [x for _, x in some], values, color, panel, size=5, hover=labels)
+        _add_ends(chart, panel, name, "elsewhere", elsewhere, OUTSIDE)
+        _add_ends(chart, panel, name, "in the floor's valley", inside, INSIDE)
         floor = polished.parameters[name]
         chart.level(floor, panel=panel, color=INSIDE).limits(
             panel, *_about([floor, *(run.parameters[name] for run, _ in dots)])
         )
     chart.ticks(None, range(len(variants)), [v.name for v in variants], turned)
     return chart.limits(None, -0.6, len(variants) - 0.4)
+
+
+def _add_ends(
+    chart: Chart,
+    panel: int,
+    name: str,
+    label: str,
+    dots: Sequence[tuple[SearchRun, float]],
+    color: str,
+) -> None:
+    """Add the values of a parameter at which runs ended, [(run, place)], to a panel."""
+    labels = [
+        f"{run.optimizer}, seed {run.seed}: {name} {run.parameters[name]:.4g}" for run, _ in dots
+    ]
+    values = [run.parameters[name] for run, _ in dots]
+    chart.points(label, [x for _, x in dots], values, color, panel, size=5, hover=labels)

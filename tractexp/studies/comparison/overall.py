@@ -80,21 +80,13 @@ def on_records(
         mean = np.mean([[by_seed[seed] for seed in seeds] for by_seed in logs.values()], axis=0)
         whole = chosen.ablation(dict(zip(names, mean.T, strict=True)))
     medians = {
-        name: tuple(
-            float(np.median([run.objective for run in c.gathered[name].runs]) / c.floor.value)
-            for c in comparisons.values()
-        )
+        name: tuple(_median_over_floor(c, name) for c in comparisons.values())
         for name in _order_names(names, ranks)
     }
     problems = f"{len(seeds)} seeds"
     if len(comparisons) > 1:
         problems = f"{len(comparisons)} records, {problems} each"
-    data = [comparison.gathered.variants[0].runs[0].data for comparison in comparisons.values()]
-    names_of = (
-        dict(zip(comparisons, data, strict=True))
-        if len({*data}) == len(data)
-        else {c: c for c in comparisons}
-    )
+    names_of = _name_by_data(comparisons)
     return Overall(
         terms,
         problems,
@@ -107,6 +99,20 @@ def on_records(
         whole,
         _cost(chosen, comparisons.values()),
     )
+
+
+def _median_over_floor(comparison: Comparison, name: str) -> float:
+    """The median objective of a variant's runs, over the floor."""
+    objectives = [run.objective for run in comparison.gathered[name].runs]
+    return float(np.median(objectives) / comparison.floor.value)
+
+
+def _name_by_data(comparisons: Mapping[str, Comparison]) -> dict[str, str]:
+    """{label: name} of comparisons: their data where these differ, else their labels."""
+    data = [comparison.gathered.variants[0].runs[0].data for comparison in comparisons.values()]
+    if len({*data}) < len(data):
+        return {label: label for label in comparisons}
+    return dict(zip(comparisons, data, strict=True))
 
 
 def on_functions(benchmark: "BbobRuns", chosen: VariantFamily | None) -> Overall:

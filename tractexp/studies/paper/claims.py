@@ -126,13 +126,18 @@ def better(
     return _sure(study, p < SIGNIFICANCE_LEVEL and A > 0.5), numbers
 
 
+def _is_ranked(best: float, second: float, worst: float) -> bool:
+    """Whether three errors differ in this order."""
+    return best * DIFFERENT < second and second * DIFFERENT < worst
+
+
 def table1(study: Study) -> list[Claim]:
     """Accuracy, identifiability and size of the three motor orders."""
     third, first, second = (study.orders[m] for m in ("electromechanical", "mechanical", "voltage"))
     P, Q = ([o.spread("train")[c] for o in (third, first, second)] for c in (0, 1))
     said = "electromechanical {}, mechanical {}, voltage {}"
-    ranked_P = P[0] * DIFFERENT < P[1] and P[1] * DIFFERENT < P[2]
-    ranked_Q = Q[0] * DIFFERENT < Q[2] and Q[2] * DIFFERENT < Q[1]
+    ranked_P = _is_ranked(P[0], P[1], P[2])
+    ranked_Q = _is_ranked(Q[0], Q[2], Q[1])
     identified = [f"{o.identified_count} of {o.free}" for o in (third, first, second)]
     alone = (
         third.identified_count == third.free
