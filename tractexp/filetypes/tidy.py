@@ -105,6 +105,7 @@ def restore_recording(path: str, content: Mapping[str, Any]) -> Recording:
             content["device"],
             datetime.fromisoformat(content["start"]) if content["start"] else None,
             content["trigger"],
+            content.get("triggers", ()),  # which earlier versions did not write
             [
                 StatusChannel(**one, raw=(cells[k].values == 1).astype(np.int8))
                 for k, one in enumerate(status, 1 + len(channels))
@@ -206,6 +207,7 @@ def _content(recording: Recording) -> dict[str, Any]:
         "device": recording.device,
         "start": recording.start.isoformat() if recording.start else None,
         "trigger": recording.trigger,
+        "triggers": list(recording.triggers),
         "notes": list(recording.notes),
         "extra": {
             key: {"array": value.tolist(), "type": value.dtype.str}
