@@ -155,3 +155,16 @@ def test_files_of_one_event_are_joined_as_is_advised(tmp_path):
             part.rename(tmp_path / f"event_{folder.upper()}{part.suffix}")
     end, tried, last = walk(str(tmp_path / "event_U.cfg"))
     assert (end, len(tried)) == ("fit", 2), last
+
+
+def test_of_one_phase_the_first_line_names_the_files_of_the_others(tmp_path):
+    for k, name in enumerate(("ev_L1", "ev_L2", "ev_L3")):
+        (tmp_path / name).mkdir()
+        path = write(tmp_path / name, ("U", "kV", V[k]), ("I", "kA", I[k]))
+        for part in (path, path.with_suffix(".dat")):
+            part.rename(tmp_path / f"{name}{part.suffix}")
+    first = str(tractexp.look(str(tmp_path / "ev_L1.cfg"), progress=False).summary()).splitlines()[
+        0
+    ]
+    assert "with ev_L2.cfg and ev_L3.cfg beside it, of the same event, it shows a load" in first
+    assert read_printed(COMMAND.search(first)[1])

@@ -112,6 +112,7 @@ def restore_recording(path: str, content: Mapping[str, Any]) -> Recording:
             ],
             list(content["notes"]),
             {key: _extra(value) for key, value in content["extra"].items()},
+            tuple(content.get("triggers", ())),
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise UserError(

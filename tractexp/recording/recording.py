@@ -229,11 +229,11 @@ class Recording:
     device: str = ""
     start: datetime | None = None  # of the first sample
     trigger: float | None = None  # s since the first sample
-    triggers: Sequence[float] = ()  # of all parts, where several were triggered
     status: Sequence[StatusChannel] = ()
     notes: Sequence[str] = ()  # what was mended while reading, with the line
     # what the format has besides, for a round trip
     extra: Mapping[str, Any] = field(default_factory=dict)
+    triggers: Sequence[float] = ()  # of all parts, where several were triggered
 
     @property
     def samples(self) -> int:

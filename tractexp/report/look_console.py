@@ -140,7 +140,9 @@ def _answer(files: Sequence[Entry]) -> str:
         command = f"; to fit it: {best['command']}" if best["command"] else ""
         secondary = f"; {SECONDARY}" if best.get("secondary") else ""
         worth = f"is worth fitting{_reservation(first['why'])}{secondary}"
-        return f"{_event(first)} of {best['name']} {worth}{command}"
+        own = (entry for entry in files if best in entry["feeders"])
+        beside = "".join(f"; {entry['proposed']}" for entry in own if entry.get("proposed"))
+        return f"{_event(first)} of {best['name']} {worth}{beside}{command}"
     return "; ".join([_refuse(files), *filter(None, (entry.get("proposed") for entry in files))])
 
 
