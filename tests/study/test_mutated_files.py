@@ -61,6 +61,13 @@ def test_what_was_found_stays_mended(sound, tmp_path, name, seed, case):
     assert kind in ("read", "refused"), f"{name}, {done}: {words}"
 
 
+def test_the_stored_run_of_damaged_structures_is_long_and_found_nothing_more():
+    stored = json.loads((BENCHMARKS / "structured_damage.json").read_text(encoding="utf-8"))
+    counts = [count for of_format in stored["counts"].values() for count in of_format.values()]
+    assert sum(counts) == stored["cases"] == 10_000
+    assert stored["bad"] == []
+
+
 @pytest.mark.parametrize(
     "words", ["invalid literal for int() with base 10: '7A'", "month must be in 1..12"]
 )
