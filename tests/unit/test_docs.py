@@ -3,11 +3,15 @@ described.
 """
 
 import ast
+import dataclasses
 import re
 from pathlib import Path
 
 import pytest
 
+from tractexp.api.discrepancy import Misfit
+from tractexp.exchange.operating_point import OperatingPoint
+from tractexp.identification.result import Result
 from tractexp.plugin import discover
 
 ROOT = Path(__file__).parents[2]
@@ -54,3 +58,17 @@ def test_what_computes_a_number_is_where_the_page_says():
         tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
         defined = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.ClassDef)}
         assert {*re.findall(r"`(\w+)`", names)} <= defined, f"{path}: {names}"
+
+
+# of what results hold, what is no number or was given
+NO_NUMBERS = {
+    *("status", "seed", "at_bound", "units", "bounds", "model", "shown_effects", "optimizer"),
+    *("advice", "notes", "verdicts", "records", "own_base", "tractexp_version", "commit"),
+}
+
+
+@pytest.mark.parametrize("held", [Result, OperatingPoint, Misfit])
+def test_every_number_of_a_result_is_on_the_page_of_numbers(held):
+    page = (ROOT / "docs" / "numbers.md").read_text(encoding="utf-8")
+    told = {*re.findall(r"`(\w+)`", page)} - NO_NUMBERS
+    assert {field.name for field in dataclasses.fields(held)} - NO_NUMBERS <= told
