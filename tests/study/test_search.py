@@ -146,7 +146,7 @@ def test_an_end_that_the_search_has_passed_is_none(capsys, monkeypatch):
     monkeypatch.setattr(progress, "_lively", lambda: False)
     with progress.report_search(4, None) as tell:
         tell(5, 0.25, 30)
-    assert capsys.readouterr().out == "  iteration 5: 30 simulations, best objective 0.25\n"
+    assert capsys.readouterr().err == "  iteration 5: 30 simulations, best objective 0.25\n"
 
 
 def test_a_target_ends_the_search_at_once():
