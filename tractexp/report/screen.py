@@ -2,8 +2,8 @@
 the page, and printed by `--all`.
 """
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from tractexp.blocks import Report, Table
 from tractexp.identification.result import Result
@@ -77,7 +77,7 @@ def describe_error(result: Result) -> str:
     return f"error, of the response: {', '.join(parts)}"
 
 
-def _tell_error(entry: dict[str, object]) -> str:
+def _tell_error(entry: Mapping[str, Any]) -> str:
     """A model's error with its interval."""
     interval = entry.get("interval")
     if entry.get("stalls") or not isinstance(interval, list | tuple) or None in interval:
