@@ -19,9 +19,9 @@ LIMITS = {
     "functions called by a participle or a preposition": 2,
     "texts and lists multiplied by a condition": 0,
     "numbers' names with several homes": 0,
-    "functions of complexity over 10, in percent": 6.0,
+    "functions of complexity over 10, in percent": 5.8,
 }
-LEAST_DOCSTRINGS = 17.3  # percent of all lines
+LEAST_DOCSTRINGS = 17.6  # percent of all lines
 
 PARTICIPLE = re.compile(r"[a-z]+(ed|ing)")
 PREPOSITIONS = re.compile(

@@ -31,6 +31,9 @@ class SearchStore:
     """
 
     def __init__(self, problem: Problem, limits: Limits, on: bool = True):
+        """The store of one problem's searches, where they can be told apart: no limit of time, all
+        parts installed.
+        """
         stored = (
             on
             and limits.seconds is None
@@ -50,6 +53,7 @@ class SearchStore:
         return None
 
     def store_result(self, settings: Mapping[str, Any], seed: int, result: SearchResult) -> None:
+        """Keep a result."""
         ending = {k: v for k, v in vars(result).items() if k not in ("values", "history")}
         arrays = {name: getattr(result.history, name) for name in ARRAYS}
         key = self._key(settings, seed)
@@ -66,6 +70,7 @@ class SearchStore:
         return SEARCHES.arrays(self.problem and store.key(self.problem, what), compute)
 
     def _key(self, settings: Mapping[str, Any], seed: int) -> str:
+        """The key of a search; "" where it cannot be kept."""
         optimizer = build("optimizer", dict(settings))
         return (
             store.key(self.problem, repr(optimizer), seed)
@@ -75,6 +80,7 @@ class SearchStore:
 
 
 def _parts(problem: Problem) -> tuple[Any, ...]:
+    """The plugins that a problem is made of."""
     return problem.model.motor, problem.model.static, *problem.model.effects
 
 

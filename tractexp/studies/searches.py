@@ -115,6 +115,7 @@ def attempt(
 
 
 def _search_chunk(chunk: _Chunk) -> list[SearchResult | FailedSearch]:
+    """The results of a chunk's seeds, in order; runs in a worker."""
     problem = chunk.recipe()
     return [_search_once(problem, chunk, seed) for seed in chunk.seeds]
 

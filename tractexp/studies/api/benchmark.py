@@ -46,6 +46,7 @@ class BenchmarkResult(Written):
         return sentences(self.bbob)
 
     def table(self) -> Table:
+        """What each optimizer reaches, by dimension."""
         from tractexp.studies.bbob.page import scale, span
 
         bbob = self.bbob
@@ -63,6 +64,7 @@ class BenchmarkResult(Written):
         return Table(columns, rows, f"share of targets met, functions solved: {scale(bbob)}")
 
     def summary(self) -> Report:
+        """The answer for each dimension, and the table."""
         from tractexp.studies.bbob import page
 
         sentences = [page.answer(self.bbob, d) for d in self.bbob.plan.dimensions]
@@ -73,22 +75,26 @@ class BenchmarkResult(Written):
         )
 
     def report(self) -> Report:
+        """The page: running times, targets reached, functions."""
         from tractexp.studies.bbob import page
 
         return page.report(self.bbob)
 
     def write_results(self, folder: Path) -> list[Path]:
+        """Write `benchmark.json`."""
         from tractexp.studies.bbob.page import content
 
         return [files.write_json(folder / "benchmark.json", content(self.bbob, self.optimizers))]
 
     def to_dict(self) -> dict[str, Any]:
+        """Runs and settings as plain data."""
         from tractexp.studies.bbob.page import content
 
         return {**content(self.bbob, self.optimizers), "titles": self.bbob.titles}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """The benchmark that `to_dict` gave."""
         from tractexp.studies.bbob.runs import BbobPlan, BbobRun, BbobRuns
 
         def run(row: Mapping[str, Any]) -> BbobRun:
@@ -201,6 +207,7 @@ def check(
 
 
 def _tuple(value: Any) -> Any:
+    """A list as a tuple; anything else as it is."""
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -224,6 +231,7 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
     cores: int | None = None  # processes; null: all cores, one for a job of a sweep
 
     def check(self) -> None:
+        """Raise `UserError` for settings out of range."""
         check(
             self.functions,
             self.instances,
@@ -238,6 +246,7 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
             get("optimizer", name)
 
     def perform(self, job: Job, **instead: Any) -> BenchmarkResult:
+        """Run the run's optimizers; in one process where the run is one of many."""
         cores = self.cores or (1 if job.of_many else None)
         return super().perform(
             job, optimizers=self.optimizers(job), cores=cores, progress=None, **instead

@@ -70,6 +70,7 @@ class ComparisonResult(Written):
         return self.content["sentences"]
 
     def table(self) -> Table:
+        """A row for each variant on each problem."""
         several = self.content.get("problems")
         each = several or {self.content["problem"]: self.content}
         rows = [
@@ -98,6 +99,7 @@ class ComparisonResult(Written):
         )
 
     def summary(self) -> Report:
+        """The answer, the table, and what was tested."""
         report, several = Report(), "problems" in self.content
         if several:
             report.text(f"{self.source}: {', '.join(self.content['problems'])}").add(
@@ -132,14 +134,17 @@ class ComparisonResult(Written):
             )
 
     def report(self) -> Report:
+        """The page of the comparison."""
         return _report(self.comparison).report(self.comparison, self.source)
 
     def to_dict(self) -> dict[str, Any]:
+        """Call, content and searches as plain data."""
         made = {} if self.searches is None else {"searches": self.searches.to_dict()}
         return {"call": dict(self.call), **self.content, **made}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """The comparison that `to_dict` gave."""
         beside = ("call", "kind", "tractexp", "searches")
         own = {key: value for key, value in content.items() if key not in beside}
         made = content.get("searches")
@@ -267,6 +272,7 @@ def check(
 
 
 def _report(comparison: "Comparison | Several") -> Any:
+    """The module that writes the page: of one problem, or of several."""
     from tractexp.studies.comparison import overall_page, page
     from tractexp.studies.comparison.overall import Several
 
@@ -274,6 +280,7 @@ def _report(comparison: "Comparison | Several") -> Any:
 
 
 def _hardest(targets: Sequence[float]) -> int:
+    """The place of the lowest target."""
     return targets.index(min(targets))
 
 
@@ -361,9 +368,11 @@ class Compare(Task, call=compare, given=("uri", "experiment")):
     cores: int | None = None  # processes for these; null: all cores
 
     def check(self) -> None:
+        """Raise `UserError` for settings out of range."""
         check(self.sweep, self.filter, self.targets, self.ties, self.floor, self.apart, self.bbob)
 
     def perform(self, job: Job, **instead: Any) -> ComparisonResult:
+        """Compare what the run's settings name, in the run's own store."""
         node = job.config["tracking"]
         return super().perform(
             job, uri=node["uri"], experiment=node["experiment"], progress=None, **instead

@@ -71,6 +71,7 @@ class PaperResult(Written):
         return Counter(claim.word for claim in self.claims)
 
     def table(self) -> Table:
+        """Every claim with its verdict and what was measured."""
         from tractexp.studies.paper.claims import count_verdicts
 
         rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
@@ -82,14 +83,17 @@ class PaperResult(Written):
         )
 
     def summary(self) -> Report:
+        """The claims, and how long that took."""
         page = Report().add(self.table())
         return page.text(f"in {self.seconds:.0f} s") if self.seconds else page
 
     def report(self) -> Report:
+        """The page: each table and figure, measured again."""
         return self._report
 
     @functools.cached_property
     def _report(self) -> Report:
+        """The same page, made once."""
         from tractexp.studies.paper.page import report
 
         return report(self.study, self.parts, self.claims)
@@ -102,12 +106,14 @@ class PaperResult(Written):
         return [files.write_json(folder / "paper.json", content)]
 
     def drawings(self) -> Mapping[str, Drawing]:
+        """The page, and the same as Markdown."""
         return {
             **super().drawings(),
             "paper.md": lambda path: files.write(path, self._report.markdown),
         }
 
     def to_dict(self) -> dict[str, Any]:
+        """Claims, settings and parts as plain data."""
         return {
             "claims": [asdict(claim) for claim in self.claims],
             "settings": dict(self.settings),
@@ -118,6 +124,7 @@ class PaperResult(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """The claims that `to_dict` gave."""
         from tractexp.studies.paper.claims import Claim
 
         claims = [Claim(**claim) for claim in content["claims"]]
@@ -223,6 +230,9 @@ def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
 
 
 def _study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "Study":
+    """The searches and fits that the parts ask for, with the printed equations beside the usual
+    ones.
+    """
     from tractexp.studies.paper.study import Study
 
     literal = replace(setup, model=setup.model.with_(integration="printed"))
@@ -267,19 +277,23 @@ class Paper(Task, call=paper):
     docs: str | None = None  # write paper.md to this file too
 
     def check(self) -> None:
+        """Raise `UserError` for settings out of range."""
         check(self.parts, getattr(self, "seeds"), getattr(self, "workers"))  # noqa: B009 # settings of the call
 
     def perform(self, job: Job, **instead: Any) -> PaperResult:
+        """Measure with dips held out, and print each stage."""
         job = job.holding_out(self.held_out)
         for line in describe_records(*job.events_of_fit, held_out="hold out"):
             say(line)
         return super().perform(job, progress=lambda line: say(f"  {line}"), **instead)
 
     def log(self, job: Job, result: PaperResult, paths: list[Path]) -> None:
+        """Log the claims; with `docs` their pages are copied there."""
         if self.docs is not None:
             print_paths(files.copy(path, Path(self.docs)) for path in paths if path.suffix == ".md")
         super().log(job, result, paths)
 
     def track(self, job: Job, result: PaperResult, paths: list[Path]) -> "TrackedRun | None":
+        """How many claims got each verdict, for MLflow."""
         metrics = {verdict.replace(" ", "_"): float(n) for verdict, n in result.counts.items()}
         return job.track(name="the paper", metrics=metrics, artifacts=paths)

@@ -33,6 +33,7 @@ class Searches(Written):
     runs: "tuple[SearchRun, ...]"
 
     def table(self) -> Table:
+        """A row for each search: variant, seed and where it ended."""
         from tractexp.studies.comparison.runs import name_variants
 
         columns = ["variant", "seed", "objective [pu²]", "epsilon_p", "epsilon_q", "simulations"]
@@ -49,13 +50,16 @@ class Searches(Written):
         return Table([*columns, "failure"], rows, words=(6,))
 
     def write_results(self, folder: Path) -> list[Path]:
+        """Write `searches.json`."""
         return [files.write_json(folder / "searches.json", self.to_dict())]
 
     def to_dict(self) -> dict[str, Any]:
+        """Call and searches as plain data."""
         return {"setup": self.setup.to_dict(), "runs": [run.to_dict() for run in self.runs]}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """The searches that `to_dict` gave."""
         from tractexp.studies.comparison.runs import SearchRun
 
         runs = tuple(map(SearchRun.from_dict, content["runs"]))

@@ -13,6 +13,7 @@ from tractexp.wording import count_noun
 
 
 def scale(benchmark: BbobRuns) -> str:
+    """How many functions, dimensions and instances were run, in a phrase."""
     plan = benchmark.plan
     functions, dimensions = len(plan.functions), " and ".join(map(str, plan.dimensions))
     return (
@@ -125,6 +126,7 @@ def span(functions: list[int]) -> str:
 
 
 def report(benchmark: BbobRuns) -> Report:
+    """The page of a benchmark."""
     plan = benchmark.plan
     page = Report(
         f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}."
@@ -172,10 +174,12 @@ def _times(page: Report, benchmark: BbobRuns, d: int) -> None:
 
 
 def _caption(plan: Any, target: int) -> str:
+    """What the table of running times shows."""
     return f"ERT to {plan.targets[target]:g} from the optimum, in evaluations (runs that met it)."
 
 
 def _reading(page: Report) -> Report:
+    """Add how the page is read."""
     return page.heading("How to read this page").items(
         [
             "ERT, the expected running time, is what all runs spent until they met the target,"

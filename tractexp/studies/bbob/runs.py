@@ -47,6 +47,7 @@ class Bbob:
     """
 
     def __init__(self, function: int, dimension: int, instance: int, targets: Sequence[float]):
+        """A function of BBOB in one instance, with the targets that are counted."""
         ioh = package()
         self.problem: Any = ioh.get_problem(function, instance, dimension, ioh.ProblemClass.BBOB)
         self.name: str = self.problem.meta_data.name
@@ -68,6 +69,7 @@ class Bbob:
         return f
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
+        """Raise `UserError`: a function of BBOB is no sum of squares."""
         raise UserError(
             "a BBOB function is no sum of squares, so least squares have no residuals to work on;"
             " choose another"
@@ -141,6 +143,7 @@ def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: BbobP
 
 
 def _run(job: tuple[str, Optimizer, tuple[int, int, int], BbobPlan]) -> BbobRun:
+    """One run of an optimizer on a case of a plan."""
     return run(*job)
 
 

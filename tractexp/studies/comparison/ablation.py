@@ -175,11 +175,14 @@ def _list_other_settings(variant: Variant, switches: set[str]) -> set[tuple[str,
 
 @dataclass(frozen=True)
 class _Contrasts:
+    """Which variants differ in a switch, or in two, and by how much their objectives."""
+
     names: dict[On, str]
     logs: dict[On, np.ndarray]  # log10 of the objective, by seed
     switches: tuple[str, ...]
 
     def ablation(self) -> Ablation:
+        """The effects of switches, alone, in company and in pairs."""
         single = {(s,): self._pairs(s) for s in self.switches}
         double = {pair: self._squares(*pair) for pair in combinations(self.switches, 2)}
         company = {(s,): self._ends(s) for s in self.switches}
@@ -211,9 +214,11 @@ class _Contrasts:
         return replace(effect, better=(float(wins.mean()), *bootstrap(wins)))
 
     def _pairs(self, switch: str) -> list[tuple[On, ...]]:
+        """(with, without) of a switch, all else alike."""
         return self._select_existing([(on | {switch}, on) for on in self.logs if switch not in on])
 
     def _squares(self, a: str, b: str) -> list[tuple[On, ...]]:
+        """(both, first, second, neither) of two switches, all else alike."""
         return self._select_existing(
             [(on | {a, b}, on | {a}, on | {b}, on) for on in self.logs if not {a, b} & on]
         )
@@ -226,4 +231,5 @@ class _Contrasts:
         return [(*pairs[-1], *pairs[0])] if pairs and len(pairs[-1][1]) > len(pairs[0][1]) else []
 
     def _select_existing(self, rows: list[tuple[On, ...]]) -> list[tuple[On, ...]]:
+        """Those contrasts of which every variant is there."""
         return [row for row in rows if all(on in self.logs for on in row)]

@@ -97,12 +97,14 @@ def runtime_curves(
 
 
 def _shares(cost: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+    """The steps of a distribution of costs between two ends."""
     x, counts = np.unique(cost[np.isfinite(cost)], return_counts=True)
     x, y = style.thin(x, np.cumsum(counts) / len(cost), 240)
     return np.array([first, *x, last]), np.array([0, *y, *(y[-1:] if len(y) else [0])])
 
 
 def targets_in_words() -> str:
+    """Which targets the curves count."""
     return (
         f"{len(ECDF_TARGETS)} targets from {ECDF_TARGETS[0]:.0f} to {ECDF_TARGETS[-1]:.2f} times"
         " the floor"
@@ -178,6 +180,7 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
 
 
 def round_numbers(low: float, high: float) -> list[float]:
+    """Round numbers between two ends, for an axis in powers of ten."""
     few, more = (
         [m * 10.0**k for k in range(-20, 5) for m in marks if low <= m * 10.0**k <= high]
         for marks in ROUND

@@ -24,6 +24,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def p_value(p: float) -> str:
+    """A probability with two digits."""
     return f"{p:.2g}" if p >= 1e-4 else f"{p:.1e}"
 
 
@@ -102,6 +103,7 @@ def _verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], 
 
 
 def headline(comparison: Comparison) -> str:
+    """Which variants lead, in a sentence."""
     if not comparison.pairs:
         return "No difference between variants was tested."
     best, *others = comparison.leaders
@@ -132,6 +134,7 @@ def near_and_far(comparison: Comparison) -> tuple[list[VariantPair], list[Varian
 
 
 def _list_names(names: list[str]) -> str:
+    """Names in a sentence, or how many there are."""
     return join_words(sorted(names)) if len(names) <= 6 else f"{len(names)} other variants"
 
 
@@ -205,6 +208,7 @@ def of_speed(comparison: Comparison) -> str:
 
 
 def of_floor(comparison: Comparison) -> str:
+    """How many runs of each variant reach the floor, in a sentence."""
     shares = _describe_shares([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
     value, source = number(comparison.floor.value, 5), comparison.floor.source
     return f"Runs within {FLOOR_SHARE:.0%} of the floor of {value} pu² ({source}): {shares}."
@@ -235,6 +239,7 @@ def _describe_shares(rows: list[tuple[float, int, str]]) -> str:
 
 
 def of_effect(effect: SwitchEffect) -> str:
+    """What a switch does, in a sentence."""
     (switch,) = effect.switches
     verdict = (
         "no effect is shown"
@@ -253,6 +258,7 @@ def of_effect(effect: SwitchEffect) -> str:
 
 
 def _listed_contrasts(effect: SwitchEffect) -> str:
+    """The pairs of variants that a switch was judged by, or how many."""
     pairs = [f"{with_} against {without}" for with_, without in effect.contrasts]
     return (
         " and ".join(pairs)

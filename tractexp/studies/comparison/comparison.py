@@ -38,6 +38,7 @@ class VariantPair:
 
     @property
     def significant(self) -> bool:
+        """Whether the two differ by more than chance, corrected for all pairs."""
         return self.corrected < SIGNIFICANCE_LEVEL
 
 
@@ -135,6 +136,7 @@ def seeds_needed(pairs: int) -> int:
 
 
 def _measure_standing(median: float, least: float) -> tuple[bool, float]:
+    """What variants are ranked by: nan last, medians below the least count as that."""
     return bool(np.isnan(median)), max(median, least)
 
 
@@ -179,6 +181,7 @@ def _pairs(
 
 
 def _pair(a: Variant, b: Variant, seeds: Sequence[int], least: float) -> VariantPair:
+    """The test of two variants by seed, the better one first."""
     x, y = (np.maximum([v.objectives[seed] for seed in seeds], least) for v in (a, b))
     p, lower = wilcoxon(x, y)
     effect = vargha_delaney(x, y)
@@ -190,6 +193,7 @@ def _pair(a: Variant, b: Variant, seeds: Sequence[int], least: float) -> Variant
 
 
 def _median(variant: Variant, seeds: Sequence[int]) -> float:
+    """The median objective of a variant; of an even number the mean of the two in the middle."""
     values = np.sort([variant.objectives[seed] for seed in seeds])
     middle = values[(len(values) - 1) // 2], values[len(values) // 2]
     return float(middle[0] if middle[0] == middle[1] else np.mean(middle))

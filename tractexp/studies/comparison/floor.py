@@ -122,6 +122,7 @@ def floor_of(
 
 
 def _same(problem: Problem, ends: np.ndarray, runs: Sequence[SearchRun]) -> bool:
+    """Whether a problem gives the objectives that runs recorded at their ends."""
     recorded = np.array([run.objective for run in runs])
     return (
         bool(np.allclose(problem.objective(ends), recorded, rtol=SAME_PROBLEM_TOLERANCE, atol=0))

@@ -65,11 +65,13 @@ def _jobs(folder: Path) -> list[Path]:
 
 
 def _job(folder: Path) -> SearchRun | None:
+    """The run of a sweep's folder; None for what is no search."""
     with _readable(folder):
         return _read_job(folder)
 
 
 def _read_job(folder: Path) -> SearchRun | None:
+    """The same, with errors as they come."""
     config = _yaml(folder / ".hydra" / "config.yaml")
     if config["task"]["name"] != FITTING:
         return None
@@ -164,6 +166,7 @@ def _explain_missing_result(folder: Path, status: Mapping[str, Any]) -> dict[str
 
 
 def _yaml(path: Path) -> Any:
+    """The content of a file of a run."""
     with _readable(path):
         return files.read_yaml(path)
 
@@ -208,6 +211,7 @@ def from_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
 
 
 def _read_logged_run(one: Any) -> SearchRun:
+    """A run as MLflow has it."""
     fields: dict[str, Any] = {
         "optimizer": one.tags["optimizer"],
         "data": one.tags["data"],
@@ -236,6 +240,7 @@ def _read_logged_run(one: Any) -> SearchRun:
 
 
 def _value(text: str) -> Any:
+    """A parameter of MLflow as the value that it was."""
     try:
         return json.loads(text)
     except json.JSONDecodeError:

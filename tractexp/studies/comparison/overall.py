@@ -159,6 +159,7 @@ def on_functions(benchmark: "BbobRuns", chosen: VariantFamily | None) -> Overall
 
 
 def _has(comparison: Comparison, name: str) -> bool:
+    """Whether a comparison has a variant of that name."""
     return name in (variant.name for variant in comparison.gathered.variants)
 
 
@@ -178,10 +179,12 @@ def _logs(comparison: Comparison, names: Sequence[str]) -> dict[int, list[float]
 
 
 def _rank_optimizers(names: Sequence[str], table: np.ndarray) -> Ranks | None:
+    """Friedman's ranks of a table (blocks, variants); None for too few."""
     return friedman(names, table) if len(names) > 2 and len(table) >= LEAST_SEEDS else None
 
 
 def _order_names(names: Sequence[str], ranks: Ranks | None) -> list[str]:
+    """Names by their mean rank, as they are without ranks."""
     return (
         sorted(names, key=dict(zip(ranks.names, ranks.mean, strict=True)).__getitem__)
         if ranks

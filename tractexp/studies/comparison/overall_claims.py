@@ -93,6 +93,7 @@ def of_agreement(several: Several) -> str:
 
 
 def _help(names: list[str]) -> str:
+    """ "levy helps", or "levy and tent help"."""
     return f"{join_words(names)} {'helps' if len(names) == 1 else 'help'}"
 
 

@@ -48,6 +48,7 @@ def report(several: Several, source: str) -> Report:
 
 
 def _overall(page: Report, overall: Overall) -> None:
+    """Add what comes out over all problems."""
     page.heading(f"{overall.terms}: {overall.where}" if overall.terms else overall.where)
     if overall.ablation:
         page.text(claims.of_switches(overall))
@@ -114,6 +115,7 @@ def effects(overall: Overall) -> Chart:
 
 
 def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
+    """Add the table of what each switch does."""
     cost = overall.cost
     columns = ["switched on", "factor", "from", "to", "better in", "from", "to", "shown"]
     columns += ["simulations per iteration"] if cost else []
@@ -151,6 +153,7 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
 
 
 def _reading(page: Report) -> Report:
+    """Add how the page is read."""
     return page.heading("How to read this page").items(
         [
             "Every problem has a floor of its own, the lowest objective that least squares reach;"

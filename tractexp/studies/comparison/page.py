@@ -47,6 +47,7 @@ def report(comparison: Comparison, source: str) -> Report:
 
 
 def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
+    """Best, quartiles and worst as cells."""
     return [
         number(x * scale, 4)
         for x in (spread.best, spread.lower, spread.median, spread.upper, spread.worst)
@@ -54,6 +55,7 @@ def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
 
 
 def quality(page: Report, comparison: Comparison) -> None:
+    """Add where the runs ended."""
     page.heading("Where the runs ended")
     drawn = charts.spread(comparison.variants, comparison.floor)
     page.chart(drawn, f"Objective {AT_END} of every run that finished. Dashed: the floor.")
@@ -94,6 +96,7 @@ def quality(page: Report, comparison: Comparison) -> None:
 
 
 def _share(value: float | None) -> str:
+    """A share in percent; "-" for none."""
     return "-" if value is None else f"{value:.0%}"
 
 
@@ -129,6 +132,7 @@ def _parameters(page: Report, comparison: Comparison) -> None:
 
 
 def _speed(page: Report, comparison: Comparison) -> None:
+    """Add how fast the variants reach the targets."""
     page.heading("How fast")
     goals = [f"{target:g} x floor" for target in comparison.targets]
     columns = [
@@ -184,6 +188,7 @@ def _curves(
 
 
 def _differences(page: Report, comparison: Comparison) -> None:
+    """Add which differences are more than chance."""
     page.heading("Is the difference more than chance?")
     if comparison.ranks:
         page.text(claims.of_ranks(comparison))
@@ -210,6 +215,7 @@ def _differences(page: Report, comparison: Comparison) -> None:
 
 
 def _pairs(page: Report, pairs: list[VariantPair]) -> None:
+    """Add the table of tested pairs."""
     rows = [
         [
             pair.first,
@@ -245,6 +251,7 @@ def _pairs(page: Report, pairs: list[VariantPair]) -> None:
 
 
 def switches(page: Report, ablation: Ablation) -> None:
+    """Add what each ingredient does."""
     page.heading("What each ingredient does")
     page.items([claims.of_effect(effect) for effect in ablation.effects])
     columns = ["switched on", "factor", "from", "to", "seeds", "shown", "contrasts"]
@@ -273,6 +280,7 @@ def factor(effect: SwitchEffect) -> list[str]:
 
 
 def _not_judged(page: Report, comparison: Comparison) -> None:
+    """Add the runs that failed or were interrupted."""
     for title, rows in zip(
         ("Failures", "Interrupted: not judged"), _without_result(comparison), strict=True
     ):
@@ -301,6 +309,7 @@ def _without_result(comparison: Comparison) -> list[list[dict[str, Any]]]:
 
 
 def _reading(page: Report, comparison: Comparison) -> None:
+    """Add how the page is read."""
     page.heading("How to read this page").items(
         [
             f"Objectives within {comparison.ties:g} of the floor count as equal in the tests: what"
@@ -362,6 +371,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
 
 
 def _of_run(variant: Variant, run: SearchRun, comparison: Comparison) -> dict[str, Any]:
+    """What `comparison.json` holds of a run."""
     inside = comparison.polished.in_valley(run) if comparison.polished else None
     fields = {
         key: getattr(run, key)

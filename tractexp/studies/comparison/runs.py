@@ -51,6 +51,7 @@ class SearchRun:
 
     @property
     def is_finished(self) -> bool:
+        """Whether it neither failed nor was interrupted."""
         return not (self.failure or self.interruption)
 
     def to_dict(self) -> dict[str, Any]:
@@ -87,6 +88,7 @@ class Variant:
 
     @property
     def finished_runs(self) -> list[SearchRun]:
+        """The runs that are finished."""
         return [run for run in self.runs if run.is_finished]
 
     @property
@@ -107,6 +109,7 @@ class Gathered:
     interrupted: tuple[tuple[str, SearchRun], ...] = ()  # (variant, run), which are not judged
 
     def __getitem__(self, name: str) -> Variant:
+        """The variant of that name. Raises `UserError` with those there are."""
         variants = [variant for variant in self.variants if variant.name == name]
         if not variants:
             raise UserError(
@@ -175,6 +178,7 @@ def gather(runs: Sequence[SearchRun], source: str) -> Gathered:
 
 
 def _check_any_finished(runs: Sequence[SearchRun], source: str) -> None:
+    """Raise `UserError` where no run is finished, with the reason."""
     if any(run.is_finished for run in runs):
         return
     failures = [run.failure for run in runs if run.failure]
@@ -192,6 +196,7 @@ Settings = tuple[str, tuple[tuple[str, str], ...]]  # the optimizer as chosen, a
 
 
 def _settings(run: SearchRun) -> Settings:
+    """What tells variants apart: the optimizer and its settings."""
     settings = {
         key: value for key, value in run.config.items() if key.partition(".")[0] in SETTINGS
     }
@@ -199,6 +204,7 @@ def _settings(run: SearchRun) -> Settings:
 
 
 def _identity(run: SearchRun) -> tuple[Settings, int]:
+    """What tells runs apart: the variant and the seed."""
     return _settings(run), run.seed
 
 
@@ -230,6 +236,7 @@ def _names(runs: Sequence[SearchRun]) -> dict[Settings, str]:
 
 
 def _variants(runs: list[SearchRun], names: Mapping[Settings, str]) -> tuple[Variant, ...]:
+    """The variants of runs, each with its runs."""
     groups: dict[Settings, list[SearchRun]] = defaultdict(list)
     for run in runs:
         groups[_settings(run)].append(run)
@@ -242,10 +249,12 @@ def _variants(runs: list[SearchRun], names: Mapping[Settings, str]) -> tuple[Var
 
 
 def _plain(value: str) -> str:
+    """A value as the command line writes it."""
     return {"None": "null", "True": "true", "False": "false"}.get(value, value.strip("'"))
 
 
 def _problem_name(run: SearchRun) -> str:
+    """The data and the model of a run, in a phrase."""
     return (
         f"{run.data}, model {run.config.get('model.motor.name', '?')} with"
         f" {run.config.get('model.static.name', '?')}"

@@ -27,6 +27,7 @@ class Spread:
 
     @classmethod
     def from_values(cls, values: Sequence[float]) -> "Spread":
+        """Best, quartiles and worst of some values; nan of none."""
         if not len(values):
             return cls(*[float("nan")] * 5)
         return cls(*map(float, np.quantile(values, (0, 0.25, 0.5, 0.75, 1))))

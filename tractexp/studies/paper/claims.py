@@ -78,6 +78,7 @@ def middle(values: Sequence[float] | np.ndarray) -> str:
 
 
 def percent(value: float) -> str:
+    """A fraction in percent with two digits."""
     return f"{100 * value:.2f} %"
 
 
@@ -231,6 +232,7 @@ def how_read(name: str) -> str:
 
 
 def table3(study: Study) -> list[Claim]:
+    """Which optimizer ends lower, after as many iterations and after as many simulations."""
     claims = []
     for first, second in PAIRS:
         for by in BUDGETS:
@@ -344,6 +346,7 @@ def _jumps(study: Study) -> Claim:
 
 
 def _sure(study: Study, holds: bool) -> str:
+    """The verdict: open with too few seeds."""
     return OPEN if study.seeds < LEAST_SEEDS else CONFIRMED if holds else REFUTED
 
 
@@ -547,4 +550,5 @@ BY_PART: dict[str, Callable[[Study], Sequence[Claim]]] = {
 
 
 def claims(study: Study, parts: Sequence[str]) -> list[Claim]:
+    """The claims of some parts."""
     return [claim for part in parts if part in BY_PART for claim in BY_PART[part](study)]

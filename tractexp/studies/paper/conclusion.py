@@ -55,6 +55,7 @@ def _model(parts: Mapping[str, list[Claim]]) -> str:
 
 
 def _values() -> str:
+    """That the printed parameters do not satisfy the printed equations."""
     checks = equations.checks()
     failed = sum(not check.holds for check in checks)
     return (
@@ -65,6 +66,7 @@ def _values() -> str:
 
 
 def _describe_ranking(study: Study) -> str:
+    """How the optimizers rank by iterations and by simulations."""
     parts = []
     for by, budget in (
         ("iterations", "After 300 iterations"),
@@ -89,6 +91,7 @@ def _describe_ranking(study: Study) -> str:
 
 
 def _differ(study: Study, first: str, second: str, by: str) -> bool:
+    """Whether two optimizers differ by more than chance."""
     pair = PAIRS[[set(p) for p in PAIRS].index({first, second})]
     three = [study.pair(a, b, by) for a, b in PAIRS]
     flipped = [study.pair(b, a, by) for a, b in PAIRS]
@@ -96,6 +99,7 @@ def _differ(study: Study, first: str, second: str, by: str) -> bool:
 
 
 def _lack(study: Study) -> str:
+    """What the sparrow searches lack, in a sentence."""
     said = why.answer(why.lacks(study))
     return (
         f"That convergence at the end, not exploration, is what the sparrow searches lack {said}."
@@ -103,6 +107,7 @@ def _lack(study: Study) -> str:
 
 
 def _random(study: Study) -> str:
+    """How often each search ends in the best valley, beside random points."""
     shares, control = {name: study.shares(name) for name in COMPARED}, study.control_shares
     there = ", ".join(f"{LABELS[n]} {s.valley} of {s.n}" for n, s in shares.items())
     above = ", ".join(f"{LABELS[n]} {np.median(study.above_bottom(n)):.2f}" for n in COMPARED)
@@ -148,6 +153,7 @@ def reasons(study: Study) -> list[str]:
 
 
 def _describe_lack(lack: why.Lack) -> str:
+    """What one search lacks, in a sentence."""
     farther = "" if lack.convergence.lacks else "not "
     others = {
         "PSO": lack.valley,
@@ -274,6 +280,7 @@ def _describe_trade(study: Study, along: np.ndarray, here: int, lowest: float) -
 
 
 def _bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
+    """How often searches reach the floor within the paper's bounds and within others."""
     shares = {
         bounds: np.mean(ends.objective <= FLOOR_FACTOR * lowest)
         for bounds, ends in study.ends_by_bounds.items()

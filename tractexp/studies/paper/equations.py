@@ -76,6 +76,7 @@ def as_printed(f: Field, y: np.ndarray, h: float) -> np.ndarray:
 
 
 def _runge_kutta(f: Field, y: np.ndarray, h: float, inner: float) -> np.ndarray:
+    """A step of the classical method, its stages `inner` apart."""
     k1 = f(y)
     k2 = f(y + inner * k1)
     k3 = f(y + inner * k2)
@@ -229,6 +230,7 @@ def _methods() -> list[Check]:
 
 
 def _rankings() -> list[Check]:
+    """Whether the paper's tables say of ISSA what its text does."""
     results = []
     tables = {
         "epsilon_p": printed.EPSILON_P,
@@ -255,6 +257,7 @@ def _rankings() -> list[Check]:
 
 
 def _lowest(where: str, what: str, table: Mapping[str, float]) -> Check:
+    """Whether ISSA has the lowest value of a table."""
     best = min(table, key=lambda name: table[name])
     return Check(
         where,
@@ -291,13 +294,16 @@ class Sphere:
     """The sum of squares about an optimum, in the box [-5, 5]^d: a problem for the search loop."""
 
     def __init__(self, optimum: np.ndarray):
+        """A sum of squares with its minimum at a point."""
         self.optimum = optimum
         self.lower, self.upper = np.full(len(optimum), -5.0), np.full(len(optimum), 5.0)
 
     def objective(self, values: np.ndarray) -> np.ndarray:
+        """The objective (n,) of points (n, d)."""
         return np.sum((values - self.optimum) ** 2, axis=1)
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
+        """The distances (n, d) from the minimum."""
         return values - self.optimum
 
 

@@ -29,6 +29,7 @@ SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
 
 
 def figure3(sheet: Report, study: Study) -> None:
+    """Add the tent map."""
     sheet.heading("Figure 3: the tent map")
     orbits = {
         f"alpha = {a}": maps.tent_orbit(float(a), 200, 1, np.random.default_rng(0))[:, 0]
@@ -49,6 +50,7 @@ def figure3(sheet: Report, study: Study) -> None:
 
 
 def figure4(sheet: Report, study: Study) -> None:
+    """Add Lévy flights."""
     sheet.heading("Figure 4: Lévy flights")
     sheet.chart(
         figures.flights(maps.flights("mantegna", 300, 3, seed=1)),
@@ -66,6 +68,7 @@ def figure4(sheet: Report, study: Study) -> None:
 
 
 def figure6(sheet: Report, study: Study) -> None:
+    """Add the record."""
     event = study.train[0]
     record = event.record
     sheet.heading("Figure 6: the record")
@@ -74,6 +77,7 @@ def figure6(sheet: Report, study: Study) -> None:
 
 
 def _fit(sheet: Report, fit: Any, role: str) -> None:
+    """Add measured and calculated power of one event."""
     record = fit.event.record
     caption = (
         f"{record.name} ({role}), ISSA, one run: epsilon_p {fit.epsilon_p:.2%}, epsilon_q"
@@ -87,11 +91,13 @@ def _fit(sheet: Report, fit: Any, role: str) -> None:
 
 
 def figure8(sheet: Report, study: Study) -> None:
+    """Add the fit."""
     sheet.heading("Figure 8: the fit")
     _fit(sheet, study.first("issa")[0], "fitted")
 
 
 def figure9(sheet: Report, study: Study) -> None:
+    """Add the searches."""
     sheet.heading("Figure 9: the searches")
     floor = Floor(study.floor, "")
     one = [_variant(study, name, "iterations", 1) for name in COMPARED]
@@ -126,6 +132,7 @@ def figure9(sheet: Report, study: Study) -> None:
 
 
 def _variant(study: Study, name: str, by: str, seeds: int) -> Variant:
+    """The searches of an optimizer as a variant of a comparison."""
     data = study.train[0].record.name
     return Variant(
         label(name),
@@ -149,6 +156,7 @@ def _variant(study: Study, name: str, by: str, seeds: int) -> Variant:
 
 
 def _reasons(sheet: Report, study: Study) -> None:
+    """Add why the searches rank as they do."""
     sheet.heading("Why they rank so", 3)
     sheet.text(*conclusion.reasons(study))
     rows = []
@@ -204,6 +212,7 @@ def _reasons(sheet: Report, study: Study) -> None:
 
 
 def _valleys(sheet: Report, study: Study) -> None:
+    """Add the valleys along the parameters that trade."""
     sheet.heading(f"The valleys along {TRADED}", 3)
     sheet.text(*conclusion.valley(study))
     grid, path = study.path

@@ -19,6 +19,7 @@ LEVY_TAIL_SHARE = 0.005  # share of the steps that count as the tail
 
 
 def issa(**settings: Any) -> Any:
+    """ISSA with some settings."""
     return build("optimizer", {"name": "issa", **settings})
 
 

@@ -50,6 +50,7 @@ class Order:
 
     @property
     def free(self) -> int:
+        """How many parameters are free."""
         return len(self.uncertainty.names)
 
     @property
@@ -65,6 +66,7 @@ class Order:
 
     @property
     def identified_count(self) -> int:
+        """How many of them are identified."""
         return sum(verdict.word == IDENTIFIED for verdict in self.uncertainty.verdicts.values())
 
     @property

@@ -96,6 +96,7 @@ def _place(part: str) -> str:
 
 
 def equations_section(sheet: Report, study: Study) -> None:
+    """Add what the printed values give in the printed equations."""
     sheet.heading("What is printed, in the printed equations")
     sheet.table(
         ["where", "printed", "what the equation gives", "verdict"],
@@ -122,6 +123,7 @@ def equations_section(sheet: Report, study: Study) -> None:
 
 
 def readings_section(sheet: Report, study: Study) -> None:
+    """Add how the text was read."""
     sheet.heading("The readings of the text")
     rows = [
         [
@@ -165,6 +167,7 @@ def readings_section(sheet: Report, study: Study) -> None:
 
 
 def _costs(study: Study, name: str) -> tuple[str, str]:
+    """The median objective and simulations of an optimizer."""
     spent = np.median([search.simulations for search in study.run_searches(name)])
     return middle(study.objectives(name)), f"{spent:,.0f}"
 

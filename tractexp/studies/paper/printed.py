@@ -58,6 +58,7 @@ class Reading:
 
     @property
     def node(self) -> dict[str, Any]:
+        """The optimizer with its settings."""
         return {"name": self.optimizer, **self.settings}
 
 

@@ -88,15 +88,18 @@ class Study:
 
     @functools.cached_property
     def problem(self) -> Problem:
+        """The problem with the usual integration."""
         return self.recipe()
 
     @functools.cached_property
     def printed_problem(self) -> Problem:
+        """The problem with the integration as printed."""
         assert self.literal is not None
         return self.literal()
 
     @functools.cached_property
     def orders(self) -> dict[str, orders.Order]:
+        """Three orders of the motor, fitted."""
         self.tell("Table 1: fitting three orders of the motor")
         return {
             m: orders.fit(self.node, m, self.train, self.held_out, self.seed)
@@ -135,6 +138,7 @@ class Study:
         return self.respond(results[0] if results else self._run([name], "iterations", 1)[name][0])
 
     def _gather(self, names: Sequence[str], by: str) -> None:
+        """Search with these optimizers, those read literally on the printed problem."""
         for literal in (False, True):
             chosen = [name for name in names if READINGS[name].literal == literal]
             if chosen:
@@ -176,6 +180,7 @@ class Study:
         return np.array([search.objective for search in self.run_searches(name, by)])
 
     def pair(self, first: str, second: str, by: str) -> OptimizerPair:
+        """The test of two optimizers, p and Vargha and Delaney's A."""
         a, b = self.objectives(first, by), self.objectives(second, by)
         return OptimizerPair(wilcoxon(a, b)[0], vargha_delaney(a, b))
 
@@ -238,6 +243,7 @@ class Study:
 
     @functools.cached_property
     def control(self) -> valleys.Ends:
+        """Where descents from random points end."""
         return self.random_ends(self.problem)
 
     def above_bottom(self, name: str) -> np.ndarray:
@@ -247,6 +253,7 @@ class Study:
         return self.objectives(name) / self.ends[name].objective
 
     def shares(self, name: str) -> Shares:
+        """How often a search ends at the floor and in its valley."""
         at, bottom = self.objectives(name), self.ends[name].objective
         counts = (
             bottom <= FLOOR_FACTOR * self.floor,
@@ -257,6 +264,7 @@ class Study:
 
     @property
     def control_shares(self) -> Shares:
+        """How often random points do."""
         there = int(np.count_nonzero(self.control.objective <= FLOOR_FACTOR * self.floor))
         return Shares(RANDOM, there, 0, 0)
 
@@ -289,6 +297,7 @@ class Study:
 
     @functools.cached_property
     def _fits(self) -> dict[str, list[list[Fit]]]:
+        """The fits of each search to the dips, made when asked for."""
         return {}
 
     def fits(self, name: str) -> list[list[Fit]]:
@@ -355,5 +364,6 @@ class Study:
 
     @functools.cached_property
     def bias(self) -> dict[str, tuple[float, float]]:
+        """How far searches are drawn to zero."""
         self.tell("section 5: the bias toward zero")
         return equations.bias()

@@ -21,6 +21,7 @@ THREE = ("paper", "one", "median")
 
 
 def table1(sheet: Report, study: Study) -> None:
+    """Add three orders of the motor."""
     sheet.heading("Table 1: three orders of the motor")
     sheet.text(
         "The paper grades the models in words and shows no numbers. Here each is fitted to the same"
@@ -147,6 +148,7 @@ def _parameters(
 
 
 def table2(sheet: Report, study: Study) -> None:
+    """Add what ISSA identifies."""
     sheet.heading("Table 2: what ISSA identifies")
     others = [(name, "median") for name in (TEN["issa"], LITERAL["issa"])]
     _parameters(
@@ -162,6 +164,7 @@ def table2(sheet: Report, study: Study) -> None:
 
 
 def table3(sheet: Report, study: Study) -> None:
+    """Add ISSA, SSA and PSO."""
     sheet.heading("Table 3: ISSA, SSA and PSO")
     _parameters(
         sheet,

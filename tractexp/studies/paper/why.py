@@ -42,6 +42,7 @@ class Test:
 
     @property
     def lacks(self) -> bool:
+        """Whether a search has less than random points, by more than chance."""
         return self.less and self.p < SIGNIFICANCE_LEVEL
 
 
@@ -59,6 +60,7 @@ class Lack:
 
     @property
     def exploration(self) -> bool:
+        """Whether it lacks exploration, by any of three tests."""
         return self.valley.lacks or self.random.lacks or self.best.lacks
 
 
