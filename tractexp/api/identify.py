@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 FIXED = "fixed"
 SHEET = "sheet.html"
 USABLE, DOUBTFUL, UNUSABLE = "usable", "doubtful", "unusable"
-USABILITY = {
+USABILITY: dict[str, str] = {
     Grade.ADEQUATE: USABLE,
     Grade.EFFECT_MISSING: DOUBTFUL,
     Grade.WRONG_MODEL: UNUSABLE,

@@ -9,6 +9,7 @@ proportion, and H is smaller.
 from dataclasses import dataclass
 from functools import cache
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -131,4 +132,5 @@ def _rated_slip(circuit: TCircuit) -> float:
     """The slip at which a machine draws its rated current at nominal voltage."""
     from scipy.optimize import brentq
 
-    return float(brentq(lambda s: abs(circuit.impedance(s)) - 1, SMALLEST_SLIP, 1.0))
+    found: Any = brentq(lambda s: abs(circuit.impedance(s)) - 1, SMALLEST_SLIP, 1.0)
+    return float(found)
