@@ -16,6 +16,8 @@ from typing import Any
 INTERPOLATION = re.compile(r"(\\*)\$\{")
 # what neither cmd.exe nor PowerShell reads as more than letters
 WINDOWS_WORD = re.compile(r"[\w.=:/\\+-]+")
+# what a POSIX shell does not take as it stands within double quotes
+DOUBLE_UNSAFE = re.compile(r'["$`\\!]')
 MARKDOWN = frozenset("\\`*_<>[]|$~&#")
 # what begins a formula where a spreadsheet opens a table
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
@@ -122,7 +124,13 @@ def comment(text: str) -> str:
 
 def shell(*words: str) -> str:
     """A command as a shell of this system takes it."""
-    return windows_shell(*words) if os.name == "nt" else shlex.join(words)
+    quote = _quote_for_windows if os.name == "nt" else _quote_for_posix
+    return " ".join(map(quote, words))
+
+
+def _quote_for_posix(word: str) -> str:
+    """A word that holds single quotes is read more easily in double ones, where these are safe."""
+    return f'"{word}"' if "'" in word and not DOUBLE_UNSAFE.search(word) else shlex.quote(word)
 
 
 def windows_shell(*words: str) -> str:

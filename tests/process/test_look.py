@@ -140,10 +140,9 @@ def test_a_recorder_of_a_station_is_one_screen(name, tmp_path):
     if not path.exists():
         pytest.skip(f"{path} is not there")
     done = run_command("look", str(path), "--folder", "x", cwd=tmp_path)
-    assert len(done.stdout.splitlines()) <= 24
-    assert ("is worth fitting; to fit it: tractexp" in done.stdout.splitlines()[0]) == (
-        "xtz" in name
-    )
+    assert len(done.stdout.splitlines()) <= 25
+    words = " ".join(done.stdout.split())  # the answer is longer than a line of 80 columns
+    assert ("is worth fitting; to fit it: tractexp" in words) == ("xtz" in name)
 
 
 def test_a_load_may_be_named_and_is_then_the_only_one(station):

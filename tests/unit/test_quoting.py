@@ -7,6 +7,7 @@ import csv
 import html
 import io
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -60,6 +61,12 @@ def test_a_shell_reads_the_name_back(name):
 @pytest.mark.parametrize("name", NASTY)
 def test_a_comment_of_yaml_ends_where_its_line_ends(name):
     assert yaml.safe_load(f"# {quoting.comment(name)}\na: 1\n") == {"a": 1}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="as POSIX shells take it")
+def test_a_word_with_single_quotes_is_read_easily_unless_double_ones_would_change_it():
+    assert quoting.shell("a", "data=['b c']") == """a "data=['b c']\""""
+    assert quoting.shell("'$HOME'") == """''"'"'$HOME'"'"''"""
 
 
 def test_a_real_shell_runs_nothing_of_any_name(tmp_path):
