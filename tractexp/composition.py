@@ -5,6 +5,7 @@ A file's `defaults` name other choices, of the same group, of a group below it, 
 group; what the file says itself comes last.
 """
 
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -102,7 +103,9 @@ def folders() -> list[Path]:
 
 def _file(group: str, name: str, places: Iterable[Path]) -> Path | None:
     """The file of a choice in the first place that has one; None where none has."""
-    return next((f for folder in places if (f := folder / group / f"{name}.yaml").is_file()), None)
+    files = (folder / group / f"{name}.yaml" for folder in places)
+    # not `Path.is_file`, which raises for a name that is too long for any file
+    return next((file for file in files if os.path.isfile(file)), None)
 
 
 def _content(group: str, file: Path) -> dict[str, Any]:

@@ -109,6 +109,10 @@ REFUSED = [
     (["~optimizer.name"], "~optimizer.name cannot be applied"),
     (["optimizer=-1"], "optimizer=-1: what is chosen there has a name"),
     (["model=null"], "model=null: what is chosen there has a name"),
+    (
+        ["model.static=" + "x" * 5000],
+        "xxx: there is no such choice. Available: branch, constant_impedance",
+    ),
     (["task=[profile]"], "task=[profile]: what is chosen there has a name"),
     (["target=???"], "target=???: ??? stands for a value that is missing"),
     (["seed=1e999"], "seed=inf is not a whole number"),
