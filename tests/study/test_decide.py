@@ -43,6 +43,7 @@ CONFIRMED, MILD, DENIED = held_out(50.0, 55.0), held_out(3.0, 6.0), held_out(-2.
         ([row("a", gap=MILD)], "candidate"),
         ([row("a", gap=CONFIRMED, grade="wrong_model")], "candidate"),
         ([row("a", gap=CONFIRMED, grade="effect_missing")], "named"),
+        ([row("a", gap=CONFIRMED, open_sizes=("a rests on its bound, 1",))], "candidate"),
         ([row("a", gap=DENIED)], "unexplained"),
         ([row("a", gap=CONFIRMED, p_of_all=1e-4)], "unexplained"),
         ([row("a", gap=CONFIRMED, behind_of_all=6.1)], "unexplained"),
@@ -80,11 +81,22 @@ def off(*names, error, deviance):
     return replace(row(*names, deviance=deviance), behind=np.nan, prediction=prediction)
 
 
-@pytest.mark.parametrize(("other", "told"), [(60.0, "named"), (40.0, "candidate")])
-def test_what_held_out_events_chose_is_named_if_the_fitted_ones_put_it_first_too(other, told):
-    sets = off("a", error=0.1, deviance=50.0), off("b", error=0.9, deviance=other)
+@pytest.mark.parametrize(
+    ("share", "told"), [(0.9, "named"), (0.49, "candidate"), (np.nan, "candidate")]
+)
+def test_what_held_out_events_chose_is_named_if_each_event_left_out_in_turn_shows_it(share, told):
+    """Whatever the fitted events alone put first."""
+    a = replace(off("a", error=0.1, deviance=50.0), replicated_share=share)
+    sets = a, off("b", error=0.9, deviance=40.0)
     verdict = decide(Evidence(off(error=1.0, deviance=100.0), sets), Criteria())
     assert (verdict.word, verdict.names, verdict.complete) == (told, ("a",), False)
+
+
+@pytest.mark.parametrize("columns", [{}, {"gap": CONFIRMED, "is_fitted_to_all": True}])
+def test_what_all_events_were_fitted_to_is_named_if_each_left_out_in_turn_shows_it(columns):
+    assert word(row("a", **columns))[0] == "candidate"
+    assert word(row("a", replicated_share=0.3, **columns))[0] == "candidate"
+    assert word(row("a", replicated_share=0.6, **columns))[0] == "named"
 
 
 def test_the_page_s_own_numbers_give_the_verdict_that_it_tells():

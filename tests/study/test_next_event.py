@@ -19,7 +19,9 @@ import tractexp
 from hidden_effects import Case, Noise
 from hidden_effects.generator import scene
 from independent import Dip
+from tractexp.discrepancy.classes import LEAST_PARTING, compare_predictions
 from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.decide import CONFIRMED_SHARE
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_event import rivals
@@ -135,7 +137,9 @@ def test_two_rivals_tie_and_the_recommended_event_ends_the_tie(tied):
     made = hidden(*MILD)
     more = replace(made, dips=(*made.dips, dip), static=(*made.static, made.static[0]))
     after = judged(recorded(more))
-    assert after.verdict.word == "candidate"  # no event was held out to confirm it
+    # no event was held out: each is left out in turn
+    is_confirmed = after.verdict.kept[0].replicated_share >= CONFIRMED_SHARE
+    assert after.verdict.word == ("named" if is_confirmed else "candidate")
     assert after.names == ("speed_dependent_torque",)
 
 
@@ -146,6 +150,21 @@ def test_what_is_recommended_stands_in_what_machines_read(tied):
     assert chances["probability"] == min(chances["by_truth"].values())
     assert set(chances["by_truth"]) == set(TIE)
     assert {"words", "depth", "duration", "probability"} <= told["next_event"]["tried"][0].keys()
+
+
+def test_what_is_tied_is_a_class_with_the_dip_from_which_it_parts(tied):
+    (told,) = content(tied)["classes"]
+    assert [tuple(names) for names in told["sets"]] == [*tied.verdict.sets]
+    assert told["part_at"] is None or told["by"] > LEAST_PARTING
+    assert tied.reason.endswith(str(tied.effect_class))
+
+
+def test_sets_that_are_one_function_of_the_voltage_never_part(alike):
+    bench, _, _, fits = alike
+    pair = [fits["stator_resistance"], fits["leakage_loss"]]
+    one = compare_predictions(bench, pair, [fit.names for fit in pair], 0.0)
+    assert one.part_at is None
+    assert one.by < LEAST_PARTING
 
 
 def test_an_equation_in_another_parameter_is_proved_to_be_the_same(alike):

@@ -308,6 +308,8 @@ def inexact(investigation):
 def test_a_name_that_leaves_more_than_noise_is_named_and_what_it_leaves_is_told(inexact):
     verdict = inexact.verdict
     assert (verdict.word, inexact.names) == ("named", ("undervoltage_trip",)), inexact.reason
+    assert verdict.kept[0].replicated_share > 0.9  # the trip is in each of the three dips
+    assert inexact.reason.endswith("; each event, left out in turn, confirms it")
     assert not verdict.complete
     assert inexact.validate.closed_share > 1 - 1 / inexact.context.criteria.divides**2
     assert inexact.remainder

@@ -12,8 +12,9 @@ A set is *kept* by one of two rules.
    beats it.
 
 Several sets kept are tied. One is *named* where an event confirms it that took no part in choosing
-it, and the model with it is not graded a wrong model; else it is a *candidate*. Where none is kept
-the records agree with the base model, or they do not.
+it, or each of several that was left out in turn, where its sizes are known within their bounds and
+the model with it is not graded a wrong model; else it is a *candidate*. Where none is kept the
+records agree with the base model, or they do not.
 """
 
 from collections.abc import Sequence
@@ -28,6 +29,7 @@ from tractexp.inference.fitting import Names
 NONE, CANDIDATE, NAMED, TIED, UNEXPLAINED = "none", "candidate", "named", "tied", "unexplained"
 WRONG_MODEL = "wrong_model"  # the grade of a model that has no name
 MOST_TESTED = 6  # sets whose rest is tested
+CONFIRMED_SHARE = 0.5  # of what an event shows of a set: so much of it confirms the set
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +66,8 @@ def decide(evidence: Evidence, criteria: Criteria) -> Verdict:
     if len(kept) > 1:
         word = TIED
     elif kept:
-        is_named = is_confirmed(kept[0], evidence) and kept[0].grade != WRONG_MODEL
-        word = NAMED if is_named else CANDIDATE
+        sound = kept[0].grade != WRONG_MODEL and not kept[0].open_sizes
+        word = NAMED if sound and is_confirmed(kept[0], evidence) else CANDIDATE
     else:
         agrees = least_p >= criteria.adequate_p and find_adequate(evidence, criteria)
         word = NONE if agrees else UNEXPLAINED
@@ -119,16 +121,17 @@ def needs_all_events(rows: Sequence[SetEvidence], criteria: Criteria) -> bool:
 
 def is_confirmed(row: SetEvidence, evidence: Evidence) -> bool:
     """Whether an event confirms a set that took no part in choosing it: held-out events that show
-    it and each of its members.
-
-    Those that chose it among others confirm it where the fitted events alone put it first, too: no
-    set of another family and of its size fits them better.
+    it and each of its members; or, where those took part or there are none, each event in turn,
+    left out, that shows them.
     """
-    if not evidence.is_predicted:
-        return bool(row.gaps) and all(gap.is_shown for gap in row.gaps)
-    rivals = [one for one in evidence.every if one.prediction and one.family != row.family]
-    alike = [one for one in rivals if len(one.fit.names) == len(row.fit.names)]
-    return all(row.fit.cost <= one.fit.cost for one in alike)
+    if chose_by_all(row, evidence):
+        return row.replicated_share >= CONFIRMED_SHARE
+    return all(gap.is_shown for gap in row.gaps)
+
+
+def chose_by_all(row: SetEvidence, evidence: Evidence) -> bool:
+    """Whether no event is left that took no part in choosing a set."""
+    return evidence.is_predicted or row.is_fitted_to_all or not row.gaps
 
 
 def find_predicting(evidence: Evidence, criteria: Criteria) -> list[SetEvidence]:

@@ -44,6 +44,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "name_sets": [
             list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets
         ],
+        "classes": [] if (one := investigation.effect_class) is None else [one.to_dict()],
         "forms": by_name(forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
         "gap": gaps(investigation),
@@ -112,9 +113,11 @@ def recommend_confirmation(findings: Findings) -> str:
     """Which event would confirm a candidate, as a sentence."""
     names, evidence = join_words(findings.names), findings.evidence
     if evidence.is_predicted:
+        every = [*findings.context.events, *findings.withheld]
+        deepest = max(every, key=lambda event: event.depth).record.name
         return (
-            "record a further event and hold it out, too: those held out took part in choosing"
-            f" {names}"
+            f"record a further dip as deep as {deepest} and hold it out, too: those held out took"
+            f" part in choosing {names}"
         )
     expected = np.array(findings.train.by_event)
     most, shown = float(expected.max()), findings.context.criteria.shown
@@ -332,7 +335,8 @@ def _evidence(row: SetEvidence) -> dict[str, Any]:
     """The numbers of a set by which `decide` decides; None where a step did not ask."""
     held_out = None if row.gap is None else {"gain": row.gap.gain, "expected": row.gap.expected}
     of_all = None if row.gap is None else {"p_left": row.p_of_all, "behind": row.behind_of_all}
-    return {"behind": row.behind, "p_left": row.p_left, "held_out": held_out, "of_all": of_all}
+    fitted = {"behind": row.behind, "p_left": row.p_left}
+    return fitted | {"held_out": held_out, "of_all": of_all, "replicated": row.replicated_share}
 
 
 def _singles(investigation: Findings) -> list[dict[str, Any]]:

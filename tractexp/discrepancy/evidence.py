@@ -137,6 +137,11 @@ class SetEvidence:
     is_fitted_to_all: bool = False  # whether `final` is the fit to all events
     prediction: Prediction | None = None
     grade: str = ""  # of the model with it, where one set alone is kept
+    # of its sizes: on a bound, or not known within their bounds, in words
+    open_sizes: tuple[str, ...] = ()
+    # the share of what it takes away of events with all fitted that it takes away with each left
+    # out in turn, the least; where that was asked
+    replicated_share: float = np.nan
     tests: Disagreement | None = None  # at its fit
     final: Refit | None = None  # without the faults of the measurement that do not help
 

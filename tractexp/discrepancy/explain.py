@@ -9,11 +9,13 @@ import numpy as np
 
 from tractexp.discrepancy.decide import (
     CANDIDATE,
+    CONFIRMED_SHARE,
     NAMED,
     NONE,
     TIED,
     UNEXPLAINED,
     Verdict,
+    chose_by_all,
     find_adequate,
     is_confirmed,
 )
@@ -32,11 +34,13 @@ from tractexp.discrepancy.ranking import (
 from tractexp.inference.chance import by_draws
 from tractexp.inference.context import Context
 from tractexp.inference.model_error import describe_stall, in_percent
+from tractexp.inference.recorder_window import RecorderWindow
 from tractexp.noise import Noise
 from tractexp.record import Event
 from tractexp.wording import alternatives, join_words, list_figures, percent
 
 CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
+CONFIRMED_IN_TURN = "each event, left out in turn, confirms it"
 MOST_NEAR = 4  # sets that are told where nothing explains
 
 
@@ -99,8 +103,14 @@ def choose_next_event(verdict: Verdict, evidence: Evidence, context: Context) ->
     assert evidence.noise is not None
     fits = [row.reported_fit for row in verdict.kept]
     labels = [join_words(label_effects(names, context)) for names in verdict.sets]
-    error = min(_measure_error(row, evidence.noise, context) for row in verdict.kept)
+    error = measure_least_error(verdict, evidence, context)
     return next_event(context, evidence.noise, evidence.base.fit, fits, labels, error=error)
+
+
+def measure_least_error(verdict: Verdict, evidence: Evidence, context: Context) -> float:
+    """What the best of the sets kept misses beyond the noise of a response."""
+    assert evidence.noise is not None
+    return min(_measure_error(row, evidence.noise, context) for row in verdict.kept)
 
 
 def _measure_error(row: SetEvidence, noise: Noise, context: Context) -> float:
@@ -127,8 +137,11 @@ def explain(
     """
     clauses = [_explain_word(verdict, evidence, nearest, context)]
     gaps = [row.gap for row in verdict.kept if row.gap is not None]
-    if gaps and all(gap.is_mild for gap in gaps):
+    is_open = verdict.word == CANDIDATE and bool(verdict.kept[0].open_sizes)
+    if gaps and all(gap.is_mild for gap in gaps) and not is_open:
         clauses.append("the held-out events are too mild to show it")
+    elif verdict.word == NAMED and chose_by_all(verdict.kept[0], evidence):
+        clauses.append(CONFIRMED_IN_TURN)
     elif verdict.word == CANDIDATE:
         clauses.append(_explain_doubt(verdict.kept[0], evidence, all_fitted=all_fitted))
     if any(row.is_fitted_to_all for row in verdict.kept):
@@ -136,11 +149,16 @@ def explain(
             "what the fitted events leave open of it was fitted to the held-out ones, too"
         )
     if (window := context.records.window) is not None:
-        clauses.append(f"{window.describe()}, which is taken into account")
+        clauses.append(f"{window.describe()}, which is taken into account{_doubt_window(window)}")
     tests = evidence.base.tests if verdict.chosen is None else verdict.chosen.tests or evidence.last
     if tests is not None and tests.parameters_at_bound:
         clauses.append(f"on a bound: {', '.join(tests.parameters_at_bound)}")
     return "; ".join(clauses)
+
+
+def _doubt_window(window: RecorderWindow) -> str:
+    """What is to be asked of a window that no record names, as the end of a sentence."""
+    return "" if window.said else ", though no record says so: ask whether it does"
 
 
 def _explain_word(
@@ -176,21 +194,28 @@ def _explain_word(
 
 def _explain_doubt(row: SetEvidence, evidence: Evidence, *, all_fitted: bool) -> str:
     """Why a set that is kept alone is a candidate and no name."""
+    if row.open_sizes:
+        return f"{'; '.join(row.open_sizes)}: so it is no name"
     if is_confirmed(row, evidence):
         return "the model with it does not describe this load, so it is no name"
+    if not chose_by_all(row, evidence):
+        doubtful = [name for name, gap in row.without.items() if not gap.is_shown]
+        return f"the held-out events are too mild to show {join_words(doubtful)}"
     if evidence.is_predicted:
-        return (
-            "the fitted events alone put another set first, and no further event confirms the"
-            " choice"
-        )
-    if all_fitted:
-        return (
-            "only all events together show it, so all were fitted, and none is left to confirm it"
-        )
-    if row.gap is None:
-        return "no event was held out to confirm it"
-    doubtful = [name for name, gap in row.without.items() if not gap.is_shown]
-    return f"the held-out events are too mild to show {join_words(doubtful)}"
+        why = "the held-out events took part in choosing it"
+    elif all_fitted or row.is_fitted_to_all:
+        why = "only all events together show it, so all were fitted"
+    else:
+        why = "no event was held out to confirm it"
+        if np.isnan(row.replicated_share):
+            return why
+    if np.isnan(row.replicated_share):
+        return f"{why}, and none is left to confirm it"
+    share = max(row.replicated_share, 0.0)
+    return (
+        f"{why}, and of what an event shows of it {share:.0%} is left where that is not fitted:"
+        f" {CONFIRMED_SHARE:.0%} of each confirms it"
+    )
 
 
 def label_effects(names: Sequence[str], context: Context) -> list[str]:

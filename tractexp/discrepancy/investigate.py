@@ -8,11 +8,26 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tractexp.discrepancy.classes import EffectClass, compare_predictions
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.decide import NONE, UNEXPLAINED, Verdict, decide, shows_more
+from tractexp.discrepancy.decide import (
+    NONE,
+    TIED,
+    UNEXPLAINED,
+    Verdict,
+    chose_by_all,
+    decide,
+    shows_more,
+)
 from tractexp.discrepancy.disagreement import Disagreement, disagreement
 from tractexp.discrepancy.evidence import Evidence, PredictedError
-from tractexp.discrepancy.explain import Nearest, choose_next_event, explain, find_nearest_sets
+from tractexp.discrepancy.explain import (
+    Nearest,
+    choose_next_event,
+    explain,
+    find_nearest_sets,
+    measure_least_error,
+)
 from tractexp.discrepancy.explanations import Explanations, explanations
 from tractexp.discrepancy.gap import GapTest, gap, share_closed, share_gone
 from tractexp.discrepancy.grades import Grader
@@ -31,10 +46,12 @@ from tractexp.discrepancy.places import DisagreementInterval, places
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult, propose
 from tractexp.discrepancy.remainder import Remainder
+from tractexp.discrepancy.replication import replicate
 from tractexp.discrepancy.rival_sets import compare_rivals
 from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.domain import domain_of
 from tractexp.identification.grade import GradedModel, Misfit
+from tractexp.identification.result import at_bound
 from tractexp.identification.verdict import UNIDENTIFIED, size
 from tractexp.inference.base_fit import BaseFit, base_fit
 from tractexp.inference.catalogue import Catalogue, catalogue
@@ -90,13 +107,24 @@ class Findings:
     @functools.cached_property
     def reason(self) -> str:
         """The sentence behind the verdict."""
-        return explain(
+        sentence = explain(
             self.verdict,
             self.evidence,
             self.nearest,
             self.explanations.base.context,
             all_fitted=self.all_fitted,
         )
+        return f"{sentence}; {self.effect_class}" if self.effect_class else sentence
+
+    @functools.cached_property
+    def effect_class(self) -> EffectClass | None:
+        """The sets that are tied, and the dip from which they part; None where none are."""
+        if self.verdict.word != TIED:
+            return None
+        context = self.explanations.base.context
+        fits = [row.reported_fit for row in self.verdict.kept]
+        error = measure_least_error(self.verdict, self.evidence, context)
+        return compare_predictions(context, fits, self.verdict.sets, error)
 
     @property
     def first(self) -> Disagreement:
@@ -169,6 +197,28 @@ class Findings:
             for e in self.final_estimates
             if e.verdict.startswith(UNIDENTIFIED) or e.half > size(e.value, *e.parameter.bounds) / 2
         }
+
+    @property
+    def open_sizes(self) -> tuple[str, ...]:
+        """Sizes of what was added, of the graded model, that rest on a bound, in words; and those
+        of an effect of which no size is known better than its bounds.
+        """
+        graded = self.final_grade
+        own = {p.name for p in self.catalogue.sizes(self.names)}
+        at = graded.problem.space.names
+        told = [
+            f"{name} rests on its bound, {graded.values[at.index(name)]:.4g}"
+            for name in at_bound(graded.problem, graded.values)
+            if name in own
+        ]
+        unknown = {
+            e.parameter.name for e in self.final_estimates if e.verdict.startswith(UNIDENTIFIED)
+        }
+        for name in self.names:
+            sizes = [p.name for p in self.catalogue.sizes([name])]
+            if unknown.issuperset(sizes):
+                told.append(f"of {join_words(sizes)} the events know no more than the bounds")
+        return tuple(told)
 
     @property
     def window(self) -> float | str | None:
@@ -447,14 +497,24 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grade
         grader=grader,
         tie_breaker=choose_next_event(verdict, evidence, explained.base.context),
     )
-    return _with_grade(findings) if len(verdict.kept) == 1 else findings
+    return _complete_row(findings, validate) if len(verdict.kept) == 1 else findings
 
 
-def _with_grade(findings: Findings) -> Findings:
-    """The findings decided anew with the grade of the model that has the one set kept."""
+def _complete_row(findings: Findings, validate: Sequence[Event]) -> Findings:
+    """The findings decided anew with the grade of the model that has the one set kept, and with
+    what each event says of it that is left out, where all took part in choosing it.
+    """
     evidence, chosen = findings.evidence, findings.verdict.kept[0]
-    graded = replace(chosen, grade=str(findings.final_grade.adequacy.grade))
-    rows = tuple(graded if row is chosen else row for row in evidence.rows)
+    grade = str(findings.final_grade.adequacy.grade)
+    row = replace(chosen, grade=grade, open_sizes=findings.open_sizes)
+    if chose_by_all(chosen, evidence):
+        told = replicate(
+            findings.base.context, validate, evidence.base.fit, chosen.reported_fit, evidence.faults
+        )
+        if told:
+            least = float(np.min([one.least_share for one in told]))
+            row = replace(row, replicated_share=least)
+    rows = tuple(row if one is chosen else one for one in evidence.rows)
     evidence = replace(evidence, rows=rows)
     return replace(findings, evidence=evidence, verdict=decide(evidence, findings.context.criteria))
 

@@ -1,0 +1,27 @@
+"""Each event left out in turn: the least share of what is expected, of events that noise does not
+hide.
+"""
+
+import numpy as np
+import pytest
+
+from tractexp.discrepancy.replication import Replication
+
+
+@pytest.mark.parametrize(
+    ("expected", "gained", "share"),
+    [
+        ((4.0, 2.0, 1.0), (4.0, 1.8, 0.6), 0.6),
+        ((4.0, 2.0, 1.0), (4.0, -1.0, 1.0), -0.5),  # without it an event is predicted better
+        ((4.0, 0.05, 1.0), (4.0, -9.0, 1.0), 1.0),  # noise hides the second
+        ((np.inf, 2.0, 1.0), (np.inf, 2.0, 1.0), 1.0),  # the motor stalls without it
+        ((4.0, 2.0, 1.0), (-np.inf, 2.0, 1.0), -np.inf),  # and here with it
+    ],
+)
+def test_the_least_share_counts(expected, gained, share):
+    assert Replication(expected, gained, (0.1, 0.1, 0.1)).least_share == share
+
+
+def test_events_that_noise_hides_confirm_nothing():
+    told = Replication((0.05, 0.05, 0.05), (0.05, 0.05, 0.05), (0.1, 0.1, 0.1))
+    assert np.isnan(told.least_share)

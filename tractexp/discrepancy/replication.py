@@ -1,0 +1,108 @@
+"""Whether each event bears out a set of effects that was fitted to all others: what confirms a name
+where the held-out events took part in choosing it.
+
+By the model's error in S: of what the set takes away of an event's squares when all events are
+fitted, it must take away a share when that event is left out. Events of which so little is taken
+away that noise hides it are not asked.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.discrepancy.gap import SPREAD
+from tractexp.discrepancy.least_squares import residual_noise
+from tractexp.discrepancy.prediction import predict
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Names, Refit, refit
+from tractexp.inference.model_error import noise_variance
+from tractexp.inference.records import Records
+from tractexp.record import Event
+
+FEWEST_EVENTS = 3  # of which one can be left out
+
+
+@dataclass(frozen=True)
+class Replication:
+    """What a set takes away of the squares of each event (E,) [pu²]: `expected` where that is
+    fitted with all others, `gained` where it is left out. Less than `hidden` noise hides.
+    """
+
+    expected: tuple[float, ...]
+    gained: tuple[float, ...]
+    hidden: tuple[float, ...]
+
+    @property
+    def least_share(self) -> float:
+        """The least share of what is expected that is gained, of the events that show the set; nan
+        where none does.
+        """
+        rows = zip(self.expected, self.gained, self.hidden, strict=True)
+        shares = [
+            1.0 if gained == expected else gained / expected
+            for expected, gained, hidden in rows
+            if expected > hidden
+        ]
+        return min(shares, default=np.nan)
+
+
+def replicate(
+    context: Context, events: Sequence[Event], base: Refit, chosen: Refit, faults: Names = ()
+) -> tuple[Replication, ...]:
+    """What each of the context's and of further `events` says of a set that was fitted to all
+    others by least squares: against the base model, then of several effects against all but each.
+
+    None of fewer than three events.
+    """
+    every = [*context.records.recorded, *events]
+    if len(every) < FEWEST_EVENTS:
+        return ()
+    context.effort.say("leaving each event out in turn")
+    plain = context.with_measured_power.held_to_usual
+    at = plain.coordinates
+    noise = residual_noise(plain, replace(chosen, unit=at.at_measured_power(chosen.unit)))
+    smaller: list[tuple[Names, np.ndarray]] = [((), base.unit)]
+    if len(chosen.names) > 1:
+        smaller += [
+            (tuple(n for n in chosen.names if n != left), at.remove_effects(chosen.unit, [left]))
+            for left in chosen.names
+        ]
+
+    own = chosen.names, chosen.unit
+
+    def forget(names: Names, unit: np.ndarray) -> np.ndarray:
+        """Sizes back at their nulls: events that show nothing of an effect shall find none."""
+        unit, sizes = unit.copy(), at.sizes(names)
+        unit[sizes] = at.null[sizes]
+        return unit
+
+    def fit_to(some: Sequence[Event]) -> dict[Names, Refit]:
+        there = plain.move_to_records(Records.from_events(some, plain.records.window))
+        move = there.coordinates.at_measured_power
+        starts = [(names, move(forget(names, unit))) for names, unit in (*smaller, own)]
+        return {fit.names: fit for fit in refit(there, noise, starts, faults)}
+
+    def measure_gains(fits: dict[Names, Refit], event: Event) -> list[float]:
+        there = plain.move_to_records(Records.from_events([event], plain.records.window))
+        after = predict(there, fits[chosen.names]).squares.sum()
+        before = [predict(there, fits[names]).squares.sum() for names, _ in smaller]
+        with np.errstate(invalid="ignore"):  # the motor stalls with and without
+            return [float(one - after) for one in before]
+
+    whole = fit_to(every)
+    others = [fit_to([*every[:k], *every[k + 1 :]]) for k in range(len(every))]
+    expected = zip(*(measure_gains(whole, event) for event in every), strict=True)
+    gained = zip(*map(measure_gains, others, every), strict=True)
+    hidden = tuple(map(find_hidden, every))
+    return tuple(
+        Replication(most, left, hidden) for most, left in zip(expected, gained, strict=True)
+    )
+
+
+def find_hidden(event: Event) -> float:
+    """The sum of squares [pu²] by which that of the noise of an event scatters, in 95 % of cases
+    to either side.
+    """
+    samples = event.record.samples - event.start
+    return SPREAD * noise_variance(event) * samples**0.5
