@@ -71,12 +71,12 @@ def _powers(load):
     before, stored = load.steady_state, load.result.before
     rows = {"load": (load.ratio * stored["P0"], load.ratio * stored["Q0"])}
     for part in ("motor", "static"):
-        rows[part] = (before[f"P_{part}"], before[f"Q_{part}"]) if f"P_{part}" in before else None
+        if f"P_{part}" in before:
+            rows[part] = (before[f"P_{part}"], before[f"Q_{part}"])
     drawn = {
-        part: row and {"P_MW": load.power * row[0], "Q_Mvar": load.power * row[1]}
-        for part, row in rows.items()
+        part: {"P_MW": load.power * P, "Q_Mvar": load.power * Q} for part, (P, Q) in rows.items()
     }
-    return {"U_kV": stored["U0"] * load.voltage, **drawn}
+    return {"U_kV": stored["U0"] * load.voltage, "motor": None, "static": None, **drawn}
 
 
 def _parameter(load, parameter):

@@ -32,7 +32,7 @@ def register_resolver() -> Callable[..., None]:
 
 def store_schema(group: str | None, name: str, schema: type) -> None:
     """`ConfigStore.store`, in place of what has that name: a process may run several commands."""
-    store = ConfigStore.instance().store
+    store: Any = ConfigStore.instance().store
     known = "replace" in inspect.signature(store).parameters
     store(name=name, node=schema, group=group, **({"replace": True} if known else {}))
 

@@ -105,14 +105,13 @@ def restore_recording(path: str, content: Mapping[str, Any]) -> Recording:
             content["device"],
             datetime.fromisoformat(content["start"]) if content["start"] else None,
             content["trigger"],
-            content.get("triggers", ()),  # which earlier versions did not write
             [
                 StatusChannel(**one, raw=(cells[k].values == 1).astype(np.int8))
                 for k, one in enumerate(status, 1 + len(channels))
             ],
             list(content["notes"]),
             {key: _extra(value) for key, value in content["extra"].items()},
-            tuple(content.get("triggers", ())),
+            tuple(content.get("triggers", ())),  # which earlier versions did not write
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise UserError(
