@@ -77,14 +77,6 @@ def log(text: str) -> None:
     print(one_line(text), file=sys.stderr, flush=True)
 
 
-def tell_beside(text: str) -> None:
-    """Print what was read and begun, where everything is asked for: the first screen is the
-    answer.
-    """
-    if is_everything_asked():
-        say(text)
-
-
 @contextmanager
 def report_search(
     iterations: int | None, budget: int | None, progress: Progress = None

@@ -30,7 +30,7 @@ from tractexp.identification.search import History, SearchResult, search
 from tractexp.inference.problem import Problem
 from tractexp.outcome import Written
 from tractexp.plugin import get, plugin
-from tractexp.progress import Progress, is_everything_asked, say, tell_stages
+from tractexp.progress import Progress, say, tell_stages
 from tractexp.provenance import build_again_command
 from tractexp.wording import join_words, shorten, shown_in_words, with_error
 
@@ -620,7 +620,7 @@ class Discrepancy(Task, call=investigate):
         paths = {path.name: path for path in (*results, *result.write_drawings(job.folder))}
         print_result(job, result)
         lines = _next_commands(result, paths)
-        if not (is_everything_asked() or job.in_sweep):
+        if not job.tells_everything:
             lines = [f"{NEXT}{choose_next(lines, result)}"]
         print_written(paths.values(), result.page)
         for line in lines:

@@ -18,7 +18,7 @@ from tractexp.blocks.terminal import show
 from tractexp.errors import UserError
 from tractexp.outcome import Written
 from tractexp.plugin import Plugin, build, get
-from tractexp.progress import console, is_everything_asked, say, tell_beside, text_width
+from tractexp.progress import console, is_everything_asked, say, text_width
 from tractexp.run_folder import Write
 
 if TYPE_CHECKING:
@@ -208,11 +208,8 @@ def _plain(kind: Any) -> Any:
 
 
 def print_result(job: "Job", result: Written) -> None:
-    """Print one screen; everything where that is asked for, and in a sweep, whose jobs have no
-    page.
-    """
-    everything = is_everything_asked() or job.in_sweep
-    show(result.summary() if everything else result.screen(), console(), text_width())
+    """Print one screen, or everything: see `Job.tells_everything`."""
+    show(result.summary() if job.tells_everything else result.screen(), console(), text_width())
 
 
 def print_written(paths: Iterable[Path], page: str) -> None:
@@ -358,10 +355,20 @@ class Job:
         self.prepare_log()
         say(line)
 
+    @property
+    def tells_everything(self) -> bool:
+        """Whether more than one screen is printed: where that is asked for, and in a sweep, whose
+        jobs have no page.
+        """
+        return is_everything_asked() or self.in_sweep
+
     def tell_beside(self, line: str) -> None:
-        """As `tell`, of a task whose first screen is the answer: see `progress.tell_beside`."""
+        """As `tell`, of what was read and begun: no part of the first screen, which is the
+        answer.
+        """
         self.prepare_log()
-        tell_beside(line)
+        if self.tells_everything:
+            say(line)
 
     def identify_load(self, **instead: Any) -> Any:
         """The identification that model, objective, optimizer and limits describe (an

@@ -10,7 +10,7 @@ from tractexp.errors import UserError
 from tractexp.exchange.format import Identified
 from tractexp.identification.division import doubt_division
 from tractexp.identification.result import Result
-from tractexp.identification.verdict import BOUND
+from tractexp.identification.verdict import BOUND, END_OF_RANGE
 
 
 @dataclass(frozen=True)
@@ -97,11 +97,15 @@ class OperatingPoint:
 
 
 def doubts(result: Result, point: OperatingPoint | None) -> list[str]:
-    """What speaks against an identified load as a physical one, a clause each."""
+    """What speaks against an identified load as a physical one, a clause each.
+
+    A machine at the end of what machines have is one: what that costs is told beside the fit.
+    """
     resting = [
         name
         for name, verdict in result.verdicts.items()
-        if verdict.startswith(BOUND) and name not in result.nuisances
+        if verdict.startswith(BOUND) and END_OF_RANGE not in verdict
+        if name not in result.nuisances
     ]
     held = f"{', '.join(resting)} {'is' if len(resting) == 1 else 'are'} held by a bound alone"
     return [*([point.doubt] if point and point.doubt else []), *([held] if resting else [])]

@@ -16,7 +16,12 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.identification.result import Fit, play
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import BOUND, BOUND_DISTANCE, ParameterVerdict
+from tractexp.identification.verdict import (
+    BOUND,
+    BOUND_DISTANCE,
+    END_OF_RANGE,
+    ParameterVerdict,
+)
 from tractexp.inference.model_error import model_error
 from tractexp.inference.problem import Problem
 from tractexp.parameter import even
@@ -97,7 +102,7 @@ def find_free_optimum(
 def say_ranges(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) -> Uncertainty:
     """The judgement that tells nobody to widen the range of what stands at its end."""
     told = {
-        name: ParameterVerdict(BOUND, f"{value:.4g}, the end of what machines have")
+        name: ParameterVerdict(BOUND, f"{value:.4g}, {END_OF_RANGE}")
         for name, value in zip(uncertainty.names, uncertainty.values.tolist(), strict=True)
         if name in _names_at_range(uncertainty, held) and uncertainty.verdicts[name].word == BOUND
     }

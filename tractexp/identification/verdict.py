@@ -16,6 +16,7 @@ IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
     "at its bound",
 )
 HELD = "a requirement of the model holds it there: beside it there is no steady state"
+END_OF_RANGE = "the end of what machines have"  # of a parameter that is held to a physical range
 # an interval of at most plus and minus this share of the value identifies a parameter
 IDENTIFIED_SHARE = 0.2
 # of the range: what may be zero is measured against this where its value is smaller
