@@ -21,8 +21,7 @@ X_PRIME = Parameter(
     power_exponent=-1,
     physical=(0.08, 1.5),
 )
-# from 0.8 on: X is five times X' at least; waveforms fitted freely give 0.3, which is no machine
-C = Parameter(0.9, (0.3, 0.99), "1", "(X - X')/X", f"{PAPER}, Eq. (1)", physical=(0.8, 0.99))
+C = Parameter(0.9, (0.3, 0.99), "1", "(X - X')/X", f"{PAPER}, Eq. (1)", physical=(0.85, 0.99))
 M = Parameter(
     0.005,
     (0.0005, 0.03),

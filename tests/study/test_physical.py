@@ -58,7 +58,7 @@ def test_records_in_kV_and_MW_are_held_and_others_are_not():
     held = model.hold_to_machines(field)
     assert held.bounds == {
         "X_prime": [0.08, 1.5],
-        "C": [0.8, 0.99],
+        "C": [0.85, 0.99],
         "M": [0.0005, 0.01],
         "T_m": [0.05, 0.9],
     }
@@ -71,7 +71,7 @@ def test_what_is_given_goes_before_what_machines_are():
     model = model_of("third_order_exponential")
     field = dips(0.006, **FIELD)
     assert model.with_(physical=False).hold_to_machines(field).bounds == {}
-    assert model.with_(physical=True).hold_to_machines(dips(0.006)).bounds["C"] == [0.8, 0.99]
+    assert model.with_(physical=True).hold_to_machines(dips(0.006)).bounds["C"] == [0.85, 0.99]
     given = model.with_(bounds={"C": [0.3, 0.7]}, fixed={"M": 0.03}).hold_to_machines(field)
     assert given.bounds["C"] == [0.3, 0.7]
     assert {*given.held} == {"X_prime", "T_m"}
