@@ -54,8 +54,7 @@ The commonest
   tractexp again RUN_FOLDER task=discrepancy         an earlier run with other settings on top
   tractexp --all ...              all that a run has to say, instead of one screen
   tractexp ui                     look at all that was logged, in a browser on this computer only
-  tractexp doctor
-      whether everything here is sound; heal what can be (tractexp sync: log what was not logged)
+  tractexp doctor                 whether all here is sound; tractexp sync: log what was not logged
   tractexp new effect NAME        write a package with an effect of your own, and its test
 
 Tasks, chosen by task=NAME; {task} by default

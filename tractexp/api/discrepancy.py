@@ -569,7 +569,7 @@ def choose_next(lines: Sequence[str], result: Investigation) -> str:
 
 @plugin
 class Discrepancy(Task, call=investigate):
-    """Investigate the training events and judge what is found on the held-out ones.
+    """Name the effect that a model lacks, and show the gap shrink on held-out dips
 
     Writes
 

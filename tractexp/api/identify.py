@@ -779,7 +779,7 @@ def _with_priors(problem: Problem, result: Result) -> list[str]:
 
 @plugin
 class Identify(Task, call=identify):
-    """Fit free parameters to the training events, judge on all, show and log that."""
+    """Identify the parameters of a load from recorded dips, and judge the model on all"""
 
     figures: bool | None = None  # write the page; null: in single runs, not in sweeps
     # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
