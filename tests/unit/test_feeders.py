@@ -335,7 +335,7 @@ def test_the_load_of_the_greatest_active_power_is_recommended():
             "P_after": P,
             "Q_after": Q,
         }
-        return {"name": name, "events": [event], "command": f"fit {name}"}
+        return {"name": name, "why": [], "events": [event], "command": f"fit {name}"}
 
     feeders = [entry("cable", 1.0, -98.0), entry("load", 20.0, 8.0), entry("aside", 5.0, 2.0)]
     assert "fit load" in look_console._answer([{"feeders": feeders}])
