@@ -190,13 +190,14 @@ def test_integrated_as_printed_a_model_takes_one_step_per_sample_and_says_what_t
 def test_the_operations_of_a_step_are_those_counted_by_hand(model):
     """Eq. (1) in rectangular form: 9 multiplications and 6 additions four times, 9 of each to go
     ahead in three stages, 6 and 12 for the sum; a constant times the voltage serves both stages in
-    the middle. All lanes share two cubics of 8 and 8 and two straight lines of 1 and 2: the end of
-    a step is the beginning of the next.
+    the middle. All lanes share two cubics of 8 and 8, the voltage's, and two slopes of the cubic of
+    its angle, the speed, of 9 and 7 and a division: the end of a step is the beginning of the next.
     """
     step = operations.count(model.source).step
-    assert step.multiplications == pytest.approx(4 * 9 - 1 + 9 + 6 + 2 * (8 + 1) / LANES)
-    assert step.additions == pytest.approx(4 * 6 + 9 + 12 + 2 * (8 + 2) / LANES)
-    assert (step.divisions, step.others) == (0, 0)
+    assert step.multiplications == pytest.approx(4 * 9 - 1 + 9 + 6 + 2 * (8 + 9) / LANES)
+    assert step.additions == pytest.approx(4 * 6 + 9 + 12 + 2 * (8 + 7) / LANES)
+    assert step.divisions == pytest.approx(2 / LANES)
+    assert step.others == 0
 
 
 def test_the_operations_of_a_sample_are_those_of_both_powers_and_the_errors(model):
