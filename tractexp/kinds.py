@@ -15,12 +15,11 @@ WORDS: Mapping[Any, str] = {
     float: "a number",
     bool: "True or False",
     str: "a text",
-    type(None): "None",
+    type(None): "nothing",
     Any: "anything",
 }
 GIVEN: Mapping[Any, str] = {
     bool: "a truth value",
-    type(None): "nothing",
     dict: "a mapping",
     list: "a list",
     tuple: "a list",
