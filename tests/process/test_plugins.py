@@ -530,7 +530,7 @@ def test_a_second_package_replaces_a_shipped_default(acme, tmp_path):
     assert "modelica" in done.stdout, done.stderr
 
 
-ENGLISH = {"none", "voltage"}  # words first, and names of plugins besides
+ENGLISH = {"none", "voltage", "auto"}  # words first, and names of plugins besides
 # the paper's subject, and parts that happen to be called as a plugin is
 NAMING = ("studies/paper/", "extend/")
 

@@ -6,8 +6,7 @@ from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.read import Dips, read
 
-SHIPPED = ("tibet_50pct", "tibet_30pct", "tibet_65pct")
-FILES = "pkg://tractexp.data/{name}.csv"
+SHIPPED = [f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (50, 30, 65)]
 
 
 @public
@@ -36,8 +35,7 @@ def examples(folder: Path | str | None = None) -> Dips:
     >>> [f"{dip.depth:.2f}" for dip in tractexp.examples()]
     ['0.50', '0.30', '0.65']
     """
-    paths = [files.locate_file(FILES.format(name=name)) for name in SHIPPED]
     if folder is not None:
-        for k, path in enumerate(paths, start=1):
-            files.copy(path, Path(folder, f"dip{k}.csv"))
+        for k, file in enumerate(SHIPPED, start=1):
+            files.copy(files.locate_file(file), Path(folder, f"dip{k}.csv"))
     return read(*SHIPPED)
