@@ -6,6 +6,7 @@ fits the model that the last one ended with, it gives the same grade.
 """
 
 import json
+import os
 import re
 import shlex
 import tempfile
@@ -154,8 +155,13 @@ def test_the_chain_of_a_shipped_record_ends(command, tmp_path):
 
 
 NOT_SEEN = "this chain was not seen to its end yet: three faults of it were mended on the way"
+# ten minutes and more each: whoever changes what a task hands on runs them
+long = pytest.mark.skipif(
+    not os.environ.get("TRACTEXP_LONG_CHAINS"), reason="long: set TRACTEXP_LONG_CHAINS=1"
+)
 
 
+@long
 @pytest.mark.xfail(strict=False, reason=NOT_SEEN)
 @pytest.mark.parametrize("load", [1, 2])
 def test_the_chain_of_a_station_ends(load, shared_data, tmp_path):
@@ -168,6 +174,7 @@ def test_the_chain_of_a_station_ends(load, shared_data, tmp_path):
     check_grades(follow(command, tmp_path))
 
 
+@long
 @pytest.mark.xfail(strict=False, reason=NOT_SEEN)
 def test_the_chain_of_another_simulator_ends(shared_data, tmp_path):
     cases = shared_data.parent / "cases" / "andes"
