@@ -357,7 +357,7 @@ def test_the_command_line_tells_both_bases(records, tmp_path):
         "optimizer.starts=2",
     ]
     done = command(
-        tmp_path, *run, "tracking.enabled=false", "task.figures=false", "hydra.run.dir=run"
+        tmp_path, "--all", *run, "tracking.enabled=false", "task.figures=false", "hydra.run.dir=run"
     )
     assert "on the file's base (100 MVA): X_prime = " in done
     told = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
