@@ -847,7 +847,7 @@ def test_the_command_compares_the_newest_sweep(swept):
         "comparison.html",
     ):
         assert part in done.stdout, part
-    assert re.search(r"\n worst +1 +6\.\d+e-05 ", done.stdout)  # one failed, median objective
+    assert re.search(r"\nworst +1 +6\.\d+e-05 ", done.stdout)  # one failed, median objective
     beside = folder / "outputs" / "sweeps" / "newer"
     for name in ("comparison.html", "comparison.json"):
         assert (folder / "out" / name).read_bytes() == (beside / name).read_bytes()
