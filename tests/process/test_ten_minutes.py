@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from command_line import COLUMNS
 
 PAGE = Path(__file__).parents[2] / "docs" / "ten-minutes.md"
 BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
@@ -40,7 +41,8 @@ def followed(tmp_path_factory):
         if language != "sh":
             continue
         for line in block.splitlines():
-            there = os.environ | {"PYTHONPATH": str(site), "PYTEST_ADDOPTS": "-p no:cacheprovider"}
+            there = os.environ | COLUMNS | {"PYTHONPATH": str(site)}
+            there["PYTEST_ADDOPTS"] = "-p no:cacheprovider"
             done = subprocess.run(
                 command(line, site), cwd=folder, capture_output=True, text=True, env=there
             )
