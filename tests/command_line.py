@@ -57,7 +57,7 @@ def as_it_was(environment):
     from hydra.core.global_hydra import GlobalHydra
     from hydra.core.hydra_config import HydraConfig
 
-    from tractexp import provenance
+    from tractexp import progress, provenance
     from tractexp.sweep import identity
     from tractexp.tracking import process
 
@@ -70,11 +70,13 @@ def as_it_was(environment):
     surroundings = mock.patch.dict(os.environ, COLUMNS | environment)
     hydra = GlobalHydra.instance().hydra
     GlobalHydra.instance().clear()
+    progress.console.cache_clear()  # a process of its own would have one of its own width
     try:
         with surroundings, mock.patch.object(sys, "argv", ["tractexp"]), warnings.catch_warnings():
             yield
     finally:
         process._end_ahead()
+        progress.console.cache_clear()
         GlobalHydra.instance().hydra = hydra
         HydraConfig.instance().cfg = None
         provenance.remember_command([])

@@ -139,7 +139,7 @@ def test_a_recorder_of_a_station_is_one_screen(name, tmp_path):
     path = Path(__file__).parents[3] / "shared" / "data" / name
     if not path.exists():
         pytest.skip(f"{path} is not there")
-    done = run_command("look", str(path), "--folder", "x", cwd=tmp_path)
+    done = run_command("look", str(path), "--folder", "x", cwd=tmp_path, COLUMNS="80")
     assert len(done.stdout.splitlines()) <= 25
     words = " ".join(done.stdout.split())  # the answer is longer than a line of 80 columns
     assert ("is worth fitting; to fit it: tractexp" in words) == ("xtz" in name)

@@ -41,7 +41,8 @@ def screen(content: Entry) -> Report:
     each file where it is from, its buses, and which loads are worth fitting.
     """
     entries = content["files"]
-    page = Report().text(_answer(entries)).items(unfitted.sentences(entries)[:MOST_REASONS])
+    reasons = unfitted.sentences(entries)[:MOST_REASONS]
+    page = Report().text(_answer(entries)).items([shorten(each, TWO_LINES) for each in reasons])
     for entry in entries[:MOST_FILES]:
         page.text(shorten(_about(entry), TWO_LINES))
         if notes := entry["notes"]:
