@@ -31,7 +31,7 @@ from tractexp.wording import count_noun, figure, join_words, shorten
 NOTES = 3  # of a file that have room
 MOST_LINE_EVENTS = 4  # events of a bus that its line has room for
 # files, buses of a file, rows of a table of loads, reasons that a screen has room for
-MOST_FILES, MOST_BUSES, MOST_LOADS, MOST_REASONS = 2, 2, 6, 2
+MOST_FILES, MOST_BUSES, MOST_LOADS, MOST_REASONS = 2, 2, 5, 2
 ONE_LINE, TWO_LINES = 76, 150  # characters
 Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
 
