@@ -80,7 +80,7 @@ def _truth(name):
 
 
 def test_the_page_shows_currents_spectra_and_the_power_of_the_same_estimator(fit, tmp_path):
-    (path,) = fit.write_drawings(tmp_path)
+    path = next(one for one in fit.write_drawings(tmp_path) if one.name == fit.page)
     text = path.read_text(encoding="utf-8")
     for told in (
         "In waveforms the sampled currents are compared",
