@@ -112,7 +112,7 @@ def say_ranges(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) ->
 def _compare(
     free: Sequence[Fit], held: Sequence[Fit], fitted: int, away: dict[str, float]
 ) -> FreeOptimum:
-    errors = [model_error(part).value for fits in (free, held) for part in (fits[:fitted],)]
+    errors = [model_error(fits[:fitted]).value for fits in (free, held)]
     predicted = [None, None]
     if len(held) > fitted:
         predicted = [model_error(fits[fitted:]).value for fits in (free, held)]

@@ -39,7 +39,7 @@ def screen(fit: "Identification") -> Report:
 def describe_load(result: Result, names: Sequence[str]) -> str:
     """Station and load, voltage and power before the dip, and which dips were fitted."""
     own, before = result.base, result.before
-    scale, units = (own.power, ("MW", "Mvar")) if own.in_mva else (own.ratio, ("pu", "pu"))
+    scale, units = choose_units(result)
     powers = [
         f"{scale * before[key]:.4g} {unit}" for key, unit in zip(("P0", "Q0"), units, strict=True)
     ]
@@ -50,6 +50,14 @@ def describe_load(result: Result, names: Sequence[str]) -> str:
     parts = [label(identities), level, *powers, f"fitted: {dips}"]
     unknown = f" ({UNKNOWN})" if not (own.in_mva or voltage) else ""
     return f"load: {', '.join(filter(None, parts))}{unknown}"
+
+
+def choose_units(result: Result) -> tuple[float, tuple[str, str]]:
+    """What powers are multiplied by, and the units of P and Q that they then have: MW and Mvar
+    where the record tells them.
+    """
+    own = result.base
+    return (own.power, ("MW", "Mvar")) if own.in_mva else (own.ratio, ("pu", "pu"))
 
 
 def tabulate_parameters(fit: "Identification") -> Table:

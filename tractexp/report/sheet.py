@@ -11,10 +11,11 @@ from tractexp.blocks.chart import Chart
 from tractexp.errors import UserError
 from tractexp.exchange.format import choose_format
 from tractexp.exchange.rating import SOURCE, rate_machine
+from tractexp.identification.verdict import brief
 from tractexp.provenance import build_folder_command, command
 from tractexp.record.identity import describe_identities, title
 from tractexp.report.identify import error_rows, list_origin, name_verdicts
-from tractexp.report.screen import describe_load
+from tractexp.report.screen import choose_units, describe_load
 from tractexp.wording import as_sentence, count_noun, with_error
 
 if TYPE_CHECKING:
@@ -65,15 +66,9 @@ def sheet(fit: "Identification") -> Report:
     return page.table(["", ""], [*list_origin(result, command()), *_export(fit)], words=(1,))
 
 
-def _scale(fit: "Identification") -> tuple[float, tuple[str, str]]:
-    """What one per unit of the fit is, and the units of P and Q."""
-    own = fit.result.base
-    return (own.power, ("MW", "Mvar")) if own.in_mva else (own.ratio, ("pu", "pu"))
-
-
 def _tabulate_powers(fit: "Identification") -> Table:
     """What the load and its parts draw before the dip."""
-    (scale, units), point = _scale(fit), fit.operating_point
+    (scale, units), point = choose_units(fit.result), fit.operating_point
     before = fit.result.before
     rows = [["load", scale * before["P0"], scale * before["Q0"]]]
     if point is not None:
@@ -93,7 +88,7 @@ def _tabulate(fit: "Identification") -> Table:
             with_error(e.value, e.standard_error or 0.0),
             e.unit,
             "{:.4g} to {:.4g}".format(*e.interval) if e.interval else "",
-            e.verdict.partition(":")[0],
+            brief(e.verdict),
         ]
         for e in fit.own_parameters
     ]
@@ -110,7 +105,7 @@ def _add_machine(page: Report, fit: "Identification") -> None:
     except UserError as error:
         page.text(as_sentence(str(error)))
         return
-    scale, (unit, _) = _scale(fit)
+    scale, (unit, _) = choose_units(fit.result)
     size = f"{scale * machine.rating:.4g} {'MVA' if unit == 'MW' else 'pu'}"
     rows = [
         [q.about, q.value, q.unit, f"{q.low:.3g} to {q.high:.3g}", q.place]
@@ -139,7 +134,7 @@ def _tabulate_errors(fit: "Identification") -> Table:
 
 def _add_charts(page: Report, fit: "Identification") -> None:
     """Measured and calculated power of the first events."""
-    scale, units = _scale(fit)
+    scale, units = choose_units(fit.result)
     fits = fit.details.fits
     for one in fits[:MOST_CHARTS]:
         voltage = one.event.record.base.voltage
@@ -172,7 +167,7 @@ def _list_limits(fit: "Identification") -> list[str]:
     """What the model is not good for, a sentence each."""
     said = [as_sentence(doubt) for doubt in fit.doubts]
     said += [f"{name} is {verdict}." for name, verdict in name_verdicts(fit.result).items()]
-    said += [f"{as_sentence(text)}" for text in fit.structures]
+    said += map(as_sentence, fit.structures)
     if not fit.result.model_error.get("held_out"):
         said.append("No event was held out: how it predicts another dip is not known.")
     if not fit.result.base.in_mva:
