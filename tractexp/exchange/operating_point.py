@@ -10,7 +10,7 @@ from tractexp.errors import UserError
 from tractexp.exchange.format import Identified
 from tractexp.identification.division import doubt_division
 from tractexp.identification.result import Result
-from tractexp.identification.verdict import BOUND, END_OF_RANGE
+from tractexp.identification.verdict import rests_on_bound
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,7 @@ def doubts(result: Result, point: OperatingPoint | None) -> list[str]:
     resting = [
         name
         for name, verdict in result.verdicts.items()
-        if verdict.startswith(BOUND) and END_OF_RANGE not in verdict
-        if name not in result.nuisances
+        if rests_on_bound(verdict) and name not in result.nuisances
     ]
     held = f"{', '.join(resting)} {'is' if len(resting) == 1 else 'are'} held by a bound alone"
     return [*([point.doubt] if point and point.doubt else []), *([held] if resting else [])]

@@ -51,6 +51,13 @@ def brief(verdict: str) -> str:
     return verdict.partition(":")[0]
 
 
+def rests_on_bound(verdict: str) -> bool:
+    """Whether a bound alone holds the parameter, by its verdict as written: the end of a physical
+    range is where machines end.
+    """
+    return verdict.startswith(BOUND) and END_OF_RANGE not in verdict
+
+
 def size(value: float, low: float, high: float) -> float:
     """What an interval is measured against: the value, or a tenth of the range for a small one that
     may be zero.
