@@ -75,8 +75,12 @@ class Workers:
             # call kills its worker.
             for batch in ([call] for call in calls) if n == 1 else [calls]:
                 results = parallel(batch)
-                with contextlib.closing(results):
+                try:
                     yield from (result for result in results if result is not None)
+                finally:
+                    # anew: a thread that ends its own `catch_warnings` takes these filters back
+                    with _quiet():
+                        results.close()
 
     def results(
         self,

@@ -1,9 +1,11 @@
 """Worker processes: killed ones, one by itself, none that begins, and those that are replaced."""
 
+import contextlib
 import os
 import subprocess
 import sys
 import time
+import warnings
 from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
@@ -101,9 +103,21 @@ def test_workers_that_never_begin_are_refused_in_a_sentence():
     assert looks == [1] * BARREN
 
 
+def pause(seconds):
+    time.sleep(0.01 * seconds)
+
+
 def test_what_a_call_had_left_is_its_result():
     ends = list(Killed().results(abs, [1, 2], trace=lambda item: f"end of {item}"))
     assert ends == [(1, "end of 1"), (2, "end of 2")]
+
+
+def test_calls_that_are_given_up_end_without_a_warning_whatever_other_threads_filter():
+    """joblib warns of results that are not used; here what filtered that is taken back before."""
+    with contextlib.closing(Workers(2).run_items(pause, range(40), 40)) as results:
+        next(results)
+        warnings.resetwarnings()
+        warnings.simplefilter("error")
 
 
 def test_libraries_use_one_thread_in_each_worker(monkeypatch):
