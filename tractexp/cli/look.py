@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tractexp import files, quoting
+from tractexp import files
 from tractexp.errors import UserError
 from tractexp.progress import console, text_width
 
@@ -17,6 +17,7 @@ DOES = (
     "Look at files without saying which channels they have: loads, events, what is worth fitting,"
     " and the command."
 )
+EVERYTHING = "  everything: the same command with --all"
 SETTING = re.compile(r"(?:data\.)?([a-z_]+)=(.*)", re.DOTALL)
 
 
@@ -51,9 +52,8 @@ def look(arguments: list[str]) -> int:
     from tractexp.blocks.terminal import show
 
     view = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
-    rest = f"  everything: {quoting.shell('tractexp', 'look', *chosen.file, '--all')}"
     show(
-        view.build_full_report() if chosen.all else view.screen().text(rest),
+        view.build_full_report() if chosen.all else view.screen().text(EVERYTHING),
         console(),
         text_width(),
     )
