@@ -507,6 +507,7 @@ def test_whether_an_effect_fits_and_what_stands_before_an_event_are_remembered_w
         "one = np.ones(2);"
         "drive = Drive.from_events([Excitation(1e-3, one, one, one, 1.0, 1.0, 0.5)]);"
         "print(m.at_rest(np.array([p.default for p in m.parameters]), drive));"
+        "print(m.latex());"
         "print('sympy' in sys.modules, 'scipy.signal' in sys.modules)"
     )
     there = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
@@ -518,6 +519,7 @@ def test_whether_an_effect_fits_and_what_stands_before_an_event_are_remembered_w
     *derived, loaded = run()
     assert derived[0] == "[None, 'its equations have no speed that moves', None]"
     assert "'P_motor': " in derived[1]
+    assert "P_s" in derived[2]
     assert loaded == "True False"
     assert run() == [*derived, "False False"]
 

@@ -8,8 +8,7 @@ proportion, and H is smaller.
 
 from dataclasses import dataclass
 from functools import cache
-from math import pi
-from typing import Any
+from math import pi, sqrt
 
 import numpy as np
 
@@ -41,7 +40,6 @@ ABOUT = {
     "slip": ("slip at the rating", "%"),
     "starting": ("starting current over that at the rating", "1"),
 }
-SMALLEST_SLIP = 1e-5  # at which a machine draws its magnetizing current alone
 
 
 @dataclass(frozen=True)
@@ -129,8 +127,13 @@ def _figures(circuit: TCircuit, inertia: float, slip: float) -> dict[str, float]
 
 
 def _rated_slip(circuit: TCircuit) -> float:
-    """The slip at which a machine draws its rated current at nominal voltage."""
-    from scipy.optimize import brentq
+    """The slip at which a machine of one cage draws its rated current at nominal voltage.
 
-    found: Any = brentq(lambda s: abs(circuit.impedance(s)) - 1, SMALLEST_SLIP, 1.0)
-    return float(found)
+    There its impedance is 1, which is a quadratic equation in R_1 over the slip.
+    """
+    rotor = circuit.X_1 + circuit.X_m
+    blocked = circuit.X_s * rotor + circuit.X_m * circuit.X_1
+    a = circuit.R_s**2 + circuit.X**2 - 1
+    b = circuit.R_s * circuit.X_m**2
+    c = blocked**2 + (circuit.R_s * rotor) ** 2 - rotor**2
+    return circuit.R_1 * a / (sqrt(b**2 - a * c) - b)

@@ -378,8 +378,12 @@ class Model:
         return json.dumps({"starts": starts, "quantities": list_stated_quantities(self.equations)})
 
     def latex(self) -> list[str]:
-        """The model's equations, one a line."""
-        return self.equations.latex()
+        """The model's equations, one a line; read back from the store, without SymPy, where they
+        were printed before.
+        """
+        parts = (self.motor, self.static, *self.effects)
+        printed = text_of(parts, lambda: json.dumps(self.equations.latex()), self._in_cache("latex"))
+        return json.loads(printed)
 
     def _candidates(
         self, drive: Drive, values: np.ndarray, before: np.ndarray | None = None
