@@ -382,7 +382,9 @@ class Model:
         were printed before.
         """
         parts = (self.motor, self.static, *self.effects)
-        printed = text_of(parts, lambda: json.dumps(self.equations.latex()), self._in_cache("latex"))
+        printed = text_of(
+            parts, lambda: json.dumps(self.equations.latex()), self._in_cache("latex")
+        )
         return json.loads(printed)
 
     def _candidates(
