@@ -11,7 +11,7 @@ import datetime as dt
 import functools
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,36 +110,48 @@ def times(cells: Sequence[Any]) -> ClockTimes:
     if not len(cells):
         return ClockTimes(np.empty(0))
     moments = [_moment(cell, row) for row, cell in enumerate(cells)]
-    dated = moments[0].day is not None
-    for row, one in enumerate(moments):
-        if (one.day is not None) != dated:
-            lack = "has" if one.day is not None else "lacks"
-            raise BadCell(row, f"{quote_cell(cells[row])} {lack} a date, unlike the first row")
-    seconds, start, remarks = np.array([one.second for one in moments]), None, []
-    if dated:
-        days, remarks = _dates([one.day for one in moments], any(one.half for one in moments))
-        first = days[moments[0].day]
-        start = dt.datetime.combine(first, dt.time()) + dt.timedelta(seconds=seconds[0])
-        since = {day: (date - first).days * DAY for day, date in days.items()}
-        seconds = seconds + np.array([since[one.day] for one in moments])
+    _check_dates(moments, cells)
+    clock = np.array([one.second for one in moments])
+    start, remarks = None, []
+    if moments[0].day is not None:
+        seconds, start, remarks = _add_days(moments, clock)
     else:
         turn = HOUR if isinstance(cells[0], str) and cells[0].count(":") == 1 else DAY
-        seconds = seconds + turn * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -turn / 2)
-    seconds = seconds + np.cumsum(
-        [0.0, *(a.leap and not b.leap for a, b in itertools.pairwise(moments))]
-    )
-    local = None if any(one.zone for one in moments) else np.array([one.second for one in moments])
+        seconds = clock + turn * np.cumsum(np.diff(clock, prepend=clock[0]) < -turn / 2)
+    leap = np.array([one.leap for one in moments])
+    seconds[1:] += np.cumsum(leap[:-1] & ~leap[1:])
+    local = np.full(len(cells), np.inf) if any(one.zone for one in moments) else clock
     seconds, jumps = _run_on(seconds, local)
     return ClockTimes(seconds - seconds[0], start, (*remarks, *jumps), moments[0].second)
 
 
-def _run_on(
-    seconds: np.ndarray, local: np.ndarray | None
-) -> tuple[np.ndarray, list[tuple[int, str]]]:
+def _check_dates(moments: Sequence[_Moment], cells: Sequence[Any]) -> None:
+    """Raise `BadCell` where some cells have a date and others none."""
+    dated = moments[0].day is not None
+    for row, one in enumerate(moments):
+        if (one.day is not None) != dated:
+            lack = "lacks" if dated else "has"
+            raise BadCell(row, f"{quote_cell(cells[row])} {lack} a date, unlike the first row")
+
+
+def _add_days(
+    moments: Sequence[_Moment], clock: np.ndarray
+) -> tuple[np.ndarray, dt.datetime, list[tuple[int, str]]]:
+    """(seconds (N,) since the midnight before the first moment, the first moment, what is said of
+    dates that can be read in several ways); `clock` (N,) are the seconds of the day.
+    """
+    days, remarks = _dates([one.day for one in moments], any(one.half for one in moments))
+    dates = [days[one.day] for one in moments]
+    since = np.array([(date - dates[0]).days * DAY for date in dates])
+    start = dt.datetime.combine(dates[0], dt.time()) + dt.timedelta(seconds=clock[0])
+    return clock + since, start, remarks
+
+
+def _run_on(seconds: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, list[tuple[int, str]]]:
     """Times (N,) [s] without the jumps of a clock that was set, and what is said of each.
 
-    `local` are the seconds of the day by which an hour that is left out in spring is known; None
-    for times of a zone, which leave out none.
+    `local` (N,) are the seconds of the day by which an hour that is left out in spring is known;
+    infinite for times of a zone, which leave out none.
     """
     steps, remarks = np.diff(seconds), list[tuple[int, str]]()
     usual = float(np.median(steps)) if len(steps) else 0.0
@@ -148,41 +160,47 @@ def _run_on(
     shifts, back = np.zeros(len(seconds)), list[float]()
     for k in np.flatnonzero((steps < 0) | (steps > 2 * usual)):
         jump = float(steps[k]) - usual
-        spring = local is not None and abs(jump - HOUR) <= usual and local[k] / HOUR < LATEST_SUMMER
-        forth = next((each for each in back if abs(each - jump) <= usual), HOUR if spring else None)
+        expected = [*back, HOUR] if local[k] / HOUR < LATEST_SUMMER else back
+        forth = next((each for each in expected if abs(each - jump) <= usual), 0.0)
         if -SET_BACK <= jump < -SWAPPED * usual:
             back.append(-jump)
-            remarks.append(
-                (int(k) + 1, f"the clock was set back by {-jump:.6g} s here: times run on")
-            )
-        elif jump > 0 and forth is not None:
+            way = "back"
+        elif jump > 0 and forth:
             back = [each for each in back if each != forth]
-            remarks.append(
-                (int(k) + 1, f"the clock was set forth by {jump:.6g} s here: times run on")
-            )
+            way = "forth"
         else:
             continue
+        said = f"the clock was set {way} by {abs(jump):.6g} s here: times run on"
+        remarks.append((int(k) + 1, said))
         shifts[k + 1] = -jump
     return seconds + np.cumsum(shifts), remarks
 
 
 def _moment(cell: Any, row: int) -> _Moment:
     """What a cell says, with a zone that of UTC; raises `BadCell`."""
-    if isinstance(cell, dt.datetime | dt.time):
-        second = cell.hour * 3600 + cell.minute * 60 + cell.second + cell.microsecond * 1e-6
-        return _Moment(cell.date() if isinstance(cell, dt.datetime) else None, second)
-    if isinstance(cell, dt.date):
-        return _Moment(cell, 0.0)  # a sheet's midnight
-    match = CLOCK.fullmatch(cell) if isinstance(cell, str) else None
-    if match is None:
+    moment = _read_text(cell, row) if isinstance(cell, str) else _read_object(cell)
+    if moment is None:
         raise BadCell(
             row, f"{quote_cell(cell)} is no time, such as 12:00:00.25 or 2024-03-31T12:00:00.25"
         )
-    hours, minutes, second = (
-        int(match["h"] or 0),
-        int(match["m"]),
-        float(match["s"].replace(",", ".").replace(":", ".")),
-    )
+    return moment
+
+
+def _read_object(cell: Any) -> _Moment | None:
+    """What a cell that is no text says, a date its midnight; None where it is no time."""
+    if isinstance(cell, dt.datetime | dt.time):
+        second = cell.hour * 3600 + cell.minute * 60 + cell.second + cell.microsecond * 1e-6
+        return _Moment(cell.date() if isinstance(cell, dt.datetime) else None, second)
+    return _Moment(cell, 0.0) if isinstance(cell, dt.date) else None
+
+
+def _read_text(cell: str, row: int) -> _Moment | None:
+    """What a text says; None where it is no time. Raises `BadCell` for one with a wrong part."""
+    match = CLOCK.fullmatch(cell)
+    if match is None:
+        return None
+    hours, minutes = int(match["h"] or 0), int(match["m"])
+    second = float(match["s"].replace(",", ".").replace(":", "."))
     if hours > 24 or minutes > 59 or second >= 61:
         raise BadCell(row, f"{quote_cell(cell)} is no time of a day")
     if match["half"]:
@@ -205,47 +223,59 @@ def _offset(zone: str | None) -> float:
 def _dates(days: Sequence[Any], american: bool) -> tuple[dict[Any, dt.date], list[tuple[int, str]]]:
     """{day as written: the day}, all read in one way, and what is said where several ways would do.
 
-    That way is taken in which the days run on best; where that leaves it open, month before day
-    where the times have AM or PM (`american`), else day before month. Raises `BadCell` where no way
-    reads all.
+    Raises `BadCell` where no way reads all.
     """
     rows = {day: row for row, day in reversed([*enumerate(days)])}
-    texts = [day for day in rows if isinstance(day, str)]
     known: dict[Any, dt.date] = {day: day for day in rows if isinstance(day, dt.date)}
+    texts = [day for day in reversed(rows) if isinstance(day, str)]
     if not texts:
         return known, []
-    order = [*reversed(texts)]
-    ways = []
-    for form in DAYS:
-        read = [_day(text, form) for text in order]
-        if None not in read and read not in [way for _, way in ways]:
-            ways.append((form, read))
+    ways = _read_in_each_way(texts)
     if not ways:
-        odd = next((t for t in order if not is_date(t)), order[-1])
+        odd = next(itertools.filterfalse(is_date, texts), texts[-1])
         raise BadCell(
             rows[odd],
             f"{quote_cell(odd)} is no date, or not written as those before; write it as 2024-03-31",
         )
-    spans = [sum(abs((b - a).days) for a, b in itertools.pairwise(way)) for _, way in ways]
-    likely = [ways[k] for k in range(len(ways)) if spans[k] == min(spans)]
-    first_month = [each for each in likely if each[0].startswith("%m")]
-    form, dates = (first_month or likely)[0] if american else likely[0]
-    remarks = []
-    if len(ways) > 1:
-        how = "month before day" if form.startswith("%m") else "day before month"
-        why = (
-            "as the days run on"
-            if len(likely) == 1
-            else "as with AM and PM"
-            if american
-            else "as is usual"
-        )
-        said = (
-            f"'{order[0]}' is read as {dates[0]:%d %B %Y}, {how}, {why}; dates as 2024-03-31 leave"
-            " nothing open"
-        )
-        remarks = [(rows[order[0]], said)]
-    return {**known, **dict(zip(order, dates, strict=True))}, remarks
+    form, why = _choose_way(ways, american)
+    known |= zip(texts, ways[form], strict=True)
+    if len(ways) == 1:
+        return known, []
+    how = "month before day" if form.startswith("%m") else "day before month"
+    said = (
+        f"'{texts[0]}' is read as {known[texts[0]]:%d %B %Y}, {how}, {why}; dates as 2024-03-31"
+        " leave nothing open"
+    )
+    return known, [(rows[texts[0]], said)]
+
+
+def _read_in_each_way(texts: Sequence[str]) -> dict[str, list[dt.date]]:
+    """{way of writing: the days that texts name so}, of the ways that read all, each reading
+    once.
+    """
+    ways: dict[str, list[dt.date]] = {}
+    for form in DAYS:
+        dates = [day for text in texts if (day := _day(text, form)) is not None]
+        if len(dates) == len(texts) and dates not in ways.values():
+            ways[form] = dates
+    return ways
+
+
+def _choose_way(ways: Mapping[str, Sequence[dt.date]], american: bool) -> tuple[str, str]:
+    """(the way in which dates are read, why): that in which the days run on best; where that
+    leaves it open, month before day where the times have AM or PM (`american`), else day before
+    month.
+    """
+    spans = {
+        form: sum(abs((b - a).days) for a, b in itertools.pairwise(dates))
+        for form, dates in ways.items()
+    }
+    likely = [form for form in ways if spans[form] == min(spans.values())]
+    if len(likely) == 1:
+        return likely[0], "as the days run on"
+    if not american:
+        return likely[0], "as is usual"
+    return max(likely, key=lambda form: form.startswith("%m")), "as with AM and PM"
 
 
 @functools.lru_cache(maxsize=4096)

@@ -3,7 +3,9 @@
 t Time [s] Zeit in ms 时间 U Voltage (kV) Va UA(kV) V1 m:u1:bus in p.u. P [MW] Active power
 """
 
+import itertools
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -298,6 +300,7 @@ COMPOUND = re.compile(
 PHASE_KEYS = ("a", "b", "c", "ab", "bc", "ca")
 TABLE_ORDERS = (*ORDERS, "UVW")  # the last: UV is the voltage of phase V
 BY_UNIT: Mapping[str, str] = {"voltage": "U", "current": "I", "power": "P", "reactive": "Q"}
+ELECTRICAL = frozenset(BY_UNIT.values())
 
 
 @dataclass(frozen=True)
@@ -367,7 +370,7 @@ def fits(quantity: str, unit: str, exact: bool = False) -> bool:
     """Whether a unit is one of a quantity, as `data.units` calls it; P in Mvar, Q in MW are, unless
     `exact`.
     """
-    kind = (meaning(amount(unit)[1]) or ("",))[0]
+    kind = _unit_quantity(amount(unit)[1])
     return kind in (FITTING[quantity] if exact else {*FITTING[quantity], *ALSO.get(quantity, ())})
 
 
@@ -375,92 +378,109 @@ def order_of(names: Sequence[str], units: Sequence[str]) -> str:
     """The order of phases, one of `TABLE_ORDERS`, in which most columns of a table have marks; the
     first of several.
     """
+    named = [column for column in zip(names, units, strict=True) if column[0]]
+    return max(TABLE_ORDERS, key=lambda order: _count_marks(named, order))
 
-    def count_marked_channels(order: str) -> int:
-        roles = (role(name, unit, order) for name, unit in zip(names, units, strict=True) if name)
-        ours = [one for one in roles if one and one.key[:1] in tuple("UIPQ")]
-        keys = {one.key.removesuffix("_angle") for one in ours}
-        sets = (
-            [key for key in keys if key[0] == letter and key[1:] in PHASE_KEYS] for letter in "UIPQ"
-        )
-        counts = ([sum(len(key) == size for key in one) for size in (2, 3)] for one in sets)
-        grounded = len({one.key for one in ours if one.line is False and one.key[1:] in PHASE_KEYS})
-        return max(
-            grounded, sum(max(singles if singles == 3 else 0, pairs) for singles, pairs in counts)
-        )
 
-    return max(TABLE_ORDERS, key=count_marked_channels)
+def _count_marks(named: Sequence[tuple[str, str]], order: str) -> int:
+    """How many columns of (name, unit) an order of phases gives marks: of the quantity with the
+    most, pairs of phases or all three, or of voltages to ground.
+    """
+    roles = filter(None, (role(name, unit, order) for name, unit in named))
+    marked = [one for one in roles if one.key.removesuffix("_angle")[1:] in PHASE_KEYS]
+    keys = {one.key.removesuffix("_angle") for one in marked}
+    counts = Counter((key[0], len(key)) for key in keys)
+    most = max((n for (_, length), n in counts.items() if 3 in (length, n)), default=0)
+    return max(most, len({one.key for one in marked if one.line is False}))
 
 
 def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     """What a column of that name and unit is, in a table with that order of phases; None for
     anything else.
     """
-    words = _words(name)
-    fractions = [word for word in words if word in FRACTIONS]
-    for fraction in fractions:
-        if not FRACTIONS[fraction] or len(words) == 1:
-            return Role("frac", unit or FRACTIONS[fraction])
-    kind = (meaning(unit) or ("",))[0]
-    electrical = kind in (*BY_UNIT, "angle") or any(
-        WORDS.get(word) in BY_UNIT.values() for word in words
-    )
-    unmarked = None if electrical else _quantity(words)
-    if unmarked and unmarked[0] not in BY_UNIT.values():
-        return Role(unmarked[0], unit)
+    words, kind = _words(name), _unit_quantity(unit)
+    electrical = kind in (*BY_UNIT, "angle") or not ELECTRICAL.isdisjoint(map(WORDS.get, words))
+    if unmarked := _fraction(words, unit) or _other_role(words, unit, electrical):
+        return unmarked
     spelled, ground = spell_marks(name, order)
-    words = _words(name) if spelled == plain(name) else _words(spelled)
-    said = _quantity(words)
-    if said is None or (electrical and said[0] not in BY_UNIT.values()):
-        said = _match_mark(words, kind, ground) or said
+    if spelled != plain(name):
+        words = _words(spelled)
+    said = _marked_quantity(words, kind, ground, electrical)
     if said is None:
         return None
     key, phase = said
     if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
         return role(f"{name} {unit}", order=order)
     whole, backward = BACKWARD.get(phase, phase), phase in BACKWARD
-    angle = (
-        kind == "angle"
-        or ANGLE & set(words)
-        or words[-1] == "phase"
-        or any(word.endswith("ang") for word in words)
-    )
-    if key in ("U", "I") and angle:
+    if key in ("U", "I") and _is_angle(words, kind):
         return Role(f"{key}{whole}_angle", unit, backward=backward)
-    if key not in ("U", "I", "P", "Q"):
-        return Role(key, unit)
-    if key != "U":
-        return Role(key + whole, unit)
-    grounded = ground or bool(GROUND & {*words, *(word[1:] for word in words if word[0] in "uv")})
-    line = True if LINE & set(words) or len(phase) == 2 else False if grounded else None
-    return Role(key + whole, unit, line, backward)
+    if key == "U":
+        return Role(key + whole, unit, _is_between_lines(words, phase, ground), backward)
+    return Role(key + whole, unit)
+
+
+def _unit_quantity(unit: str) -> str:
+    """The quantity of a unit; "" of per unit, and for no unit."""
+    return (meaning(unit) or ("",))[0]
+
+
+def _fraction(words: Sequence[str], unit: str) -> Role | None:
+    """The role of a column of fractions of a second; None for any other."""
+    for word in words:
+        if word in FRACTIONS and (len(words) == 1 or not FRACTIONS[word]):
+            return Role("frac", unit or FRACTIONS[word])
+    return None
+
+
+def _other_role(words: Sequence[str], unit: str, electrical: bool) -> Role | None:
+    """The role of a column of time, frequency and the like; None for any other."""
+    said = None if electrical else _quantity(words)
+    return Role(said[0], unit) if said and said[0] not in ELECTRICAL else None
+
+
+def _is_angle(words: Sequence[str], kind: str) -> bool:
+    """Whether a phasor's column holds its angle."""
+    if kind == "angle" or words[-1] == "phase" or ANGLE.intersection(words):
+        return True
+    return any(word.endswith("ang") for word in words)
+
+
+def _is_between_lines(words: Sequence[str], phase: str, ground: bool) -> bool | None:
+    """Whether a voltage is line to line; None where its name does not say it."""
+    if len(phase) == 2 or LINE.intersection(words):
+        return True
+    ends = [word[1:] for word in words if word[0] in "uv"]
+    return False if ground or GROUND.intersection((*words, *ends)) else None
 
 
 def _quantity(words: Sequence[str]) -> tuple[str, str] | None:
-    """(quantity, phase) that words say."""
-    return (
-        next((pair for pair in (_compound(words), _match_words(words)) if pair), None)
-        if words
-        else None
-    )
+    """(quantity, phase) that words say; None where they say none."""
+    return _compound(words) or _match_words(words)
+
+
+def _marked_quantity(
+    words: Sequence[str], kind: str, ground: bool, electrical: bool
+) -> tuple[str, str] | None:
+    """(quantity, phase) that words say, marks of phases among them; None where they say none."""
+    said = _quantity(words)
+    if said and (said[0] in ELECTRICAL or not electrical):
+        return said
+    return _match_mark(words, kind, ground) or said
 
 
 def _match_mark(words: Sequence[str], kind: str, ground: bool) -> tuple[str, str] | None:
-    """(quantity, phase) of a name that is little more than a mark: its unit, or two phases or
-    ground, say it.
+    """(quantity, phase) of a name that is little more than a mark, whose unit says the quantity:
+    where it has none, two phases or ground say a voltage. None for any other name.
     """
     phase = next((PHASES[word] for word in words if PHASES.get(word, "0")[0] in "abc"), "")
-    more = [
-        word
-        for word in words
-        if word not in PHASES and word not in ANGLE and word not in ("mag", "rms")
-    ]
+    more = set(words) - PHASES.keys() - ANGLE - {"mag", "rms"}
     if not phase or (more and not kind):
         return None
-    quantity = BY_UNIT.get(kind) or (
-        "U" if (ground or len(phase) == 2) and kind in ("", "angle") else ""
-    )
-    return (quantity, phase) if quantity else None
+    if kind in BY_UNIT:
+        return BY_UNIT[kind], phase
+    if kind in ("", "angle") and (ground or len(phase) == 2):
+        return "U", phase
+    return None
 
 
 def _words(name: str) -> list[str]:
@@ -473,34 +493,41 @@ def _words(name: str) -> list[str]:
 
 
 def _compound(words: Sequence[str]) -> tuple[str, str] | None:
-    """Quantity and phase of a word such as ua, vl1, i_b, V1."""
-    for word, after in zip(words, [*words[1:], ""], strict=True):
+    """Quantity and phase of a word such as ua, vl1, i_b, V1; None where there is none."""
+    for word, after in itertools.pairwise([*words, ""]):
         if match := COMPOUND.fullmatch(word):
             return "U" if match[1] == "v" else match[1].upper(), PHASES[match[2]]
-        if (key := WORDS.get(word)) in ("U", "I", "P", "Q") and after in PHASES and (after != "p"):
+        if (key := WORDS.get(word, "")) in ELECTRICAL and after in PHASES:
             return key, PHASES[after]
     return None
 
 
 def _match_words(words: Sequence[str]) -> tuple[str, str] | None:
-    """Quantity and phase of words such as "active power", "phase A voltage", "正序电压"."""
-    first = ("dfdt", "rocof", "reactive", *words)
-    quantity = next((WORDS[word] for word in first if word in words and word in WORDS), "")
+    """Quantity and phase of words such as "active power", "phase A voltage", "正序电压"; None
+    where they say no quantity.
+    """
+    quantity = _match_quantity(words)
+    if quantity in ("U", "I"):
+        return quantity, _match_phase(words)
+    return (quantity, "") if quantity else None
+
+
+def _match_quantity(words: Sequence[str]) -> str:
+    """The quantity that words say, "" for none; "reactive" and a rate go before all others."""
+    for word in ("dfdt", "rocof", "reactive", *words):
+        if word in words and word in WORDS:
+            return WORDS[word]
+    text = " ".join(words)  # where no spaces part the words
+    long = (word for word in WORDS if len(word) > 1 and not word.isascii())
+    return next((WORDS[word] for word in long if word in text), "")
+
+
+def _match_phase(words: Sequence[str]) -> str:
+    """The phase or sequence that words say, "" for none; a letter says one beside "phase" only."""
+    for word in words:
+        if word in PHASES and ("phase" in words or len(word) > 1 or not word.isascii()):
+            return PHASES[word]
     text = " ".join(words)
-    if not quantity:  # where no spaces part the words
-        within = (
-            key
-            for word, key in WORDS.items()
-            if len(word) > 1 and not word.isascii() and word in text
-        )
-        quantity = next(within, "")
-    if not quantity:
-        return None
-    if quantity not in ("U", "I"):
-        return quantity, ""
-    spelled = (
-        p
-        for w in words
-        if (p := PHASES.get(w)) and not (w.isascii() and len(w) == 1 and "phase" not in words)
-    )
-    return quantity, next(spelled, "1" if "正序" in text else "2" if "负序" in text else "")
+    if "正序" in text:
+        return "1"
+    return "2" if "负序" in text else ""

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tractexp.errors import DATA, UserError
-from tractexp.filetypes.columns import factor, role
+from tractexp.filetypes.columns import Role, factor, role
 from tractexp.filetypes.mapping import PHASES, map_times
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableFile
@@ -35,44 +35,79 @@ def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
     """That a table without Q, or angles, is of direct current, with mean, ripple and dip, one
     sentence; "" where it is not, or may be something else.
     """
-    names, named = table.heading.names, [bool(NAMED.search(name)) for name in table.heading.names]
-    roles = {
-        k: one
-        for k, name in enumerate(names)
-        if (one := role(NAMED.sub(" ", name).strip(), table.heading.units[k]))
-    }
-    volts = [k for k, one in roles.items() if one.key in ("U", "U1")]
+    names, roles = table.heading.names, _read_roles(table)
     keys = {one.key for one in roles.values()}
-    if len(volts) != 1 or any(key[1:] in PHASES or "angle" in key or key[0] == "Q" for key in keys):
+    number = _find_voltage(roles)
+    if number is None:
         return ""
-    (number,) = volts
-    unit = units.get("U") or roles[number].unit
     try:
-        mapping = map_times(table)
-        times = {one.number: "number" for one in mapping.columns.values()}
-        times[mapping.columns["t"].number] = "time"
-        cells = table.read({**times, number: "gaps"})
-        t, x = times_of(table, mapping, cells).t, cells[number].values * factor(unit)
+        t, x = _read_column(table, number, units.get("U") or roles[number].unit)
     except UserError:
         return ""
-    if not unit and np.nanmedian(x) > LARGEST_DIRECT_KILOVOLTS:
-        x = x / 1000
-    rate = (len(t) - 1) / float(t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else 0.0
-    direct = DirectVoltage.from_values(x, rate) if rate else None
-    if direct is None or not direct.is_direct:
-        return ""
-    alone = (
-        not keys & {"I", "P"} and not _find_pulses(x, rate) and not _is_direct_alone(direct.mean)
-    )
-    if not any(named) and (alone or not _is_railway(direct.mean)):
+    direct = _find_direct(t, x)
+    if direct is None:
         return ""
     said = direct.describe(names[number], float(t[0]))
-    if any(named):
+    if any(map(NAMED.search, names)):
         return said
+    told = not keys.isdisjoint("IP") or _is_told(direct.mean, t, x)
+    if not told or not _is_railway(direct.mean):
+        return ""
     return (
         f"{said}; that it is no RMS value is told by {1000 * direct.mean:.4g} V, near a nominal"
         " one of direct current, without Q or angles: if it is one, add Q"
     )
+
+
+def _read_roles(table: TableFile) -> dict[int, Role]:
+    """{number of a column: its role by its name without what says direct current}."""
+    names = [NAMED.sub(" ", name).strip() for name in table.heading.names]
+    roles = map(role, names, table.heading.units)
+    return {k: one for k, one in enumerate(roles) if one}
+
+
+def _find_voltage(roles: Mapping[int, Role]) -> int | None:
+    """The number of the one voltage among columns; None where there are several, or one that
+    tables of direct current do not have: of Q, of a phase, an angle.
+    """
+    volts = []
+    for number, one in roles.items():
+        if one.key[0] == "Q" or one.key[1:] in PHASES or "angle" in one.key:
+            return None
+        if one.key in ("U", "U1"):
+            volts.append(number)
+    return volts[0] if len(volts) == 1 else None
+
+
+def _read_column(table: TableFile, number: int, unit: str) -> tuple[np.ndarray, np.ndarray]:
+    """The times (N,) [s] of a table and one of its columns [kV], by its size where it has no unit.
+    Raises `UserError` for cells that are none.
+    """
+    mapping = map_times(table)
+    kinds = {one.number: "number" for one in mapping.columns.values()}
+    kinds |= {mapping.columns["t"].number: "time"}
+    cells = table.read({**kinds, number: "gaps"})
+    x = cells[number].values * factor(unit)
+    if not unit and np.nanmedian(x) > LARGEST_DIRECT_KILOVOLTS:
+        x = x / 1000
+    return times_of(table, mapping, cells).t, x
+
+
+def _find_direct(t: np.ndarray, x: np.ndarray) -> DirectVoltage | None:
+    """What a voltage (N,) [kV] is as a direct one; None where it is none."""
+    rate = _sampling_rate(t)
+    direct = DirectVoltage.from_values(x, rate) if rate else None
+    return direct if direct and direct.is_direct else None
+
+
+def _sampling_rate(t: np.ndarray) -> float:
+    """Samples a second of times (N,) [s]; 0 where they do not increase."""
+    return (len(t) - 1) / float(t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else 0.0
+
+
+def _is_told(mean: float, t: np.ndarray, x: np.ndarray) -> bool:
+    """Whether the ripple of a voltage (N,) [kV], or its mean, says that it is direct."""
+    return bool(_find_pulses(x, _sampling_rate(t))) or _is_direct_alone(mean)
 
 
 def _is_direct_alone(mean: float) -> bool:
@@ -98,20 +133,17 @@ def check_alternating(
     """
     t, U, P, Q = (columns[key] for key in "tUPQ")
     level = float(np.nanmedian(U))
-    rate = (len(t) - 1) / float(t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else 0.0
-    direct = (
-        DirectVoltage.from_values(U, rate) if rate and not declared and _is_railway(level) else None
-    )
-    if direct is None or not direct.is_direct:
+    direct = None if declared or not _is_railway(level) else _find_direct(t, U)
+    if direct is None:
         return []
-    without = np.nanmax(np.abs(Q), initial=0.0) <= NO_Q * np.nanmax(np.abs(P), initial=0.0)
-    pulses = _find_pulses(U, rate)
-    reasons = [f"a ripple of {pulses:g} Hz"] if pulses else []
-    if without:
-        reasons.append("Q is zero")
-    if NAMED.search(name):
-        reasons.append("its name")
-    if reasons:
+    pulses = _find_pulses(U, _sampling_rate(t))
+    without_Q = np.nanmax(np.abs(Q), initial=0.0) <= NO_Q * np.nanmax(np.abs(P), initial=0.0)
+    telling = {
+        f"a ripple of {pulses:g} Hz": pulses,
+        "Q is zero": without_Q,
+        "its name": NAMED.search(name),
+    }
+    if reasons := [reason for reason, holds in telling.items() if holds]:
         raise UserError(
             f"{source}: {direct.describe(name, float(t[0]))}; told by {' and '.join(reasons)};"
             f" if it is an RMS value, say its nominal voltage, {DATA.base_voltage}={level:.3g}"

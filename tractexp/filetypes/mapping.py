@@ -2,6 +2,7 @@
 
 import datetime as dt
 import itertools
+import operator
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from tractexp.recording.unit import amount
 CONTRACT = ("t", "U", "P", "Q", "f", "U2", "U_angle")
 PHASES = ("a", "b", "c")
 LINES = ("ab", "bc", "ca")
+PHASE_VOLTAGES = ("Ua", "Ub", "Uc")
 KEYS = (
     *(key for key in CONTRACT if key != "U_angle"),
     "dfdt",
@@ -75,15 +77,15 @@ def map_columns(
     No note mentions `other_columns`, which serve elsewhere. Raises `UserError` for a chosen column
     that is not there, for one that is missing, and where several columns fit one key.
     """
+    choices = {_key(key): choice for key, choice in columns.items()}
     numbers = {
-        _key(key): _column_number(table, key, choice)
-        for key, choice in columns.items()
+        key: _column_number(table, key, choice)
+        for key, choice in choices.items()
         if choice is not None
     }
     options = _options(table, numbers)
-    for key, choice in columns.items():
-        if choice is None:  # left out
-            options.pop(_key(key), None)
+    for key in choices.keys() - numbers.keys():  # left out
+        options.pop(key, None)
     kind, keys = _kind(table, options, numbers)
     _check_ambiguity(table, options, keys, columns)
     chosen = {key: options[key][0] for key in keys}
@@ -93,10 +95,14 @@ def map_columns(
             chosen[key] = replace(one, role=replace(one.role, unit=str(units[quantity])))
     for one in chosen.values():
         _check_unit(table, one)
-    days = [one for one in options.get("day", []) if one.number != chosen["t"].number][:1]
-    return Mapped(
-        kind, chosen, tuple(_notes(table, chosen, days, other_columns)), _first_day(table, days)
-    )
+    days = _find_days(options, chosen["t"])
+    notes = _notes(table, chosen, days, other_columns)
+    return Mapped(kind, chosen, tuple(notes), _first_day(table, days))
+
+
+def _find_days(options: Mapping[str, list[MappedColumn]], time: MappedColumn) -> list[MappedColumn]:
+    """The first column of dates beside that of times; [] where there is none."""
+    return [one for one in options.get("day", []) if one.number != time.number][:1]
 
 
 def map_times(table: TableFile) -> Mapped:
@@ -107,7 +113,7 @@ def map_times(table: TableFile) -> Mapped:
     if "t" not in options:
         raise UserError(_describe_missing_columns(table, options, {"times": ()}))
     columns = {key: options[key][0] for key in ("t", "frac") if key in options}
-    days = [one for one in options.get("day", []) if one.number != columns["t"].number][:1]
+    days = _find_days(options, columns["t"])
     beside = tuple(one.number for one in days)
     return Mapped("waves", columns, (), _first_day(table, days), beside)
 
@@ -144,18 +150,19 @@ def _check_ambiguity(
     if not several:
         return
     listed = ", ".join(one.label for one in options[several[0]])
-    names = [name.strip() for name in table.heading.names]
-    firsts = {key: options[key][0] for key in several}
-    answers = {
-        key: f"'{one.name}'" if names.count(one.name.strip()) == 1 else str(one.number)
-        for key, one in firsts.items()
-    }
-    answers |= {key: _answer(choice) for key, choice in given.items() if key not in answers}
-    said = ", ".join(f"{key}: {answer}" for key, answer in answers.items())
+    given_answers = {key: _answer(choice) for key, choice in given.items()}
+    answers = given_answers | {key: _name_column(table, options[key][0]) for key in several}
+    said = ", ".join(f"{key}: {answers[key]}" for key in dict.fromkeys((*several, *given)))
     raise UserError(
         f"{table.source}: {several[0]} could be any of the columns {listed}; say which, e.g."
         f" {DATA.columns}={{{said}}}"
     )
+
+
+def _name_column(table: TableFile, one: MappedColumn) -> str:
+    """A column as it is typed: its name in quotes, or its number where others have that name."""
+    names = [name.strip() for name in table.heading.names]
+    return f"'{one.name}'" if names.count(one.name.strip()) == 1 else str(one.number)
 
 
 def _answer(choice: Any) -> str:
@@ -205,40 +212,45 @@ def _key(name: str) -> str:
 
 
 def _column_number(table: TableFile, key: str, choice: Any) -> int:
-    """The number of a column chosen by name, with or without its unit, or by number."""
-    names = [name.strip() for name in table.heading.names]
-    units = table.heading.units
+    """The number of a column chosen by name, with or without its unit, or by number; raises
+    `UserError` for one that is not there, or several times.
+    """
+    names, units = [name.strip() for name in table.heading.names], table.heading.units
     if isinstance(choice, int) or (str(choice).isdigit() and str(choice) not in names):
-        if not 0 <= int(choice) < len(names):
-            raise UserError(
-                f"{DATA.columns}: {key}={choice}: {table.source} has {len(names)} columns, counted"
-                " from 0"
-            )
-        return int(choice)
-    wanted = _squeeze_name(str(choice))
-    matches = [k for k, name in enumerate(names) if _squeeze_name(name) == wanted]
-    matches = matches or [
-        k for k, name in enumerate(names) if _squeeze_name(name + units[k]) == wanted
-    ]
+        if 0 <= int(choice) < len(names):
+            return int(choice)
+        raise UserError(
+            f"{DATA.columns}: {key}={choice}: {table.source} has {len(names)} columns, counted"
+            " from 0"
+        )
+    with_units = list(map(operator.add, names, units))
+    matches = _match_names(str(choice), names) or _match_names(str(choice), with_units)
+    if len(matches) == 1:
+        return matches[0]
     if not matches:
-        roles = (role(name, unit) for name, unit in zip(names, units, strict=True))
-        fitting = [
-            n
-            for n, r in zip(names, roles, strict=True)
-            if r is None or r.quantity == Role(key).quantity
-        ]
+        fitting = itertools.compress(names, map(_suits, itertools.repeat(key), names, units))
         raise UserError(
             f"{DATA.columns}: {key}={choice}: {table.source} has no such"
             f" column{nearest(str(choice), fitting) or '.'} "
             f"Columns: {', '.join(names)}"
         )
-    if len(matches) > 1:
-        raise UserError(
-            f"{DATA.columns}: {key}={choice}: {table.source} has that column {len(matches)} times;"
-            " give its number, "
-            f"one of {', '.join(map(str, matches))}"
-        )
-    return matches[0]
+    raise UserError(
+        f"{DATA.columns}: {key}={choice}: {table.source} has that column {len(matches)} times;"
+        " give its number, "
+        f"one of {', '.join(map(str, matches))}"
+    )
+
+
+def _suits(key: str, name: str, unit: str) -> bool:
+    """Whether a column may hold a key's quantity, for its name says no other."""
+    named = role(name, unit)
+    return named is None or named.quantity == Role(key).quantity
+
+
+def _match_names(wanted: str, names: Sequence[str]) -> list[int]:
+    """The numbers of the names that are the wanted one but for blanks and brackets."""
+    squeezed = _squeeze_name(wanted)
+    return [k for k, name in enumerate(names) if _squeeze_name(name) == squeezed]
 
 
 def _squeeze_name(name: str) -> str:
@@ -250,34 +262,51 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
     """{key: the columns that could be it}; the user's choice, and a name that is the key itself,
     excludes others.
     """
-    heading, options = table.heading, {}
+    heading = table.heading
     names = _spell_out_names(heading.names)
     order = order_of(names, heading.units)
-    for key, number in numbers.items():
-        label = role(heading.names[number], heading.units[number], order)
-        line = label.line if label and label.quantity == "U" else None
-        line = (
-            False
-            if line is None and label and label.key[:1] == "U" and label.key[1:] in PHASES
-            else line
-        )
-        options[key] = [
-            MappedColumn(number, table.label(number), Role(key, heading.units[number], line))
-        ]
-    free = [k for k in range(len(heading.names)) if k not in numbers.values() and heading.names[k]]
-    roles = {k: one for k in free if (one := role(names[k], heading.units[k], order))}
-    exact = {key for key in CONTRACT if key in [heading.names[k] for k in free]}
-    if "U" not in exact and "U" not in numbers:
+    options = {key: [_chosen_column(table, key, k, order)] for key, k in numbers.items()}
+    roles = {
+        k: one
+        for k in find_other_columns(table, numbers.values())
+        if (one := role(names[k], heading.units[k], order))
+    }
+    exact = set(CONTRACT).intersection(map(heading.names.__getitem__, roles))
+    if "U" not in {*exact, *numbers}:
         exact.discard("U2")  # of U1, U2, U3
     renamed = _resolve_numbered_roles(roles)
     for k, one in roles.items():
         name = heading.names[k]
         key = name if name in exact else renamed.get(one.key, one.key)
-        if key in numbers or (key in exact and name != key):
-            continue
-        line = None if key == "U" and (name == "U" or one.key == "Ua") else one.line
-        options.setdefault(key, []).append(MappedColumn(k, name, replace(one, key=key, line=line)))
+        if key not in numbers and (key not in exact or name == key):
+            options.setdefault(key, []).append(_named_column(k, name, key, one))
     return _find_time_columns(table, options)
+
+
+def find_other_columns(table: TableFile, taken: Collection[int]) -> list[int]:
+    """The numbers of the columns that have a name and are not taken."""
+    return [k for k, name in enumerate(table.heading.names) if name and k not in taken]
+
+
+def _named_column(number: int, name: str, key: str, by_name: Role) -> MappedColumn:
+    """A column with the role that it has by its name, under a key: a whole U is not line to line
+    for being called U, or U L1.
+    """
+    undecided = key == "U" and (name == "U" or by_name.key == "Ua")
+    line = None if undecided else by_name.line
+    return MappedColumn(number, name, replace(by_name, key=key, line=line))
+
+
+def _chosen_column(table: TableFile, key: str, number: int, order: str) -> MappedColumn:
+    """The column that the user chose for a key; its name says whether a voltage is line to line,
+    and that of a phase is not unless it says so.
+    """
+    unit = table.heading.units[number]
+    named = role(table.heading.names[number], unit, order)
+    line = named.line if named else None
+    if line is None and named and named.key in PHASE_VOLTAGES:
+        line = False
+    return MappedColumn(number, table.label(number), Role(key, unit, line))
 
 
 def _spell_out_names(names: Sequence[str]) -> Sequence[str]:
@@ -329,11 +358,7 @@ def _find_time_columns(
 
     Of a date and a time, the time; fractions alone are none of a known second.
     """
-    days = [
-        one
-        for one in options.get("day", [])
-        if any(is_time(row[one.number]) for row in table.sample[:1])
-    ]
+    days = [one for one in options.get("day", []) if _begins_with_time(table, one.number)]
     seconds = options.pop("soc", [])
     if seconds and ("t" not in options or "frac" in options):
         options["t"] = seconds
@@ -347,6 +372,11 @@ def _find_time_columns(
     return options
 
 
+def _begins_with_time(table: TableFile, number: int) -> bool:
+    """Whether the first cell of a column is a time of day, with or without its date."""
+    return any(is_time(row[number]) for row in table.sample[:1])
+
+
 def _first_day(table: TableFile, days: Sequence[MappedColumn]) -> dt.date | None:
     """The date of the first row in a column of dates."""
     return next((first_day([row[one.number] for row in table.sample]) for one in days), None)
@@ -358,32 +388,37 @@ def _kind(
     """What the table holds, and the keys that make it up, t first; raises `UserError` for what is
     no such table.
     """
-    keys, wanted = set(options), set(chosen)
-    kinds: dict[str, list[str]] = {}
-    wave = _waveform(options)
-    if len({key[0] for key in wave}) == 1 and not _oscillates(table, options, wave):
-        wave = []
-    if wave and (not _powers(options) or (_has(keys, "P") and _oscillates(table, options, wave))):
-        kinds["waves"] = wave
-    if powers := _powers(options):
-        kinds["powers"] = [*powers, *_telling_current(table, options, powers)]
-    if phasors := _phasors(options):
-        kinds["phasors"] = phasors
-    order = [kind for kind in ("phasors", "waves", "powers") if kind in kinds]
-    if "powers" in kinds and not ("waves" in kinds and _oscillates(table, options, wave)):
-        order.remove("powers")
-        order.insert(0, "powers")
-    for kind in order:
-        if wanted <= {"t", "frac", *kinds[kind]} and "t" in keys:
-            if kind == "waves" and not _oscillates(table, options, wave):
-                named = ", ".join(options[key][0].label for key in wave)
-                raise UserError(
-                    f"{table.source}: the columns {named} hold magnitudes without angles, and "
-                    "there are none of P and Q: the load's power does not follow from them; add P"
-                    " and Q, or the angles"
-                )
-            return kind, ["t", *(key for key in ("frac",) if key in keys), *kinds[kind]]
+    kinds, times = _find_kinds(table, options), [key for key in ("t", "frac") if key in options]
+    for kind, keys in kinds.items():
+        if "t" not in options or not {*chosen} <= {"t", "frac", *keys}:
+            continue
+        if kind == "waves" and not _oscillates(table, options, keys):
+            named = ", ".join(options[key][0].label for key in keys)
+            raise UserError(
+                f"{table.source}: the columns {named} hold magnitudes without angles, and "
+                "there are none of P and Q: the load's power does not follow from them; add P"
+                " and Q, or the angles"
+            )
+        return kind, [*times, *keys]
     raise UserError(_describe_missing_columns(table, options, kinds))
+
+
+def _find_kinds(table: TableFile, options: Mapping[str, Any]) -> dict[str, list[str]]:
+    """{kind that a table may be: the keys that make it up}, the likeliest first.
+
+    Columns of one quantity alone, and columns beside powers, are waveforms only where they
+    oscillate.
+    """
+    wave, powers = _waveform(options), _powers(options)
+    swings = _oscillates(table, options, wave)
+    if len({key[0] for key in wave}) == 1 and not swings:
+        wave = []
+    kinds = {"phasors": _phasors(options), "waves": wave, "powers": powers}
+    if powers:
+        kinds["powers"] = [*powers, *_telling_current(table, options, powers)]
+        if not (swings and _has(options, "P")):
+            kinds = {"powers": kinds["powers"], "phasors": kinds["phasors"]}
+    return {kind: keys for kind, keys in kinds.items() if keys}
 
 
 def _has(keys: Iterable[str], letter: str) -> bool:
@@ -418,19 +453,16 @@ def _telling_current(
     table: TableFile, options: Mapping[str, list[MappedColumn]], powers: Sequence[str]
 ) -> list[str]:
     """The key of a current [kA] beside powers, which tells whether a voltage whose name does not is
-    line to line.
+    line to line; [] where there is none, or no need.
     """
-    first, keys = (
-        options[powers[0]][0],
-        [key for key in ("I", "Ia", "Ib", "Ic", "I1") if key in options],
-    )
-    told = first.role.line is not None or first.name == first.role.key == "U" or not first.role.unit
-    if told or not keys or len(options[keys[0]]) > 1:
+    voltage = options[powers[0]][0]
+    keys = [key for key in ("I", "Ia", "Ib", "Ic", "I1") if key in options]
+    told = voltage.role.line is not None or voltage.name == voltage.role.key == "U"
+    if told or not voltage.role.unit or not keys or len(options[keys[0]]) > 1:
         return []
-    one = options[keys[0]][0]
-    cells = [row[one.number] if one.number < len(row) else "" for row in table.sample]
-    numbers = all(is_number(cell) or is_number(cell, ",") for cell in cells)
-    return [keys[0]] if one.role.unit and numbers else []
+    current = options[keys[0]][0]
+    known = len(_sample_numbers(table, current.number)) == len(table.sample)
+    return [keys[0]] if current.role.unit and known else []
 
 
 def _some(keys: Iterable[str], letter: str) -> list[str]:
@@ -441,37 +473,37 @@ def _some(keys: Iterable[str], letter: str) -> list[str]:
 
 
 def _phasors(options: Mapping[str, Any]) -> list[str]:
-    """Magnitudes and angles: of three phases where they are there, else of two, else of the
-    positive sequence.
+    """Magnitudes and angles of voltages and currents, and f; [] where those of one are missing."""
+    voltages, currents = _phasor_keys(options, "U"), _phasor_keys(options, "I")
+    if not (voltages and currents):
+        return []
+    return [*voltages, *currents, *(key for key in ("f",) if key in options)]
+
+
+def _phasor_keys(options: Mapping[str, Any], letter: str) -> list[str]:
+    """Magnitudes and angles of one quantity: of three phases where they are there, else of the
+    positive sequence, else of two phases (of U two lines), which say the third. [] for none.
     """
-    result: list[str] = []
-    for letter in "UI":
-        groups = [
-            [letter + p for p in PHASES],
-            [letter + p for p in LINES],
-            [f"{letter}1"],
-            [letter],
-        ]
-        marks = LINES if letter == "U" else PHASES  # of which two say the third
-        groups += [[letter + p for p in marks if p != left] for left in marks]
-        whole = [g for g in groups if all(k in options and f"{k}_angle" in options for k in g)]
-        if not whole:
-            return []
-        result += [key for k in whole[0] for key in (k, f"{k}_angle")]
-    return [*result, *(key for key in ("f",) if key in options)]
+    pairs = itertools.combinations(LINES if letter == "U" else PHASES, 2)
+    for ends in (PHASES, LINES, ("1",), ("",), *pairs):
+        keys = [key for end in ends for key in (letter + end, f"{letter}{end}_angle")]
+        if options.keys() >= {*keys}:
+            return keys
+    return []
 
 
 def _waveform(options: Mapping[str, Any]) -> list[str]:
     """Voltages and currents that may be waveforms: both, or those of one kind where no power stands
     beside them.
     """
-    U, I = (
-        _set(options, letter, ())
-        or [k for k in (letter, letter + "a", letter + "1") if k in options][:1]
-        for letter in "UI"
-    )
+    U, I = (_set(options, letter, ()) or _one_phase(options, letter) for letter in "UI")
     one_kind = len(U or I) == 3 and not _has(options, "P") and not _has(options, "Q")
     return [*U, *I] if (U and I) or one_kind else []
+
+
+def _one_phase(options: Mapping[str, Any], letter: str) -> list[str]:
+    """The key of the one column there is of a quantity; [] where there is none."""
+    return [key for key in (letter, f"{letter}a", f"{letter}1") if key in options][:1]
 
 
 def _oscillates(
@@ -482,26 +514,26 @@ def _oscillates(
 
     Where there is no voltage, whether a current does.
     """
-    letter = "U" if any(key[0] == "U" for key in keys) else "I"
-    for key in (key for key in keys if key[0] == letter):
-        cells = [
-            row[options[key][0].number] for row in table.sample if options[key][0].number < len(row)
-        ]
-        values = [
-            float(str(cell).replace(",", "."))
-            for cell in cells
-            if is_number(cell) or is_number(cell, ",")
-        ]
-        if values and min(values) < 0 < max(values):
-            return True
-    return False
+    ours = [key for key in keys if key[0] == "U"] or keys
+    samples = [_sample_numbers(table, options[key][0].number) for key in ours]
+    return any(min(values, default=0.0) < 0 < max(values, default=0.0) for values in samples)
+
+
+def _sample_numbers(table: TableFile, number: int) -> list[float]:
+    """The numbers among a column's cells in the first rows, with either decimal mark."""
+    cells = [row[number] for row in table.sample if number < len(row)]
+    return [
+        float(str(cell).replace(",", "."))
+        for cell in cells
+        if is_number(cell) or is_number(cell, ",")
+    ]
 
 
 def _describe_missing_columns(
     table: TableFile, options: Mapping[str, Any], groups: Mapping[str, Any]
 ) -> str:
-    """The sentence on what is missing."""
-    names = [table.label(k) for k in range(len(table.heading.names)) if table.heading.names[k]]
+    """The sentence on what is missing of a table whose columns make up `groups`."""
+    names = [table.label(k) for k in find_other_columns(table, ())]
     if not names:
         return (
             f"{table.source}: no line names the columns; add one, such as t,U,P,Q, or name them by"
@@ -516,17 +548,28 @@ def _describe_missing_columns(
             f"others; {listed}; name all that are needed: {DATA.columns}={{t: ..., U: ..., P: ...,"
             f" Q: ...}}"
         )
-    missing = [key for key in ("t",) if key not in options]
+    missing = [] if "t" in options else ["t"]
     if not groups:
-        missing += [] if _set(options, "U", ("U", "U1")) else ["U"]
-        missing += [key for key in ("P", "Q") if not _has(options, key)]
+        missing += _list_missing_powers(options)
+    return (
+        f"{table.source}: column {', '.join(missing)} is missing; {listed};"
+        f" {_suggest_columns(table, options, missing)}"
+    )
+
+
+def _suggest_columns(table: TableFile, options: Mapping[str, Any], missing: Sequence[str]) -> str:
+    """The setting that says which columns the missing ones are, with those that may be meant."""
     meant = {key: name for key in missing if (name := _meant(table, options, key))}
     said = ", ".join(f"{key}: '{meant[key]}'" if key in meant else f"{key}: ..." for key in missing)
     which = f"if {', '.join(meant.values())} is meant, say so" if meant else "say which is which"
-    return (
-        f"{table.source}: column {', '.join(missing)} is missing; {listed}; {which}:"
-        f" {DATA.columns}={{{said}}}"
-    )
+    return f"{which}: {DATA.columns}={{{said}}}"
+
+
+def _list_missing_powers(options: Mapping[str, Any]) -> list[str]:
+    """Which of U, P and Q no column holds."""
+    there = {"U": bool(_set(options, "U", ("U", "U1")))}
+    there |= {letter: _has(options, letter) for letter in "PQ"}
+    return [key for key, is_there in there.items() if not is_there]
 
 
 def _meant(table: TableFile, options: Mapping[str, list[MappedColumn]], key: str) -> str:
@@ -535,32 +578,25 @@ def _meant(table: TableFile, options: Mapping[str, list[MappedColumn]], key: str
 
     "" where there is none or several: a name that only looks alike says nothing.
     """
-    if key != "t":
-        alike = {
-            c.number: c
-            for k, several in options.items()
-            if k[0] == key and "_" not in k
-            for c in several
-        }
-        return next(iter(alike.values())).name if len(alike) == 1 else ""
-    taken = {c.number for several in options.values() for c in several}
-    free = [
-        k
-        for k, name in enumerate(table.heading.names)
-        if name and k not in taken and _increases(table, k)
-    ]
+    if key == "t":
+        return _find_counting_column(table, options)
+    names = [name for name in options if name[0] == key and "_" not in name]
+    alike = {one.number: one.name for name in names for one in options[name]}
+    return next(iter(alike.values())) if len(alike) == 1 else ""
+
+
+def _find_counting_column(table: TableFile, options: Mapping[str, list[MappedColumn]]) -> str:
+    """The one column without a role that counts up as t does; "" for none or several."""
+    taken = {one.number for one in itertools.chain(*options.values())}
+    free = [k for k in find_other_columns(table, taken) if _increases(table, k)]
     return table.label(free[0]) if len(free) == 1 else ""
 
 
 def _increases(table: TableFile, number: int) -> bool:
     """Whether a column increases in every row of the sample, as times do."""
-    cells = [row[number] for row in table.sample if number < len(row)]
-    values = [
-        float(str(cell).replace(",", "."))
-        for cell in cells
-        if is_number(cell) or is_number(cell, ",")
-    ]
-    return len(values) == len(cells) > 1 and all(a < b for a, b in itertools.pairwise(values))
+    rows = sum(number < len(row) for row in table.sample)
+    values = _sample_numbers(table, number)
+    return len(values) == rows > 1 and all(a < b for a, b in itertools.pairwise(values))
 
 
 def _check_unit(table: TableFile, one: MappedColumn) -> None:
@@ -585,9 +621,8 @@ def _notes(
     notes, used = [], {one.number for one in (*chosen.values(), *days)}
     if any(key != one.name or table.heading.units[one.number] for key, one in chosen.items()):
         notes.append("columns: " + ", ".join(f"{key} = {one.label}" for key, one in chosen.items()))
+    served = {"", *other_columns}
     spare = [
-        name
-        for k, name in enumerate(table.heading.names)
-        if name and k not in used and name not in other_columns
+        name for k, name in enumerate(table.heading.names) if k not in used and name not in served
     ]
     return [*notes, f"columns not used: {', '.join(spare)}"] if spare else notes

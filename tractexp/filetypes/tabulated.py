@@ -1,6 +1,6 @@
 """The content of a table, from its columns: what it holds, and a load's powers against time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
@@ -39,6 +39,7 @@ NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
 LEAST_LIVE_VOLTAGE = 0.5  # of the median voltage: at less the frequency is noise
 SLOWEST = 10.0  # Hz: no network's frequency is lower
 ANGLES = frozenset(("U_angle", "U1_angle"))  # of the voltage, beside powers
+PHASE_ANGLES = ("Ua_angle", "Ub_angle", "Uc_angle")
 BESIDE = ANGLES | {"U2"}
 WHOLE_TURN = 0.85  # of a turn: an angle that steps by more from row to row was wrapped there
 AGREES = 0.05  # of the apparent power, within which it is the product of voltage and current
@@ -104,9 +105,8 @@ def _record_voltage(source: str, table: TableFile, mapping: Mapped, nominal: flo
     values, start, said = _read(table, mapping)
     keys = [key for key in values if key[0] == "U"]
     columns = {"U": np.mean([values[key] for key in keys], axis=0)}
-    told = mapping.columns[keys[0]].role.line
     absolute = _absolute(mapping, keys[0])
-    lines = _to_lines(columns, told, keys[0], None) if absolute else []
+    lines = _to_lines(columns, mapping.columns[keys[0]], None) if absolute else []
     level = float(np.nanmedian(columns["U"])) if absolute else 1.0
     record = Record(
         name=Path(source).stem,
@@ -215,31 +215,52 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     _check_power_units(table, mapping)
     values, start, said = _read(table, mapping)
     columns, notes = {"t": values["t"]}, [*mapping.notes, *said]
+    keys = {
+        letter: [key for key in values if key[0] == letter and key not in BESIDE]
+        for letter in "UPQI"
+    }
     for letter in "UPQ":
-        keys = [key for key in values if key[0] == letter and key not in BESIDE]
-        columns[letter] = (
-            values[keys[0]] if len(keys) == 1 else np.add.reduce([values[key] for key in keys])
-        )
-        if len(keys) > 1:
-            columns[letter] = columns[letter] / (len(keys) if letter == "U" else 1)
-            notes.append(
-                f"{letter} is the {'mean' if letter == 'U' else 'sum'} of {', '.join(keys)}"
-            )
+        columns[letter], merged = _merge_phases(values, keys[letter])
+        notes += merged
     columns |= {key: values[key] for key in ("f", "U2") if key in values}
     for key in ANGLES & values.keys():
         columns["U_angle"], note = _turned_angle(mapping.columns[key], values[key])
         notes.append(note)
-    first = next(key for key in mapping.columns if key[0] == "U" and key != "U2")
-    power = next(key for key in mapping.columns if key[0] == "P")
-    absolute = {"U": _absolute(mapping, first), "P": _absolute(mapping, power)}
-    if absolute["U"] or (absolute["U"] is None and kilovolts):
-        current = next((values[key] for key in values if key[0] == "I"), None)
-        told = mapping.columns[first]
-        if absolute["U"]:
-            notes += check_alternating(table.source, told.name, columns, kilovolts)
-        notes += _to_lines(columns, told.role.line, first, current)
-        notes += _describe_secondary_size(columns) if absolute["U"] and not kilovolts else []
-    return Powers(columns, absolute, (*table.notes, *notes), start=start)
+    absolute = {"U": _absolute(mapping, keys["U"][0]), "P": _absolute(mapping, keys["P"][0])}
+    current = values[keys["I"][0]] if keys["I"] else None
+    result = Powers(columns, absolute, (*table.notes, *notes), start=start)
+    return _settle_voltage(table.source, result, mapping.columns[keys["U"][0]], current, kilovolts)
+
+
+def _merge_phases(
+    values: Mapping[str, np.ndarray], keys: Sequence[str]
+) -> tuple[np.ndarray, list[str]]:
+    """(the mean (N,) of the columns of U, or the sum of those of P or Q; a note where there are
+    several).
+    """
+    if len(keys) == 1:
+        return values[keys[0]], []
+    letter, names = keys[0][0], ", ".join(keys)
+    total = np.add.reduce([values[key] for key in keys])
+    if letter == "U":
+        return total / len(keys), [f"U is the mean of {names}"]
+    return total, [f"{letter} is the sum of {names}"]
+
+
+def _settle_voltage(
+    source: str, result: Powers, one: MappedColumn, current: np.ndarray | None, kilovolts: bool
+) -> Powers:
+    """The powers with U of column `one` line to line where it is in kV; raises `UserError` for a
+    direct voltage.
+    """
+    absolute, columns = result.absolute["U"], result.columns
+    if not (absolute or (absolute is None and kilovolts)):
+        return result
+    notes = check_alternating(source, one.name, columns, kilovolts) if absolute else []
+    notes += _to_lines(columns, one, current)
+    if absolute and not kilovolts:
+        notes += _describe_secondary_size(columns)
+    return replace(result, notes=(*result.notes, *notes))
 
 
 def _turned_angle(one: MappedColumn, values: np.ndarray) -> tuple[np.ndarray, str]:
@@ -271,29 +292,38 @@ def _check_power_units(table: TableFile, mapping: Mapped) -> None:
 
 
 def _to_lines(
-    columns: dict[str, np.ndarray], line: bool | None, key: str, current: np.ndarray | None
+    columns: dict[str, np.ndarray], one: MappedColumn, current: np.ndarray | None
 ) -> list[str]:
-    """Make phase voltages line-to-line ones; what was taken for what, and why where the name does
-    not say it.
+    """Make U of column `one` line to line where it is a phase's; what it was taken for, and why
+    where its name does not say it.
     """
+    line, why, key = one.role.line, "", one.role.key
     if line:
         return []
-    level, why = float(np.nanmedian(columns["U"])), ""
-    product = None if current is None or line is not None else _by_power(columns, current)
-    if product is not None:
-        line, why = product, ", for P and Q are the product of it and the current then"
-    elif line is None and key[1:] in PHASES and is_between_phases(level):
-        line, why = (
-            True,
-            f", for {level:.4g} kV is near a nominal voltage, and times sqrt(3) near none",
-        )
-    elif line is None:
-        line = key[1:] not in PHASES
+    if line is None:
+        line, why = _guess_line(columns, key, current)
     if line:
         return [f"{key} taken as line-to-line voltage{why}"]
     for name in {"U", "U2"} & set(columns):
         columns[name] = columns[name] * np.sqrt(3)
     return [f"{key} taken as a phase voltage{why}: times sqrt(3) it is line to line"]
+
+
+def _guess_line(
+    columns: Mapping[str, np.ndarray], key: str, current: np.ndarray | None
+) -> tuple[bool, str]:
+    """(whether a voltage [kV] whose name does not say it is line to line, why): by the powers,
+    else by its size.
+    """
+    product = None if current is None else _by_power(columns, current)
+    if product is not None:
+        return product, ", for P and Q are the product of it and the current then"
+    level = float(np.nanmedian(columns["U"]))
+    if key[1:] not in PHASES:
+        return True, ""
+    if is_between_phases(level):
+        return True, f", for {level:.4g} kV is near a nominal voltage, and times sqrt(3) near none"
+    return False, ""
 
 
 def _describe_secondary_size(columns: Mapping[str, np.ndarray]) -> list[str]:
@@ -356,35 +386,45 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     """U, P and Q of a table of voltages and currents by size and angle."""
     values, start, note = _read(table, mapping)
     values, absolute = _in_units(table, mapping, values)
-    keys = {
-        letter: [k for k in values if k[0] == letter and not k.endswith("_angle")]
-        for letter in "UI"
-    }
+    voltages, currents = _list_magnitudes(values, "U"), _list_magnitudes(values, "I")
     scale, angle_notes = _radians(table, mapping, values)
-    V, I = (
-        np.array([values[k] * np.exp(1j * scale * values[f"{k}_angle"]) for k in keys[letter]])
-        for letter in "UI"
+    V, turned = _forward(
+        _join_phasors(values, voltages, scale), [mapping.columns[k] for k in voltages]
     )
-    V, turned = _forward(V, [mapping.columns[k] for k in keys["U"]])
-    (V1, V2), (I1, _) = _sequences(V, keys["U"]), _sequences(I, keys["I"])
-    V1, sort = _to_ground(mapping.columns[keys["U"][0]], V1) if absolute else (V1, [])
-    if not absolute and keys["U"][0][1:] in LINES:  # per unit of a line voltage
+    V1, V2 = _sequences(V, voltages)
+    I1, _ = _sequences(_join_phasors(values, currents, scale), currents)
+    sort: list[str] = []
+    if absolute:
+        V1, sort = _to_ground(mapping.columns[voltages[0]], V1)
+    elif voltages[0][1:] in LINES:  # per unit of a line voltage
         V1, V2 = np.sqrt(3) * V1, None if V2 is None else np.sqrt(3) * V2
     size, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
     S = three * V1 * I1.conj()
     columns = {"t": values["t"], "U": size * np.abs(V1), "P": S.real, "Q": S.imag}
+    source = "U, P, Q from phasors"
     if V2 is not None:
         columns["U2"] = size * np.abs(V2)
-    source = "U, P, Q from phasors" + (", positive sequence" if V2 is not None else "")
+        source += ", positive sequence"
     notes = [*mapping.notes, *note, *angle_notes, *turned, *sort, source]
     columns["U_angle"] = unwrap_angle(np.angle(V1))
     if "f" in values:
-        columns["f"] = (
-            values["f"] if np.nanmedian(values["f"]) > nominal / 2 else nominal + values["f"]
-        )
+        is_whole = np.nanmedian(values["f"]) > nominal / 2  # else the deviation from nominal
+        columns["f"] = values["f"] if is_whole else nominal + values["f"]
     else:
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
     return Powers(columns, {"U": absolute, "P": absolute}, (*table.notes, *notes), start=start)
+
+
+def _join_phasors(
+    values: Mapping[str, np.ndarray], keys: Sequence[str], scale: float
+) -> np.ndarray:
+    """The phasors (K, N) of magnitudes and their angles, `scale` rad each one."""
+    return np.array([values[k] * np.exp(1j * scale * values[f"{k}_angle"]) for k in keys])
+
+
+def _list_magnitudes(keys: Iterable[str], letters: str) -> list[str]:
+    """The keys of voltages or currents but for those of their angles."""
+    return [key for key in keys if key[0] in letters and not key.endswith("_angle")]
 
 
 def _forward(V: np.ndarray, sources: Sequence[MappedColumn]) -> tuple[np.ndarray, list[str]]:
@@ -439,31 +479,30 @@ def _in_units(
     one. Raises `UserError` where neither is so, and where one has a unit and another none, or one
     per unit.
     """
-    sizes = {
-        key: one
-        for key, one in mapping.columns.items()
-        if key[0] in "UI" and not key.endswith("_angle")
-    }
-    stated = {_absolute(mapping, key) for key in sizes}
-    level = float(np.nanmedian(np.abs(values[next(key for key in sizes if key[0] == "U")])))
+    sizes = {key: _absolute(mapping, key) for key in _list_magnitudes(mapping.columns, "UI")}
+    stated = {*sizes.values()}
+    level = float(np.nanmedian(np.abs(values[_list_magnitudes(sizes, "U")[0]])))
     if stated == {None} and level > LARGEST_KILOVOLTS:
         return {**values, **{key: values[key] * 1e-3 for key in sizes}}, True
     if stated == {None} and NEAR_ONE[0] < level < NEAR_ONE[1]:
         return {**values}, False
-    if len(stated) > 1 or None in stated:
-        odd = next(
-            (one for key, one in sizes.items() if _absolute(mapping, key) is None),
-            next(iter(sizes.values())),
-        )
-        what = (
-            "is per unit and others are not"
-            if odd.role.unit
-            else f"has no unit, and its voltage is {level:.4g}"
-        )
-        raise UserError(
-            f"{table.source}: {odd.label} {what}: say the units, e.g. {DATA.units}={{U: kV, I: A}}"
-        )
-    return {**values}, bool(stated.pop())
+    if stated in ({True}, {False}):
+        return {**values}, stated == {True}
+    raise UserError(
+        f"{table.source}: {_describe_odd_unit(mapping, sizes, level)}: say the units, e.g."
+        f" {DATA.units}={{U: kV, I: A}}"
+    )
+
+
+def _describe_odd_unit(mapping: Mapped, sizes: Mapping[str, bool | None], level: float) -> str:
+    """Which column is unlike the others, or without a unit: `sizes` are per unit where False,
+    without a unit where None; the voltage is about `level`.
+    """
+    for key, is_absolute in sizes.items():
+        if is_absolute is None:
+            return f"{mapping.columns[key].label} has no unit, and its voltage is {level:.4g}"
+    odd = next(key for key, is_absolute in sizes.items() if not is_absolute)
+    return f"{mapping.columns[odd].label} is per unit and others are not"
 
 
 def _radians(
@@ -471,22 +510,27 @@ def _radians(
 ) -> tuple[float, list[str]]:
     """The factor from the unit of the angles to rad, and a note where the values decided it."""
     angles = {key: one for key, one in mapping.columns.items() if key.endswith("_angle")}
-    unit = next((one.role.unit for one in angles.values() if one.role.unit), "")
+    unit = next(filter(None, (one.role.unit for one in angles.values())), "")
     if unit:
         return factor(unit), []
     widest = max(float(np.nanmax(np.abs(values[key]), initial=0.0)) for key in angles)
     if widest > 2 * np.pi:
         return np.pi / 180, ["angles taken as degrees, for they exceed 2 pi"]
-    phases = [values[key] for key in angles if key[0] == "U" and len(key) == len("Ua_angle")]
-    if len(phases) == 3:
-        apart = np.nanmedian(np.abs(np.mod(phases[1] - phases[0] + np.pi, 2 * np.pi) - np.pi))
-        if abs(apart - 2 * np.pi / 3) < 0.3:
-            return 1.0, ["angles taken as rad, for the phases are 2 pi/3 apart"]
+    if _are_thirds_apart([values[key] for key in angles if key in PHASE_ANGLES]):
+        return 1.0, ["angles taken as rad, for the phases are 2 pi/3 apart"]
     raise UserError(
         f"{table.source}: {next(iter(angles.values())).label} has no unit, and its values suit"
         " degrees and rad: "
         f"say {DATA.units}={{angle: deg}} or {DATA.units}={{angle: rad}}"
     )
+
+
+def _are_thirds_apart(angles: Sequence[np.ndarray]) -> bool:
+    """Whether angles (N,) are those of three phases in rad, a third of a turn apart."""
+    if len(angles) != 3:
+        return False
+    apart = np.nanmedian(np.abs(np.mod(angles[1] - angles[0] + np.pi, 2 * np.pi) - np.pi))
+    return abs(apart - 2 * np.pi / 3) < 0.3
 
 
 def _sequences(X: np.ndarray, keys: list[str]) -> tuple[np.ndarray, np.ndarray | None]:

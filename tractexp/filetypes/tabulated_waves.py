@@ -1,7 +1,7 @@
 """A recording of waveforms from the columns of a table."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -9,9 +9,9 @@ from tractexp.errors import DATA, UserError
 from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.columns import role
 from tractexp.filetypes.comtrade_samples import HUGE
-from tractexp.filetypes.mapping import LINES, PHASES, Mapped
+from tractexp.filetypes.mapping import LINES, PHASES, Mapped, find_other_columns
 from tractexp.filetypes.moments import times_of
-from tractexp.filetypes.table import TableFile
+from tractexp.filetypes.table import TableColumn, TableFile
 from tractexp.record.gap import (
     find_single_gaps,
     find_single_lost_rows,
@@ -36,38 +36,39 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
             f"{table.source} holds {mapping.kind}, not waveforms; read it as such: data=csv"
             f" data.path={table.source}"
         )
-    times = {mapping.columns[key].number for key in ("t", "frac") if key in mapping.columns}
-    named = [k for k, name in enumerate(table.heading.names) if name and k not in times]
+    keys = {one.number: key for key, one in mapping.columns.items()}
+    times = [number for number in keys if keys[number] in ("t", "frac")]
+    named = find_other_columns(table, times)
     numbers = {k: "gaps" for k in named if _is_sampled(_numbers_of(table, k))}
-    others = [
-        one.number for one in mapping.columns.values() if one.number not in (*numbers, *times)
-    ]
-    _refuse_other_rates(table, others)
-    cells = table.read(
-        {**dict.fromkeys(times, "number"), mapping.columns["t"].number: "time", **numbers}
-    )
-    for k in numbers:
-        wild = np.abs(cells[k].values) > HUGE
-        if wild.any():
-            i = int(np.argmax(wild))
-            raise table.refuse(
-                i,
-                k,
-                f"{cells[k].values[i]:g} is not a value up to {HUGE:g}; leave the row out, or"
-                " correct it",
-            )
+    _refuse_other_rates(table, [k for k in keys if k not in {*numbers, *times}])
+    kinds = dict.fromkeys(times, "number") | {mapping.columns["t"].number: "time"}
+    cells = table.read({**kinds, **numbers})
+    _refuse_wild(table, {k: cells[k] for k in numbers})
     read = times_of(table, mapping, cells)
     lost = find_single_lost_rows(read.t)
     segments, odd = _segments(table, insert_times(read.t, lost))
-    named = {one.number: key for key, one in mapping.columns.items()}
     channels = [
-        _channel(table, mapping, k, insert_missing(cells[k].values, lost), named.get(k, ""))
+        _channel(table, mapping, k, insert_missing(cells[k].values, lost), keys.get(k, ""))
         for k in numbers
     ]
     notes = [*table.notes, *read.notes, *odd]
     return in_units(
         Recording(table.source, channels, segments, nominal, start=read.start, notes=notes), {}, {}
     )
+
+
+def _refuse_wild(table: TableFile, cells: Mapping[int, TableColumn]) -> None:
+    """Raise `UserError` for a value that no instrument shows."""
+    for k, column in cells.items():
+        wild = np.abs(column.values) > HUGE
+        if wild.any():
+            i = int(np.argmax(wild))
+            raise table.refuse(
+                i,
+                k,
+                f"{column.values[i]:g} is not a value up to {HUGE:g}; leave the row out, or"
+                " correct it",
+            )
 
 
 def _numbers_of(table: TableFile, number: int) -> list[bool]:
@@ -116,19 +117,8 @@ def _channel(
 
 def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]]:
     """Runs of even sampling; a note on jitter and on gaps."""
-    if not np.isfinite(t).all():
-        i = int(np.argmin(np.isfinite(t)))
-        raise UserError(f"{table.source}: {table.place(i)}: t = {t[i]} is not a finite number")
+    _check_times(table, t)
     steps = np.diff(t)
-    if len(t) < 3 or (steps <= 0).any():
-        i = int(np.argmax(steps <= 0)) + 1 if len(t) > 2 else 0
-        raise UserError(
-            f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after"
-            f" {t[i - 1]:.9g} s; give "
-            f"the unit of time ({DATA.units}={{t: ms}}), or more digits"
-            if len(t) > 2
-            else f"{table.source}: only {len(t)} rows; waveforms need more"
-        )
     usual = float(np.median(steps))
     breaks = [0, *(np.flatnonzero(steps > SEGMENT_GAP_STEPS * usual) + 1).tolist(), len(t)]
     segments, widest = [], 0.0
@@ -147,14 +137,31 @@ def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]
             )
         widest = max(widest, float(off.max()))
         segments.append(Segment(first, stop, 1 / step, float(t[first] - t[0])))
-    notes = (
-        [f"times up to {100 * widest:.2g} % of a step off a uniform grid: taken as even"]
-        if widest > LARGEST_JITTER
-        else []
-    )
+    notes = []
+    if widest > LARGEST_JITTER:
+        notes.append(
+            f"times up to {100 * widest:.2g} % of a step off a uniform grid: taken as even"
+        )
     if len(segments) > 1:
         notes.append(
             f"{len(segments) - 1} gaps in time, the first at {table.place(breaks[1])}: each part is"
             " read by itself"
         )
     return segments, notes
+
+
+def _check_times(table: TableFile, t: np.ndarray) -> None:
+    """Raise `UserError` for times (N,) [s] that are too few, are no numbers, or do not increase."""
+    if not np.isfinite(t).all():
+        i = int(np.argmin(np.isfinite(t)))
+        raise UserError(f"{table.source}: {table.place(i)}: t = {t[i]} is not a finite number")
+    if len(t) < 3:
+        raise UserError(f"{table.source}: only {len(t)} rows; waveforms need more")
+    still = np.diff(t) <= 0
+    if still.any():
+        i = int(np.argmax(still)) + 1
+        raise UserError(
+            f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after"
+            f" {t[i - 1]:.9g} s; give "
+            f"the unit of time ({DATA.units}={{t: ms}}), or more digits"
+        )
