@@ -76,12 +76,16 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class SuiteCase:
-    """Dips to fit and dips that judge, and the effects that are hidden; None where nobody knows."""
+    """Dips to fit and dips that judge, and the effects that are hidden; None where nobody knows.
+
+    Of an `inexact` load no model is exact.
+    """
 
     number: int
     fitted: Sequence[Event]
     unused: Sequence[Event]
     truth: tuple[str, ...] | None
+    inexact: bool = False
 
 
 def make_cases(numbers: Sequence[int], seed: int) -> Iterator[SuiteCase]:
@@ -113,7 +117,7 @@ def make_case(number: int, series: int) -> SuiteCase:
         except (ValueError, ArithmeticError):
             continue
         truth = () if recipe in (NOTHING, INEXACT) else (recipe,)
-        return SuiteCase(number, dips[:FITTED], dips[FITTED:], truth)
+        return SuiteCase(number, dips[:FITTED], dips[FITTED:], truth, recipe == INEXACT)
     raise AssertionError("the series of seeds has no end")
 
 

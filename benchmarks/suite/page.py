@@ -1,6 +1,12 @@
-"""What the methods of the benchmark reached, as a table and a page."""
+"""What the methods of the benchmark reached, as a table and a page.
 
-from collections.abc import Sequence
+    python benchmarks/suite/page.py
+
+writes the table of the stored rows into README.md beside this file.
+"""
+
+import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +16,13 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
 
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+
+import marked  # noqa: E402
+
+STORED = HERE / "suite.jsonl"
+MARK = "benchmarks/suite/page.py"
 COLUMNS = [
     "method",
     "cases",
@@ -18,29 +31,41 @@ COLUMNS = [
     "no prediction",
     "band held",
     "named right",
+    "right among several",
     "named wrong",
     "silent, something hidden",
     "seconds, median",
+    "90 %",
 ]
 CAPTION = (
     "Error: rms of calculated less measured S over the rms of the response, from the dip on. Band:"
-    " the worst sample of P and of Q lies within it. Right: exactly what is hidden; wrong: anything"
-    " else that is named; seconds: of processor, of a fit."
+    " the worst sample of P and of Q lies within it. Right: exactly what is hidden, alone or among"
+    " sets that are said to be alike; wrong: all else that is said. Seconds: of processor, of a"
+    " fit."
 )
+# what is hidden in the cases of each column
+GROUPS = {
+    "nothing hidden": lambda row: row["truth"] == [] and not row["inexact"],
+    "inexact to 1 %": lambda row: row["inexact"],
+    "one effect hidden": lambda row: bool(row["truth"]),
+    "unknown": lambda row: row["truth"] is None,
+}
+Rows = Sequence[dict[str, Any]]
 
 
-def write_page(rows: Sequence[dict[str, Any]], seed: int, path: Path) -> str:
+def write_page(rows: Rows, seed: int, path: Path) -> str:
     """Write the page, and return the table as it is printed."""
-    methods = sorted({row["method"] for row in rows})
-    table = [summarize([row for row in rows if row["method"] == one]) for one in methods]
+    table = [summarize(own) for own in split_by_method(rows)]
     page = Report("The benchmark: dips that no method saw", f"cases 21 to 50 from seed {seed}.")
     page.table(COLUMNS, table, CAPTION)
+    page.table(["method", *GROUPS], compare_groups(rows), "Median error of unused dips.")
     chart = Chart("error of an unused dip [%]", ["share of dips"], pixels=420)
-    for k, method in enumerate(methods):
-        errors = np.sort(collect_errors([row for row in rows if row["method"] == method]))
+    for k, own in enumerate(split_by_method(rows)):
+        errors = np.sort(collect_errors(own))
         shown = errors[np.isfinite(errors)]
         shares = np.arange(1, len(shown) + 1) / max(len(errors), 1)
-        chart.line(method, 100 * shown, shares, PALETTE[k % len(PALETTE)], step=True)
+        color = PALETTE[k % len(PALETTE)]
+        chart.line(own[0]["method"], 100 * shown, shares, color, step=True)
     page.chart(chart, "Share of the unused dips that a method predicts to an error, or better.")
     failures = [
         [row["method"], row["case"], reason] for row in rows for reason in collect_failures(row)
@@ -52,34 +77,63 @@ def write_page(rows: Sequence[dict[str, Any]], seed: int, path: Path) -> str:
     return "\n".join([*lines, str(path)])
 
 
-def measure(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
+def make_tables(rows: Rows) -> str:
+    """The tables of stored rows, Markdown."""
+    seeds = ", ".join(sorted({str(row["seed"]) for row in rows if row["seed"] is not None}))
+    table = [summarize(own) for own in split_by_method(rows)]
+    drawn = f"Cases 21 to 50 are of seed {seeds}." if seeds else ""
+    groups = marked.table(["median error of unused dips", *GROUPS], compare_groups(rows))
+    return "\n\n".join(filter(None, [drawn, marked.table(COLUMNS, table), groups, CAPTION]))
+
+
+def split_by_method(rows: Rows) -> list[Rows]:
+    """The rows of each method, in order of names."""
+    methods = sorted({row["method"] for row in rows})
+    return [[row for row in rows if row["method"] == one] for one in methods]
+
+
+def compare_groups(rows: Rows) -> list[list[str]]:
+    """A row a method: the median error of unused dips in each group of cases."""
+    table = []
+    for own in split_by_method(rows):
+        medians = (find_quantile(filter(is_there, own), 0.5) for is_there in GROUPS.values())
+        table.append([own[0]["method"], *map(in_percent, medians)])
+    return table
+
+
+def measure(rows: Rows) -> dict[str, float]:
     """What a method reached, as numbers; a share of nothing is nan."""
     errors = collect_errors(rows)
     held = [one for row in rows for dip in row.get("dips", ()) for one in dip["held"] or ()]
     known = [row for row in rows if row["truth"] is not None and row.get("named") is not None]
-    is_right = [row["named"] == sorted(row["truth"]) for row in known]
-    named = [bool(row["named"]) for row in known]
+    said = [row for row in known if row["named"]]
+    right = [row for row in said if sorted(row["truth"]) in row["named"] and row["truth"]]
+    alone = [row for row in right if len(row["named"]) == 1]
     seconds = [row["seconds"] for row in rows if "seconds" in row]
     return {
         "cases": len(rows),
-        "error_median": float(np.quantile(errors, 0.5, method="higher")),
-        "error_90": float(np.quantile(errors, 0.9, method="higher")),
+        "error_median": find_quantile(rows, 0.5),
+        "error_90": find_quantile(rows, 0.9),
         "unpredicted": int(np.isinf(errors).sum()),
         "dips": len(errors),
         "band_held": float(np.mean(held)) if held else np.nan,
         "in_bands": len(held),
         "could_name": len(known),
-        "named_right": sum(a and b for a, b in zip(named, is_right, strict=True)),
-        "named_wrong": sum(a and not b for a, b in zip(named, is_right, strict=True)),
+        "named_right": len(alone),
+        "right_among_several": len(right) - len(alone),
+        "named_wrong": len(said) - len(right),
         "silent": sum(not row["named"] and bool(row["truth"]) for row in known),
         "seconds": float(np.median(seconds)) if seconds else np.nan,
+        "seconds_90": float(np.quantile(seconds, 0.9)) if seconds else np.nan,
     }
 
 
-def summarize(rows: Sequence[dict[str, Any]]) -> list[str]:
+def summarize(rows: Rows) -> list[str]:
     """The row of a method in the table."""
     told = measure(rows)
-    names = [str(told[key]) for key in ("named_right", "named_wrong", "silent")]
+    keys = ("named_right", "right_among_several", "named_wrong", "silent")
+    names = [str(told[key]) for key in keys]
+    seconds = [told["seconds"], told["seconds_90"]]
     return [
         rows[0]["method"],
         str(told["cases"]),
@@ -87,12 +141,18 @@ def summarize(rows: Sequence[dict[str, Any]]) -> list[str]:
         in_percent(told["error_90"]),
         f"{told['unpredicted']} of {told['dips']}",
         f"{told['band_held']:.0%} of {told['in_bands']}" if told["in_bands"] else "",
-        *(names if told["could_name"] else [""] * 3),
-        f"{told['seconds']:.1f}" if np.isfinite(told["seconds"]) else "",
+        *(names if told["could_name"] else [""] * len(names)),
+        *(f"{one:.1f}" if np.isfinite(one) else "" for one in seconds),
     ]
 
 
-def collect_errors(rows: Sequence[dict[str, Any]]) -> np.ndarray:
+def find_quantile(rows: Iterable[dict[str, Any]], share: float) -> float:
+    """The error that this share of unused dips does not exceed; nan without dips."""
+    errors = collect_errors(rows)
+    return float(np.quantile(errors, share, method="higher")) if len(errors) else np.nan
+
+
+def collect_errors(rows: Iterable[dict[str, Any]]) -> np.ndarray:
     """The error of every unused dip, infinite where there is no prediction, (n,)."""
     errors = [dip["error"] for row in rows for dip in row.get("dips", ({"error": None},))]
     return np.array([np.inf if error is None else error for error in errors])
@@ -104,4 +164,10 @@ def collect_failures(row: dict[str, Any]) -> list[str]:
 
 
 def in_percent(share: float) -> str:
-    return f"{100 * share:.2g} %" if np.isfinite(share) else "none"
+    return "" if np.isnan(share) else f"{100 * share:.2g} %" if np.isfinite(share) else "none"
+
+
+if __name__ == "__main__":
+    from run import read_rows
+
+    marked.replace(HERE / "README.md", MARK, make_tables(read_rows(STORED)))

@@ -1,21 +1,24 @@
 """Run methods over the numbered cases: python benchmarks/suite/run.py [--methods A.py B.py]
-[--cases 1-20] [--seed 0] [--cores 2] [--out FOLDER] [--track sqlite:///mlflow.db]
+[--cases 1-20] [--seed 0] [--cores 2] [--minutes 9] [--out FOLDER] [--track sqlite:///mlflow.db]
 
 A method is a file with `fit(events)` and `predict(model, event)`, and `name(model)` if it says what
 is missing (README.md beside this file). By default all of `methods/` run over all cases. Written
-are `suite.json`, a row a method and case, and the page `suite.html`; with `--track` each method is
-a run in MLflow, too. Nothing of an unused dip
-reaches a method but its voltage, its frequency and the power before it.
+are `suite.jsonl`, a row a method and case, and the page `suite.html`; with `--track` each method is
+a run in MLflow, too. Repeat the command to go on where it stopped: what a changed method's file
+said before is not kept. Nothing of an unused dip reaches a method but its voltage, its frequency
+and the power before it.
 """
 
 import argparse
+import hashlib
 import importlib.util
+import itertools
 import json
 import os
 import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -27,11 +30,13 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
 import numpy as np  # noqa: E402
-from cases import MADE, RECORDS, Event, SuiteCase, make_cases  # noqa: E402
+from cases import MADE, RECIPES, RECORDS, Event, SuiteCase, make_cases  # noqa: E402
 from joblib import Parallel, delayed  # noqa: E402
 from page import measure, write_page  # noqa: E402
 
 METHODS = HERE / "methods"
+DRAWN = range(len(RECIPES) + 1, MADE[-1] + 1)  # the cases that follow a seed
+Row = dict[str, Any]
 
 
 def read_method(path: Path) -> ModuleType:
@@ -52,13 +57,13 @@ def run_method(path: Path, case: SuiteCase) -> dict[str, Any]:
     and the processor time of its fit. What it raises is a row, too.
     """
     row: dict[str, Any] = {"method": path.stem, "case": case.number}
-    row |= {"truth": None if case.truth is None else list(case.truth)}
+    row |= {"truth": None if case.truth is None else list(case.truth), "inexact": case.inexact}
     begun = time.process_time()
     try:
         method = read_method(path)
         model = method.fit(list(case.fitted))
         row["seconds"] = time.process_time() - begun
-        row["named"] = sorted(method.name(model)) if hasattr(method, "name") else None
+        row["named"] = sort_sets(method.name(model)) if hasattr(method, "name") else None
     except Exception as error:  # a method of others may raise anything
         return row | {"failed": describe_error(error)}
     return row | {"dips": [judge_dip(method, model, event) for event in case.unused]}
@@ -83,6 +88,11 @@ def judge_dip(method: ModuleType, model: Any, event: Event) -> dict[str, Any]:
     return {"error": error if np.isfinite(error) else None, "held": held}
 
 
+def sort_sets(sets: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Sets of effects, of which one is said to be missing, as they are compared."""
+    return sorted(sorted(names) for names in sets)
+
+
 def describe_error(error: Exception) -> str:
     """The kind of an error, what it says, and the line of the method that raised it."""
     frames = traceback.extract_tb(error.__traceback__)
@@ -101,17 +111,65 @@ def read_numbers(text: str) -> list[int]:
 
 
 def run_suite(
-    methods: Sequence[Path], numbers: Sequence[int], seed: int, cores: int
-) -> list[dict[str, Any]]:
-    """A row for each method and case."""
+    methods: Sequence[Path], numbers: Sequence[int], seed: int, kept: Sequence[Row] = ()
+) -> Iterator[Any]:
+    """Jobs, one a case, that give the rows of the methods which have none among those kept."""
     for path in methods:
         read_method(path)  # what is no method is told before anything runs
-    cases = list(make_cases(numbers, seed))
-    if absent := sorted(set(numbers) - {case.number for case in cases}):
-        print(f"left out, for their files are not here: cases {', '.join(map(str, absent))}")
-    jobs = [delayed(run_method)(path, case) for case in cases for path in methods]
-    rows = Parallel(n_jobs=cores, verbose=1)(jobs)
-    return list(rows)
+    done = {(row["file"], row["case"], row["seed"]) for row in kept}
+    for number in numbers:
+        own = seed if number in DRAWN else None
+        left = [path for path in methods if (digest(path), number, own) not in done]
+        if left:
+            yield delayed(run_case)(number, own, left)
+
+
+def run_case(number: int, seed: int | None, methods: Sequence[Path]) -> list[Row]:
+    """A row for each method on one case; none where the files of a record are not there."""
+    about = {"seed": seed}
+    return [
+        run_method(path, case) | about | {"file": digest(path)}
+        for case in make_cases([number], seed or 0)
+        for path in methods
+    ]
+
+
+def digest(path: Path) -> str:
+    """What a method's file holds, in short: of another content its rows are others."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+
+
+def read_rows(path: Path) -> list[Row]:
+    """The rows kept in a file, none where there is none."""
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def collect_rows(
+    path: Path, methods: Sequence[Path], numbers: Sequence[int], seed: int, cores: int, end: float
+) -> list[Row]:
+    """The rows of methods and cases: those kept in a file, and those still to be run until a
+    time `end` [s], which are added to it.
+    """
+    kept = read_rows(path)
+    jobs = run_suite(methods, numbers, seed, kept)
+    in_time = itertools.takewhile(lambda job: time.monotonic() < end, jobs)
+    parallel = Parallel(n_jobs=cores, pre_dispatch=cores, return_as="generator_unordered")
+    with path.open("a", encoding="utf-8") as file:
+        for rows in parallel(in_time):
+            kept += rows
+            file.writelines(json.dumps(row) + "\n" for row in rows)
+            file.flush()
+            if rows:
+                spent = sum(row.get("seconds", 0.0) for row in rows)
+                print(f"case {rows[0]['case']}: {spent:.0f} s", flush=True)
+    wanted = {
+        (digest(one), number, seed if number in DRAWN else None)
+        for one in methods
+        for number in numbers
+    }
+    return [row for row in kept if (row["file"], row["case"], row["seed"]) in wanted]
 
 
 def log_rows(rows: Sequence[dict[str, Any]], seed: int, uri: str) -> None:
@@ -133,16 +191,21 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--cases", type=read_numbers, default=[*MADE, *RECORDS])
     parser.add_argument("--seed", type=int, default=0, help="of cases 21 to 50")
     parser.add_argument("--cores", type=int, default=2)
+    parser.add_argument("--minutes", type=float, default=1e9, help="begin no further case after")
     parser.add_argument("--out", type=Path, default=Path("suite"))
     parser.add_argument("--track", help="address of an MLflow store")
     asked = parser.parse_args(words)
     methods = [path.resolve() for path in asked.methods]
-    rows = run_suite(methods, asked.cases, asked.seed, asked.cores)
     asked.out.mkdir(parents=True, exist_ok=True)
-    content = {"seed": asked.seed, "rows": rows}
-    (asked.out / "suite.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    print(write_page(rows, asked.seed, asked.out / "suite.html"))
-    if asked.track:
+    end = time.monotonic() + 60 * asked.minutes
+    store = asked.out / "suite.jsonl"
+    rows = collect_rows(store, methods, asked.cases, asked.seed, asked.cores, end)
+    if absent := sorted(set(asked.cases) - {row["case"] for row in rows}):
+        left = ", ".join(map(str, absent))
+        print(f"without rows, for their files are not here or time was up: cases {left}")
+    if rows:
+        print(write_page(rows, asked.seed, asked.out / "suite.html"))
+    if rows and asked.track:
         log_rows(rows, asked.seed, asked.track)
 
 

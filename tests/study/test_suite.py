@@ -1,11 +1,10 @@
 """The benchmark that others can enter: what a method sees, what is counted, and what fails."""
 
-import json
 import sqlite3
 
 import numpy as np
 import pytest
-from suite import run
+from suite import page, run
 from suite.cases import RECIPES, Event, SuiteCase, make_case, make_cases, read_record
 
 SAMPLES, START = 400, 100
@@ -41,9 +40,17 @@ def case():
     return SuiteCase(1, [event], [event], ("a",))
 
 
+def rows_of(named, truth=("a",)):
+    return [{"method": "m", "truth": truth, "named": named, "inexact": False, "dips": []}]
+
+
 @pytest.mark.parametrize(
     ("band", "named", "held"),
-    [((0.05, 0.01), ["a"], [True, True]), ((0.03, 0.01), [], [False, True]), (None, ["b"], None)],
+    [
+        ((0.05, 0.01), [["a"]], [True, True]),
+        ((0.03, 0.01), [], [False, True]),
+        (None, [["c", "b"], ["a"]], None),
+    ],
 )
 def test_the_error_is_that_of_the_response_and_a_band_holds_its_worst_sample(
     tmp_path, case, band, named, held
@@ -52,7 +59,26 @@ def test_the_error_is_that_of_the_response_and_a_band_holds_its_worst_sample(
     (dip,) = row["dips"]
     assert dip["error"] == pytest.approx(0.1)
     assert dip["held"] == held
-    assert row["named"] == named
+    assert row["named"] == sorted(sorted(one) for one in named)
+
+
+@pytest.mark.parametrize(
+    ("named", "truth", "counted"),
+    [
+        ([["a"]], ["a"], "named_right"),
+        ([["a"], ["b"]], ["a"], "right_among_several"),
+        ([["b"]], ["a"], "named_wrong"),
+        ([["a", "b"]], ["a"], "named_wrong"),
+        ([["a"]], [], "named_wrong"),
+        ([], ["a"], "silent"),
+        ([], [], None),
+        ([["a"]], None, None),
+    ],
+)
+def test_a_name_is_right_alone_or_among_several_or_wrong(named, truth, counted):
+    told = page.measure(rows_of(named, truth))
+    counts = ("named_right", "right_among_several", "named_wrong", "silent")
+    assert {key: told[key] for key in counts} == {key: int(key == counted) for key in counts}
 
 
 def test_what_a_method_raises_is_a_row_and_no_end(tmp_path, case):
@@ -108,16 +134,44 @@ def test_cases_of_files_that_are_there_have_dips_to_fit_and_others():
 
 
 def test_the_command_writes_rows_and_a_page(tmp_path, capsys):
-    method = write(tmp_path, "mine", RIGHT.format(band=(9.0, 9.0), named=["stator_transients"]))
+    method = write(tmp_path, "mine", RIGHT.format(band=(9.0, 9.0), named=[["stator_transients"]]))
     store = f"sqlite:///{tmp_path / 'mlflow.db'}"
     words = ["--methods", str(method), "--cases", "51", "--cores", "1", "--out", str(tmp_path)]
     run.main([*words, "--track", store])
-    (row,) = json.loads((tmp_path / "suite.json").read_text(encoding="utf-8"))["rows"]
+    (row,) = run.read_rows(tmp_path / "suite.jsonl")
     assert row["dips"][0]["held"] == [True, True]
     printed = capsys.readouterr().out
     assert "mine | 1 | " in printed
-    assert "100% of 2 | 1 | 0 | 0 | " in printed
+    assert "100% of 2 | 1 | 0 | 0 | 0 | " in printed
     assert "mine" in (tmp_path / "suite.html").read_text(encoding="utf-8")
     with sqlite3.connect(tmp_path / "mlflow.db") as kept:
         logged = dict(kept.execute("select key, value from latest_metrics"))
     assert (logged["band_held"], logged["named_right"]) == (1.0, 1.0)
+
+
+def test_a_run_goes_on_where_it_stopped_and_a_changed_method_is_run_again(tmp_path):
+    method = write(tmp_path, "mine", RIGHT.format(band=None, named=[]))
+    words = ["--methods", str(method), "--cores", "1", "--out", str(tmp_path)]
+    run.main([*words, "--cases", "51", "--minutes", "0"])
+    assert run.read_rows(tmp_path / "suite.jsonl") == []
+    run.main([*words, "--cases", "51"])
+    run.main([*words, "--cases", "51,52"])
+    assert [row["case"] for row in run.read_rows(tmp_path / "suite.jsonl")] == [51, 52]
+    write(tmp_path, "mine", RIGHT.format(band=(9.0, 9.0), named=[]))
+    run.main([*words, "--cases", "52"])
+    kept = run.read_rows(tmp_path / "suite.jsonl")
+    assert [(row["case"], row["dips"][0]["held"]) for row in kept] == [
+        (51, None),
+        (52, None),
+        (52, [True, True]),
+    ]
+
+
+def test_the_stored_rows_are_whole_and_their_tables_are_shown():
+    rows = run.read_rows(page.STORED)
+    methods = {path.stem: run.digest(path) for path in run.METHODS.glob("*.py")}
+    assert {row["method"]: row["file"] for row in rows} == methods
+    cases = [(row["method"], row["case"]) for row in rows]
+    assert sorted(cases) == sorted((m, n) for m in methods for n in (*run.MADE, *run.RECORDS))
+    shown = (page.HERE / "README.md").read_text(encoding="utf-8")
+    assert page.marked.parted(shown, page.MARK)[1].strip() == page.make_tables(rows)

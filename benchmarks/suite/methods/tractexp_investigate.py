@@ -1,5 +1,5 @@
 """This program's investigation: the paper's load with what is found missing. Of several dips the
-last is held out; only what is `named` is a name, a candidate is silence.
+last is held out. Only what is `named`, or tied, is said to be missing; a candidate is silence.
 """
 
 import numpy as np
@@ -20,4 +20,4 @@ def predict(model, event):
 
 
 def name(model):
-    return list(model.names) if model.verdict == "named" else []
+    return model.content["name_sets"] if model.verdict in ("named", "tied") else []
