@@ -1,10 +1,12 @@
 """What the methods of the benchmark reached, as a table and a page.
 
-    python benchmarks/suite/page.py
+    python benchmarks/suite/page.py [FOLDER]
 
-writes the table of the stored rows into README.md beside this file.
+makes the page of the rows in the folder of a sweep; without one it writes the tables of the stored
+rows into README.md beside this file.
 """
 
+import json
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -53,10 +55,22 @@ GROUPS = {
 Rows = Sequence[dict[str, Any]]
 
 
-def write_page(rows: Rows, seed: int, path: Path) -> str:
+def read_sweep(folder: Path) -> Rows:
+    """The rows of the jobs of a sweep."""
+    paths = sorted(folder.glob("*/suite.json"))
+    return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+
+
+def describe_seeds(rows: Rows) -> str:
+    """Of which seeds the drawn cases are; "" without any."""
+    seeds = sorted({row["seed"] for row in rows if row["seed"] is not None})
+    return f"Cases 21 to 50 are of seed {', '.join(map(str, seeds))}." if seeds else ""
+
+
+def write_page(rows: Rows, path: Path) -> str:
     """Write the page, and return the table as it is printed."""
     table = [summarize(own) for own in split_by_method(rows)]
-    page = Report("The benchmark: dips that no method saw", f"cases 21 to 50 from seed {seed}.")
+    page = Report("The benchmark: dips that no method saw", describe_seeds(rows))
     page.table(COLUMNS, table, CAPTION)
     page.table(["method", *GROUPS], compare_groups(rows), "Median error of unused dips.")
     chart = Chart("error of an unused dip [%]", ["share of dips"], pixels=420)
@@ -79,11 +93,11 @@ def write_page(rows: Rows, seed: int, path: Path) -> str:
 
 def make_tables(rows: Rows) -> str:
     """The tables of stored rows, Markdown."""
-    seeds = ", ".join(sorted({str(row["seed"]) for row in rows if row["seed"] is not None}))
     table = [summarize(own) for own in split_by_method(rows)]
-    drawn = f"Cases 21 to 50 are of seed {seeds}." if seeds else ""
     groups = marked.table(["median error of unused dips", *GROUPS], compare_groups(rows))
-    return "\n\n".join(filter(None, [drawn, marked.table(COLUMNS, table), groups, CAPTION]))
+    return "\n\n".join(
+        filter(None, [describe_seeds(rows), marked.table(COLUMNS, table), groups, CAPTION])
+    )
 
 
 def split_by_method(rows: Rows) -> list[Rows]:
@@ -170,4 +184,8 @@ def in_percent(share: float) -> str:
 if __name__ == "__main__":
     from run import read_rows
 
-    marked.replace(HERE / "README.md", MARK, make_tables(read_rows(STORED)))
+    if len(sys.argv) > 1:
+        folder = Path(sys.argv[1])
+        print(write_page(read_sweep(folder), folder / "suite.html"))
+    else:
+        marked.replace(HERE / "README.md", MARK, make_tables(read_rows(STORED)))

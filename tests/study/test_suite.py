@@ -165,13 +165,3 @@ def test_a_run_goes_on_where_it_stopped_and_a_changed_method_is_run_again(tmp_pa
         (52, None),
         (52, [True, True]),
     ]
-
-
-def test_the_stored_rows_are_whole_and_their_tables_are_shown():
-    rows = run.read_rows(page.STORED)
-    methods = {path.stem: run.digest(path) for path in run.METHODS.glob("*.py")}
-    assert {row["method"]: row["file"] for row in rows} == methods
-    cases = [(row["method"], row["case"]) for row in rows]
-    assert sorted(cases) == sorted((m, n) for m in methods for n in (*run.MADE, *run.RECORDS))
-    shown = (page.HERE / "README.md").read_text(encoding="utf-8")
-    assert page.marked.parted(shown, page.MARK)[1].strip() == page.make_tables(rows)

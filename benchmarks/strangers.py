@@ -1,0 +1,193 @@
+"""Loads of simulators that nobody here wrote, as judges of names: python benchmarks/strangers.py
+[--count 30] [--minutes 9] [--tables]
+
+Loads of motulator (`strangers_motulator`) and of ANDES (`andes_loads`) in turn, three dips each of
+which the last is held out, with noise of 0.05 to 1 %. What a load has that the base model lacks is
+known. What is said of it is *right* where every effect named is there, a *class* where that holds
+for one of the sets that are tied, *silent* where nothing is named though something is missing.
+Where nothing is missing to say nothing is *rightly silent*, and to say that something is, without a
+name, *doubted*. All else is *wrong*. Rows are appended to strangers.jsonl, so that a run
+goes on where it stopped. The seeds are of the series `SERIES`, none left out.
+"""
+
+import argparse
+import itertools
+import json
+import os
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+for library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
+import andes_loads  # noqa: E402
+import marked  # noqa: E402
+import numpy as np  # noqa: E402
+import strangers_motulator as motulator  # noqa: E402
+
+from hidden_effects.noise import Noise  # noqa: E402
+from tractexp.errors import UserError  # noqa: E402
+
+STORED = Path(__file__).with_suffix(".jsonl")
+SERIES = "strangers"
+DIPS = 3
+LEVELS = (0.0005, 0.01)  # pu, of the noise of P and Q
+RIGHT, CLASS, SILENT, WRONG = "right", "class", "silent", "wrong"
+RIGHTLY_SILENT, DOUBTED = "rightly silent", "doubted"
+OUTCOMES = (RIGHT, CLASS, RIGHTLY_SILENT, SILENT, DOUBTED, WRONG)
+Columns = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Stranger:
+    """Dips of a load, what it has that the base model lacks, and whether it has what no effect is.
+
+    `truth` holds all of these effects: one that moves little need not be named.
+    """
+
+    simulator: str
+    kind: str
+    model: str
+    frequency: float
+    dips: list[Columns]
+    truth: tuple[str, ...]
+    outside: bool = False
+
+
+def make_strangers() -> Iterator[tuple[int, str]]:
+    """Numbers and simulators in turn, without end."""
+    return zip(itertools.count(), itertools.cycle(("motulator", "ANDES")))
+
+
+def make_stranger(number: int, simulator: str) -> Stranger:
+    """The load of this number. Raises what its simulator raises where there is none."""
+    rng = andes_loads.generator(SERIES, number, simulator)
+    make = make_machine if simulator == "motulator" else make_system
+    return make(number // 2, rng)
+
+
+def make_machine(number: int, rng: np.random.Generator) -> Stranger:
+    """A load of motulator's; in every second round the base model has what all of these have, and
+    in every third the angle of the voltage jumps.
+    """
+    kinds = list(motulator.KINDS)
+    kind, turn = kinds[number % len(kinds)], number // len(kinds)
+    load = motulator.draw_load(kind, rng)
+    drawn = motulator.draw_dips(rng, DIPS, jumps=number % 3 == 2)
+    dips = [motulator.record_dip(load, dip) for dip in drawn]
+    whole = turn % 2 == 0
+    model = "fifth_order_stator_flux" if whole else "third_order_exponential"
+    truth = motulator.KINDS[kind] + (() if whole else motulator.ALWAYS)
+    outside = kind in motulator.OUTSIDE
+    return Stranger("motulator", kind, model, motulator.FREQUENCY, dips, truth, outside)
+
+
+def make_system(number: int, rng: np.random.Generator) -> Stranger:
+    """A load of ANDES's, the frequency with the jumps of the angle in every second set."""
+    one = andes_loads.make(SERIES, number)
+    chosen = "f" if rng.integers(2) else "f_smooth"
+    dips = [
+        {key: dip[key] for key in ("t", "U", "P", "Q")} | {"f": dip[chosen]} for dip in one.dips
+    ]
+    kind = one.truth["kind"]
+    truth = ("second_cage",) if kind == "Motor5" else ()
+    truth += ("stator_resistance",) if one.truth["motor"]["rs"] > 1e-3 else ()
+    told = f"{kind}, {'with' if 'stator_resistance' in truth else 'without'} stator resistance"
+    return Stranger("ANDES", told, "third_order_zip", andes_loads.FREQUENCY, dips, truth)
+
+
+def judge_stranger(number: int, simulator: str) -> dict[str, Any]:
+    """A row: what is said of the load of this number and what that is worth, or why there is
+    none.
+    """
+    import tractexp
+
+    row: dict[str, Any] = {"number": number, "simulator": simulator}
+    try:
+        stranger = make_stranger(number, simulator)
+    except (andes_loads.StalledMotor, RuntimeError, ArithmeticError) as error:
+        return row | {"refused": f"{type(error).__name__}: {error}"}
+    rng = andes_loads.generator(SERIES, number, f"{simulator} noise")
+    level = float(np.exp(rng.uniform(*np.log(LEVELS))))
+    row |= {"kind": stranger.kind, "model": stranger.model, "truth": list(stranger.truth)}
+    row |= {"outside": stranger.outside, "noise": level}
+    begun = sum(os.times()[:4])
+    try:
+        dips = [
+            tractexp.read(
+                **Noise(level).add(dip, rng), name=f"dip {k}", frequency=stranger.frequency
+            )[0]
+            for k, dip in enumerate(stranger.dips, 1)
+        ]
+        found = tractexp.investigate(dips[:-1], stranger.model, validate=dips[-1:], progress=False)
+    except UserError as error:
+        return row | {"refused": f"UserError: {error}"}
+    told = {"verdict": found.verdict, "sets": found.content["name_sets"], "reason": found.reason}
+    row |= told | {"outcome": rate(told, stranger.truth, stranger.outside)}
+    return row | {"seconds": sum(os.times()[:4]) - begun}
+
+
+def rate(told: dict[str, Any], truth: tuple[str, ...], outside: bool) -> str:
+    """What a verdict is worth; a candidate is a name."""
+    if told["verdict"] in ("none", "unexplained"):
+        if truth or outside:
+            return SILENT
+        return RIGHTLY_SILENT if told["verdict"] == "none" else DOUBTED
+    right = [bool(names) and set(names) <= set(truth) for names in told["sets"]]
+    if not any(right):
+        return WRONG
+    return RIGHT if len(right) == 1 else CLASS
+
+
+def make_tables(rows: list[dict[str, Any]]) -> str:
+    """A row a simulator and kind of load, Markdown."""
+    judged = [row for row in rows if "outcome" in row]
+    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for row in judged:
+        groups.setdefault((row["simulator"], row["kind"]), []).append(row)
+    lines = [[*group, len(own), *count_outcomes(own)] for group, own in sorted(groups.items())]
+    lines.append(["all", "", len(judged), *count_outcomes(judged)])
+    return marked.table(["simulator", "load", "sets", *OUTCOMES], lines)
+
+
+def count_outcomes(rows: list[dict[str, Any]]) -> list[int]:
+    """How many rows have each outcome."""
+    counted = Counter(row["outcome"] for row in rows)
+    return [counted[one] for one in OUTCOMES]
+
+
+def read_rows() -> list[dict[str, Any]]:
+    """The rows stored."""
+    if not STORED.exists():
+        return []
+    return [json.loads(line) for line in STORED.read_text(encoding="utf-8").splitlines()]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--count", type=int, default=30)
+    parser.add_argument("--minutes", type=float, default=1e9, help="begin no further set after")
+    parser.add_argument("--tables", action="store_true", help="print the stored rows' table")
+    asked = parser.parse_args()
+    rows = read_rows()
+    if not asked.tables:
+        done = {(row["number"], row["simulator"]) for row in rows}
+        end = time.monotonic() + 60 * asked.minutes
+        for number, simulator in itertools.islice(make_strangers(), asked.count):
+            if (number, simulator) in done or time.monotonic() > end:
+                continue
+            row = judge_stranger(number, simulator)
+            rows.append(row)
+            with STORED.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+            told = row.get("refused") or f"{row['outcome']}: {row['verdict']} {row['sets']}"
+            print(f"{number} {simulator}, {row.get('kind')}: {told}", flush=True)
+    print(make_tables(rows))
+
+
+if __name__ == "__main__":
+    main()
