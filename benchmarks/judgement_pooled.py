@@ -1,10 +1,9 @@
 """Judgement sets of several versions together: python judgement_pooled.py [--keep FROZEN]
 
-A set of 12 rows has an interval of 26 points to either side; what naming reached over seven sets has
-one of 4. Of each set that was ever frozen the rows are kept in short in judgement_pooled.jsonl:
-what was hidden and what was said, no seed twice. `--keep` adds those of judgement.jsonl, or of
-another file of rows (`--rows`), before a later set takes their place. Without it the table is
-written into docs/judgement.md.
+A row of 12 data sets has an interval of 26 points to either side, seven sets together one of 4 to
+11. Of each set the rows are kept in short in judgement_pooled.jsonl: what was hidden and what was
+said, no seed twice. `--keep` adds those of judgement.jsonl, or of another file of rows (`--rows`),
+before a later set takes their place. Without it the table is written into docs/judgement.md.
 
 What is said counts by label, and by class: effects of one class predict alike, so that records
 show the class and not which of its members is there. The classes are those in which 1,196 data sets
