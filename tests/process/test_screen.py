@@ -6,6 +6,7 @@ from contextlib import nullcontext
 
 import pytest
 from command_line import run_command
+from rich.cells import cell_len
 from rich.console import Console
 from screens import LINES, WIDTH, count_rows
 from test_export import identified
@@ -122,6 +123,18 @@ def test_a_value_that_a_bound_holds_is_why_a_model_that_fits_is_unusable():
     fit = fitted(adequacy=adequacy, verdicts={"T_m": "at its bound: 1"})
     told = " ".join(" ".join(print_at(fit.screen(), WIDTH)).split())
     assert "unusable: T_m is held by a bound alone; noise alone leaves as much." in told
+
+
+def test_at_sixty_columns_each_parameter_is_a_folded_sentence():
+    narrow, out = 60, io.StringIO()
+    console = Console(file=out, width=narrow, highlight=False, soft_wrap=True, color_system=None)
+    show(fitted().screen(), console, narrow)
+    lines = out.getvalue().splitlines()
+    assert max(map(cell_len, lines)) <= narrow
+    assert [line.partition(":")[0] for line in lines if ": value" in line] == [
+        *fitted().result.parameters
+    ]
+    assert not any(len(line.split()) == 1 and len(line.strip()) < 2 for line in lines if line)
 
 
 def test_a_narrow_console_gets_a_sentence_for_each_row():

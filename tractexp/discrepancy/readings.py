@@ -58,7 +58,7 @@ RULES = (
         "ringing",
         "a direct component of flux or current, which power shows at the supply frequency: the"
         " stator's own transient, an offset of the source or of a current transformer",
-        "Kundur 1994, sec. 5.1.1",
+        "Kundur 1994, Power System Stability and Control, stator transients",
         "the sampled currents: a direct part that decays is in the load, one in a single phase is"
         " in its transformer",
         WAVES,
@@ -69,7 +69,7 @@ RULES = (
         "ringing",
         "a voltage or load that is not balanced: its negative sequence makes power swing at twice"
         " the supply frequency",
-        "Akagi, Watanabe and Aredes 2007, ch. 3",
+        "Akagi, Watanabe and Aredes 2007, Instantaneous Power Theory",
         "the three phases, or a channel of the negative sequence (U2)",
         WAVES,
         frequency=_about(2),
@@ -78,7 +78,7 @@ RULES = (
     Rule(
         "ringing",
         "harmonics, of a core that saturates or of a converter",
-        "Arrillaga and Watson 2003, ch. 3",
+        "Arrillaga and Watson 2003, Power System Harmonics, 2nd ed.",
         "the spectra of the phase currents before, in and after the dip",
         LOOK,
         frequency=(2.5, inf),
@@ -94,7 +94,7 @@ RULES = (
     Rule(
         "step",
         "a part of the load that trips or comes back, at a level of the voltage or by a timer",
-        "IEEE Task Force on Load Representation 1993",
+        "IEEE Task Force 1993, IEEE Trans. Power Systems 8(2) 472",
         "a dip of another depth: a level acts at the same voltage, a timer after the same time; and"
         " the status channels",
         LOOK,
@@ -110,7 +110,7 @@ RULES = (
         "decay",
         "a transient faster than the model has: a field of the machine, the capacitor of a"
         " converter",
-        "Kundur 1994, sec. 5.1.1",
+        "Kundur 1994, Power System Stability and Control, stator transients",
         "the sampled currents: phasors average over a cycle",
         WAVES,
         time_constant=(0.0, SLOW),
@@ -118,7 +118,7 @@ RULES = (
     Rule(
         "decay",
         "a slow recovery: thermostats, tap changers, drives that run up again",
-        "Karlsson and Hill 1994",
+        "Karlsson and Hill 1994, IEEE Trans. Power Systems 9(1) 157",
         "a record that goes on for several of these time constants",
         LOOK,
         time_constant=(SLOW, inf),
@@ -126,7 +126,7 @@ RULES = (
     Rule(
         "ringing",
         "a control loop of the load, or the network beside it",
-        "Arrillaga and Watson 2003, ch. 6",
+        "Arrillaga and Watson 2003, Power System Harmonics, 2nd ed., resonances",
         "the other loads of the bus, and another event: a ring of the network is in all of them",
         LOOK,
     ),

@@ -18,11 +18,12 @@ from tractexp.exchange.format import Identified
 from tractexp.identification.result import Result
 
 SOURCE = (
-    "IEEE Task Force on Load Representation 1995, seven types of induction motor, from small"
-    " industrial to air conditioners"
+    "IEEE Task Force on Load Representation 1995, IEEE Trans. Power Systems 10(3) 1302, seven"
+    " types of induction motor, from small industrial to air conditioners"
 )
 NOMINAL_SPEED = 2 * pi * 60  # rad/s, of the types
-# R_s, X_s, X_m, R_1, X_1 [pu of the rating], H [s]
+# R_s, X_s, X_m, R_1, X_1 [pu of the rating], H [s]. Of these rows that of the water pump was found
+# again elsewhere, as the default of a public library's motor; the article itself was not at hand.
 TYPES = (
     (0.031, 0.100, 3.20, 0.018, 0.180, 0.70),  # small industrial motor
     (0.013, 0.067, 3.80, 0.009, 0.170, 1.50),  # large industrial motor
