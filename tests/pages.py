@@ -79,4 +79,10 @@ def charts(text):
 
 
 def unpacked(packed):
-    return np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}")
+    """The numbers of an array as the page holds it; nan is a gap."""
+    if "count" in packed:
+        return packed["start"] + packed["step"] * np.arange(packed["count"])
+    raw = np.frombuffer(base64.b64decode(packed["bdata"]), dtype=f"<{packed['dtype']}")
+    if packed["dtype"] != "i2":
+        return raw
+    return np.where(raw == -32768, np.nan, packed["offset"] + packed["scale"] * raw)

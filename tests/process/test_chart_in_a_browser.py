@@ -157,3 +157,28 @@ def test_the_cursor_reads_every_curve_and_turns_the_phasors(tmp_path):
     assert later[1].startswith("u [kV]a (<b>U1) ")
     assert abs(float(later[1].split()[-1])) < 1e-3
     assert later[3:] == ["statustrip ", *phasors]
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_a_button_goes_from_megawatts_to_per_unit_and_back(tmp_path):
+    x = np.linspace(0, 1, 50)
+    y = np.where(x > 0.9, np.nan, x)
+    chart = Chart("t [s]", ["U [pu]", "P [pu]"]).line("U", x, y, BLUE)
+    chart.band("noise", x, x - 1, x + 1, BLUE, 1).line("rival", x, 2 * x, BLUE, 1, hidden=True)
+    chart.units(["U [kV]", "P [MW]"], [27.5, 40.0])
+    script = """
+    const told = [], [chart] = charts, button = document.querySelector("button.units");
+    const tell = () => told.push([button.textContent, chart.layout.yaxis.title.text,
+      chart.layout.yaxis2.title.text, chart.data[0].y[10], chart.data[2].y[49],
+      Number.isNaN(chart.data[0].y[49]), chart.data[3].visible]);
+    tell(); button.click(); tell(); button.click(); tell();
+    document.getElementById("told").textContent = JSON.stringify(told);"""
+    dom, complaints = drawn(Worked(Report("units").chart(chart, "one"), script), tmp_path)
+    assert complaints == []
+    megawatts, per_unit, again = json.loads(re.search(r'id="told">(.*?)</p>', dom)[1])
+    assert megawatts == again
+    assert megawatts[:3] == ["in pu", "U [kV]", "P [MW]"]
+    assert per_unit[:3] == ["in MW and Mvar", "U [pu]", "P [pu]"]
+    assert per_unit[3:5] == pytest.approx([10 / 49, 2], abs=1e-4)
+    assert megawatts[3:5] == pytest.approx([27.5 * 10 / 49, 80], abs=1e-2)
+    assert megawatts[5:] == per_unit[5:] == [True, "legendonly"]

@@ -14,6 +14,7 @@ from tractexp.model.drive import Drive, Excitation
 from tractexp.model.lowering import lower
 from tractexp.model.model import compose
 from tractexp.plugin import build
+from tractexp.testing.loads import choose_active_size
 
 NODE = shutil.which("node")
 STEP, SUBSTEPS = 0.002, 2
@@ -35,18 +36,26 @@ def dip():
 
 @pytest.mark.skipif(NODE is None, reason="node is not installed")
 @pytest.mark.parametrize(
-    ("motor", "static"),
+    ("motor", "static", "effects"),
     [
-        ("electromechanical", "exponential"),
-        ("electromechanical", "zip"),
-        ("mechanical", "exponential_frequency"),
-        ("voltage", "exponential"),
-        ("none", "zip"),
+        ("electromechanical", "exponential", ()),
+        ("electromechanical", "zip", ()),
+        ("mechanical", "exponential_frequency", ()),
+        ("voltage", "exponential", ()),
+        ("none", "zip", ()),
+        ("electromechanical", "exponential", ("stator_resistance",)),
+        ("electromechanical", "exponential", ("second_cage", "undervoltage_trip")),
+        ("electromechanical", "zip", ("thermostatic_load", "speed_dependent_torque")),
+        ("double_cage", "zip", ("feeder_impedance",)),
     ],
 )
-def test_it_gives_what_the_compiled_kernel_gives(motor, static, tmp_path):
-    model, drive = made(motor, static), Drive.from_events([dip()])
-    values = np.array([p.default for p in model.parameters])
+def test_it_gives_what_the_compiled_kernel_gives(motor, static, effects, tmp_path):
+    """With effects the steady state is solved for, here as there."""
+    model, drive = made(motor, static, effects), Drive.from_events([dip()])
+    own = {p.name for effect in model.effects for p in effect.parameters}
+    values = np.array(
+        [choose_active_size(p) if p.name in own else p.default for p in model.parameters]
+    )
     expected = model.simulate(drive, values, SUBSTEPS)
     rows = dict(zip(PHASOR_INPUTS, np.nan_to_num(drive.inputs).tolist(), strict=True))
     given = json.dumps([*values.tolist(), *drive.before[0].tolist()])
@@ -80,7 +89,8 @@ def test_without_a_steady_state_there_is_none(tmp_path):
     assert done.stdout == "null\n"
 
 
-def test_a_steady_state_that_is_solved_for_has_no_sliders():
-    model = made("electromechanical", "exponential", ["stator_resistance"])
-    with pytest.raises(UserError, match="whose steady state is a formula"):
+def test_a_model_in_waveforms_has_no_sliders():
+    parts = [build("model/motor", {"name": "stator_flux"}), build("model/static", {"name": "zip"})]
+    model = compose(*parts, domain="waves")
+    with pytest.raises(UserError, match="this one is in waveforms"):
         write_program(lower(model.equations), model.integration)

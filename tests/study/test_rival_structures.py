@@ -91,13 +91,18 @@ def test_where_nothing_is_missing_the_interval_is_the_fits_own_and_no_rival_gain
     assert sum(inside) >= 6
 
 
+def rival(name, T_m, known):
+    """A structure that fits as well, with another torque."""
+    return RivalStructure(name, 1.0, {"T_m": T_m}, known.likelihood.problem, known.values)
+
+
 def test_a_parameter_that_a_rival_moves_far_is_not_called_identified(missing):
     from tractexp.identification import rivals as module
 
     known, _ = missing
     known = replace(known, rivals=())
     j = known.names.index("T_m")
-    far = RivalStructure("other", 1.0, {"T_m": float(1.5 * known.values[j])})
+    far = rival("other", float(1.5 * known.values[j]), known)
     told = dict(module._find_moved_parameters(known, replace(known, rivals=(far,))))
     assert list(told) == ["T_m"]
     assert known.verdicts["T_m"].word == IDENTIFIED
@@ -116,9 +121,7 @@ def test_a_parameter_whose_interval_rivals_make_wide_is_not_called_identified(mi
     j = known.names.index("T_m")
     value = float(known.values[j])
     known = replace(known, profiled=dict(known.profiled) | {"T_m": (0.88 * value, 1.12 * value)})
-    rivals = tuple(
-        RivalStructure(f"by {share}", 1.0, {"T_m": share * value}) for share in (0.9, 1.1)
-    )
+    rivals = tuple(rival(f"by {share}", share * value, known) for share in (0.9, 1.1))
     assert dict(module._find_moved_parameters(known, replace(known, rivals=rivals[:1]))) == {}
     assert module.IDENTIFIED_SHARE == 0.2
     both = dict(module._find_moved_parameters(known, replace(known, rivals=rivals)))

@@ -1,4 +1,10 @@
 const charts = [...document.querySelectorAll(".chart")];
+const KINDS = {i2: Int16Array, f4: Float32Array, f8: Float64Array};
+const decode = ({dtype, bdata, offset, scale, start, step, count}) => {
+  if (count) return Float64Array.from({length: count}, (_, i) => start + i * step);
+  const raw = new KINDS[dtype](Uint8Array.from(atob(bdata), letter => letter.charCodeAt(0)).buffer);
+  return dtype === "i2" ? Float64Array.from(raw, code => code === -32768 ? NaN : offset + scale * code) : raw;
+};
 const unpack = samples => {
   const bytes = Uint8Array.from(atob(samples.bdata), letter => letter.charCodeAt(0));
   samples.raw = new Int16Array(bytes.buffer);
@@ -93,16 +99,58 @@ const zoomed = chart => {
   const made = picked.map(k => seen(chart.data[k].samples, from, to));
   Plotly.restyle(chart, {x: made.map(m => m.x), y: made.map(m => m.y)}, picked);
 };
+// Panels whose units are known: curves are kept as they were given, and shown times their panel's factor.
+let perUnit = false;
+const inUnits = ({own, units, titles}, data) => {
+  const scale = trace => perUnit ? 1 : units.factors[Number((trace.yaxis || "y").slice(1) || 1) - 1];
+  const labels = perUnit ? titles : units.labels;
+  return {
+    curves: data.map((trace, k) => ArrayBuffer.isView(own[k]) ? own[k].map(value => value * scale(trace)) : own[k]),
+    axes: Object.fromEntries(labels.map((text, k) => [`yaxis${k ? k + 1 : ""}.title.text`, text])),
+  };
+};
+const switchUnits = () => {
+  perUnit = !perUnit;
+  document.querySelectorAll("button.units").forEach(label);
+  charts.filter(chart => chart.measures && chart.data).forEach(chart => {
+    const {curves, axes} = inUnits(chart.measures, chart.data);
+    Plotly.update(chart, {y: curves}, axes);
+  });
+};
+const label = button => { button.textContent = perUnit ? "in MW and Mvar" : "in pu"; };
+const measure = (chart, data, layout, units) => {
+  const axes = units.labels.map((_, k) => layout[`yaxis${k ? k + 1 : ""}`]);
+  const own = data.map(trace => trace.y);
+  chart.measures = {own, units, titles: axes.map(axis => axis.title.text)};
+  const {curves} = inUnits(chart.measures, data);
+  data.forEach((trace, k) => { trace.y = curves[k]; });
+  axes.forEach((axis, k) => { axis.title.text = (perUnit ? chart.measures.titles : units.labels)[k]; });
+  const button = document.createElement("button");
+  button.className = "units"; label(button); button.addEventListener("click", switchUnits);
+  chart.before(button);
+};
+// What a click at x is answered by, below the chart.
+const answer = (chart, answers) => {
+  const box = chart.nextElementSibling.insertAdjacentElement("afterend", document.createElement("p"));
+  box.className = "answer";
+  chart.on("plotly_click", event => {
+    const x = Number(event.points[0].x);
+    box.innerText = answers.filter(({start, end}) => start <= x && x <= end).map(({text}) => text).join("\n");
+  });
+};
 const draw = chart => {
-  const {data, layout, cursor, arrays} = JSON.parse(chart.nextElementSibling.textContent);
+  const {data, layout, cursor, arrays, units, answers} = JSON.parse(chart.nextElementSibling.textContent);
+  const decoded = arrays.map(decode);
   data.forEach(trace => ["x", "y"].forEach(key => {
-    if (trace[key] && trace[key].array !== undefined) trace[key] = {...arrays[trace[key].array]};
+    if (trace[key] && trace[key].array !== undefined) trace[key] = decoded[trace[key].array];
   }));
+  if (units) measure(chart, data, layout, units);
   const sampled = data.filter(trace => trace.samples);
   const [from, to] = (layout.xaxis.range || [-Infinity, Infinity]).map(Number);
   sampled.forEach(trace => { unpack(trace.samples); Object.assign(trace, seen(trace.samples, from, to)); });
   data.filter(trace => trace.phasor).forEach(({phasor}) => { unpack(phasor.re); unpack(phasor.im); });
   Plotly.newPlot(chart, data, layout, SETTINGS);
+  if (answers) answer(chart, answers);
   const told = event => Object.keys(event).some(key => key.startsWith("xaxis"));
   if (sampled.length) chart.on("plotly_relayout", event => told(event) && zoomed(chart));
   if (cursor === undefined) return;

@@ -90,6 +90,8 @@ class Chart:
         self._notes: list[dict[str, Any]] = []
         self._in_legend: set[str] = set()
         self._panels, self._cursor = panels, None
+        self._units: dict[str, Any] | None = None
+        self._answers: list[dict[str, Any]] = []
         self._axes = self._laid_out(panels, heights or [1.0] * len(panels), log_y)
         self._x: dict[str, Any] = {
             "title": {"text": quoting.html(x)},
@@ -145,16 +147,20 @@ class Chart:
         dash: str = "solid",
         step: bool = False,
         legend: bool = True,
+        hidden: bool = False,
     ) -> "Chart":
         """A curve; equal names are one entry of the legend. nan is a gap; `step` holds each value
         until the next.
 
-        Without `legend` it is named where it is pointed at only.
+        Without `legend` it is named where it is pointed at only; `hidden` it is drawn when its name
+        is clicked.
         """
         x, y = style.thin(np.asarray(x, dtype=float), np.asarray(y, dtype=float), MOST_LINE_POINTS)
         shape = {"shape": "hv"} if step else {}
         line = {"color": color, "width": width, "dash": dash, **shape}
         packed: dict[str, Any] = {"x": _pack_numbers(x, "f8"), "y": _pack_numbers(y, "f4")}
+        if hidden:
+            packed["visible"] = "legendonly"
         return self._add(name, panel, mode="lines", line=line, silent=not legend, **packed)
 
     def samples(
@@ -235,6 +241,20 @@ class Chart:
             [_short(name) for name, *_ in courses],
         )
         return self.limits(panel, 0.3 - len(courses), 1.0)
+
+    def units(self, labels: Sequence[str], factors: Sequence[float]) -> "Chart":
+        """What the panels are shown in at first, with their labels, and how much of that one of
+        their own units is; a button goes to and fro for all charts of a page.
+        """
+        self._units = {"labels": [*map(quoting.html, labels)], "factors": [*map(float, factors)]}
+        return self
+
+    def answers(self, answers: Sequence[tuple[float, float, str]]) -> "Chart":
+        """What is said below the chart when it is clicked at an x from the first to the second of
+        two numbers.
+        """
+        self._answers = [{"start": a, "end": b, "text": text} for a, b, text in answers]
+        return self
 
     def cursor(self, x: float) -> "Chart":
         """Values of all curves beside each other where the cursor is, instead of labels; at first
@@ -507,11 +527,13 @@ class Chart:
             }
             if not self._legend:  # just above the panels, below the buttons
                 layout["title"] |= {"yref": "paper", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
-        if self._cursor is None:
-            return {"data": self._data, "layout": layout}
-        # read out beside it
-        data = [{**trace, "hoverinfo": "none", "hovertemplate": None} for trace in self._data]
-        return {"data": data, "layout": layout, "cursor": self._cursor}
+        told = {"units": self._units, "answers": self._answers, "cursor": self._cursor}
+        plain = {"data": self._data, "layout": layout}
+        plain |= {key: value for key, value in told.items() if value not in (None, [])}
+        if self._cursor is not None:  # read out beside it
+            quiet: dict[str, Any] = {"hoverinfo": "none", "hovertemplate": None}
+            plain["data"] = [{**trace, **quiet} for trace in self._data]
+        return plain
 
     def element(self, label: str) -> str:
         """The chart as HTML, told to screen readers as `label`."""
@@ -546,23 +568,44 @@ class Chart:
 
 
 def _share_arrays(plain: dict[str, Any]) -> dict[str, Any]:
-    """A chart whose traces name their packed arrays by number: curves of one record have their
-    times once.
+    """A chart whose traces name their packed arrays by number, so that curves of one record have
+    their times once, and short: values in 16 bits, uniform times by start and step.
     """
     arrays: list[dict[str, str]] = []
+    exact = set[int]()
 
-    def share(value: Any) -> Any:
+    def share(trace: dict[str, Any], key: str) -> Any:
+        value = trace[key]
         if not (isinstance(value, dict) and "bdata" in value):
             return value
         if value not in arrays:
             arrays.append(value)
-        return {"array": arrays.index(value)}
+        number = arrays.index(value)
+        axis = plain["layout"][f"{key}axis{trace.get(f'{key}axis', '')[1:]}"]
+        if axis.get("type") == "log":
+            exact.add(number)
+        return {"array": number}
 
     traces = [
-        {key: share(value) if key in ("x", "y") else value for key, value in trace.items()}
+        trace | {key: share(trace, key) for key in ("x", "y") if key in trace}
         for trace in plain["data"]
     ]
-    return {**plain, "data": traces, "arrays": arrays}
+    short = [a if k in exact else _shorten_array(a) for k, a in enumerate(arrays)]
+    return {**plain, "data": traces, "arrays": short}
+
+
+def _shorten_array(packed: dict[str, str]) -> dict[str, Any]:
+    """A packed array in fewer letters: no worse than a screen shows it."""
+    kind = np.dtype(f"<{packed['dtype']}")
+    values = np.frombuffer(base64.b64decode(packed["bdata"]), kind).astype(float)
+    if kind.itemsize < np.dtype(float).itemsize:
+        return {"dtype": "i2"} | _encode_values(values)
+    count = len(values)
+    step = (values[-1] - values[0]) / (count - 1) if count > 1 else 0.0
+    even = values[0] + step * np.arange(count) if count else values
+    if count and np.allclose(values, even, rtol=0, atol=1e-6 * abs(step)):
+        return {"start": float(values[0]), "step": float(step), "count": count}
+    return packed
 
 
 def _short(name: str) -> str:
@@ -587,17 +630,20 @@ def _height(panel: int | None) -> dict[str, Any]:
 
 
 def _encode_curve(start: float, step: float, y: np.ndarray) -> dict[str, Any]:
-    """Values (n,), every `step` from `start` on, in 16 bits between the lowest and the highest; nan
-    is a gap.
-    """
+    """Values (n,), every `step` from `start` on."""
+    return {"start": start, "step": step} | _encode_values(y)
+
+
+def _encode_values(y: np.ndarray) -> dict[str, Any]:
+    """Values (n,) in 16 bits between the lowest and the highest; nan is a gap."""
     finite = np.isfinite(y)
     low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
     offset, scale = (low + high) / 2, max((high - low) / (2 * GREATEST_CODE), 1e-300)
     held = np.where(
         finite, np.round((np.where(finite, y, offset) - offset) / scale), -GREATEST_CODE - 1
     ).astype("<i2")
-    coded = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
-    return coded | {"offset": offset, "scale": scale}
+    packed = base64.b64encode(held.tobytes()).decode()
+    return {"bdata": packed, "offset": offset, "scale": scale}
 
 
 def _pack_numbers(values: np.ndarray, kind: str) -> dict[str, str]:

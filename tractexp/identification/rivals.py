@@ -30,12 +30,14 @@ RIVAL_ITERATIONS = 25
 @dataclass(frozen=True, eq=False)
 class RivalStructure:
     """A structure that fits as well: its name, what it leaves over what the model leaves, and the
-    shared parameters.
+    shared parameters; its own problem and all free values (d,) there.
     """
 
     name: str
     squares: float  # its objective over the model's
     values: dict[str, float]
+    problem: Problem
+    free: np.ndarray
 
     def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
@@ -144,11 +146,11 @@ def _fit_rival(uncertainty: Uncertainty, name: str, model: Model) -> RivalStruct
     best = int(ended.deviance.argmin())
     if not ended.deviance[best] < uncertainty.deviance + threshold():
         return None
-    values = dict(zip(other.space.names, likelihood.values(ended.unit[best]).tolist(), strict=True))
+    free = likelihood.values(ended.unit[best])
+    values = dict(zip(other.space.names, free.tolist(), strict=True))
     shared = {n: value for n, value in values.items() if n in uncertainty.names}
-    return RivalStructure(
-        name, float(ended.deviance[best] / max(uncertainty.deviance, 1e-30)), shared
-    )
+    squares = float(ended.deviance[best] / max(uncertainty.deviance, 1e-30))
+    return RivalStructure(name, squares, shared, other, free)
 
 
 def _starts(uncertainty: Uncertainty, other: Problem) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.domain import domain_of
 from tractexp.errors import UserError
-from tractexp.identification.linear_network import black_boxes, choose_network
+from tractexp.identification.linear_network import BlackBox, black_boxes, choose_network
 from tractexp.identification.result import TRAIN, Fit, model_errors
 from tractexp.inference.model_error import STALL, in_percent
 from tractexp.wording import count_noun
@@ -27,15 +27,11 @@ def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
     `events` as those of the result, `ratio` of the errors on the events held out, else on those
     fitted; and the `sentence`, which alone is there where no network can be fitted.
     """
-    events = [fit.waves or fit.event for fit in fits]
     split = sum(fit.role == TRAIN for fit in fits)
     try:
-        box = choose_network(black_boxes(domain_of(events[0]), events[:split]), events[:split])
+        box, played = play_network(fits)
     except UserError as why:
         return {"sentence": f"no linear network stands beside it: {why}"}
-    played = [
-        Fit(role=fit.role, **vars(box.play(event))) for fit, event in zip(fits, events, strict=True)
-    ]
     own, judged = model_errors(played), slice(split, None) if split < len(fits) else slice(split)
     left, model = (e["held_out"]["value"] if e["held_out"] else e["value"] for e in (own, error))
     ratio = model / left if left > 0 and np.isfinite(model) else None
@@ -52,6 +48,18 @@ def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
         "ratio": ratio,
         "sentence": sentence,
     }
+
+
+def play_network(fits: Sequence[Fit]) -> tuple[BlackBox, list[Fit]]:
+    """The best linear network of the fitted events, and what it calculates of all of them.
+
+    Raises `UserError` where none can be fitted.
+    """
+    events = [fit.waves or fit.event for fit in fits]
+    split = sum(fit.role == TRAIN for fit in fits)
+    box = choose_network(black_boxes(domain_of(events[0]), events[:split]), events[:split])
+    pairs = zip(fits, events, strict=True)
+    return box, [Fit(role=fit.role, **vars(box.play(event))) for fit, event in pairs]
 
 
 def poles_in_words(poles: Sequence[dict[str, float]]) -> str:

@@ -14,6 +14,13 @@ from tractexp.kernel.expressions import OURS, Expressions
 from tractexp.kernel.graph import Symbol
 from tractexp.kernel.layout import EVENT, PHASOR_INPUTS, SMOOTH
 from tractexp.kernel.lowered import Lowered, Phase
+from tractexp.kernel.steady import (
+    BALANCED,
+    LARGEST_SETTLED_MOVE,
+    NEWTON_ITERATIONS,
+    SETTLED,
+    STATE_DIFFERENCE,
+)
 
 COMPARISONS = {"olt": "<", "ole": "<=", "ogt": ">", "oge": ">=", "oeq": "===", "une": "!=="}
 LOGIC = {"and": "&&", "or": "||", "xor": "!=="}
@@ -105,15 +112,12 @@ def write_program(lowered: Lowered, integration: str) -> str:
     numbers of the event and the rows of the inputs; it returns the rows of the outputs, null where
     there is no steady state.
 
-    Raises `UserError` for equations whose steady state is solved for by iteration, or that read
-    waveforms.
+    Raises `UserError` for equations that read waveforms.
     """
     read = {symbol.name for symbol in lowered.inputs}
-    if lowered.rest is not None or not read <= {*PHASOR_INPUTS}:
-        raise UserError(
-            "a page has sliders for models in phasors whose steady state is a formula, which this"
-            " one's is not"
-        )
+    if not read <= {*PHASOR_INPUTS}:
+        raise UserError("a page has sliders for models in phasors, and this one is in waveforms")
+    solves = lowered.rest is not None and bool(lowered.states)
     event = tuple(Symbol(name, real=True) for name in EVENT)
     given = (*lowered.parameters, *(Symbol(name, real=True) for name in ("P0", "Q0")))
     before = (*given, *event)
@@ -126,7 +130,15 @@ def write_program(lowered: Lowered, integration: str) -> str:
         _write_function("renewal", moving, lowered.renewal),
         _write_function("output", moving, lowered.output),
     ]
+    if solves:
+        parts.append(_write_function("rest", (*before, *lowered.starts), lowered.rest))
     sizes = {
+        "SOLVES": solves,
+        "MOST_ITERATIONS": NEWTON_ITERATIONS,
+        "DIFFERENCE": STATE_DIFFERENCE,
+        "LEAST_MOVE": LARGEST_SETTLED_MOVE,
+        "SETTLED": SETTLED,
+        "BALANCED": BALANCED,
         "STATES": len(lowered.states),
         "STARTS": len(lowered.starts),
         "MEMORIES": len(lowered.memories),

@@ -8,10 +8,49 @@ const between = (inputs, name, i, x, step) => {
   const square = 3 * rise - 2 * da - db, cube = da + db - 2 * rise;
   return name === smooth ? a + x * (da + x * (square + x * cube)) : (da + x * (2 * square + 3 * x * cube)) / step;
 };
+// Newton's method from a first guess: what makes the balances vanish; null where it does not end there.
+const settle = (balances, guess) => {
+  const x = [...guess];
+  let moved = 1;
+  for (let iteration = 0; iteration < MOST_ITERATIONS && moved > LEAST_MOVE; iteration++) {
+    const now = balances(x), rows = now.map(value => [value]);
+    for (let k = x.length - 1; k >= 0; k--) {
+      const kept = x[k], ahead = DIFFERENCE * (1 + Math.abs(kept));
+      x[k] = kept + ahead;
+      balances(x).forEach((value, r) => rows[r].unshift((value - now[r]) / ahead));
+      x[k] = kept;
+    }
+    const steps = eliminate(rows), sizes = steps.map((step, k) => Math.abs(step) / (1 + Math.abs(x[k])));
+    moved = Math.max(...sizes);
+    steps.forEach((step, k) => { x[k] -= (moved < 0.5 ? 1 : 0.5 / moved) * step; });
+  }
+  return moved <= SETTLED && balances(x).every(value => Math.abs(value) < BALANCED) ? x : null;
+};
+// The solution of linear equations, each a row that ends in its right side.
+const eliminate = rows => {
+  const n = rows.length, solution = new Array(n);
+  for (let k = 0; k < n; k++) {
+    for (let r = k + 1; r < n; r++) if (Math.abs(rows[r][k]) > Math.abs(rows[k][k])) [rows[k], rows[r]] = [rows[r], rows[k]];
+    for (let r = k + 1; r < n; r++) {
+      const factor = rows[r][k] / rows[k][k];
+      rows[r] = rows[r].map((value, c) => value - factor * rows[k][c]);
+    }
+  }
+  for (let k = n - 1; k >= 0; k--) {
+    const known = solution.reduce((sum, value, c) => sum + rows[k][c] * value, 0);
+    solution[k] = (rows[k][n] - known) / rows[k][k];
+  }
+  return solution;
+};
 // The outputs of the equations above over one event: four stages a step, `substeps` steps a sample.
 const simulate = (given, event, inputs, substeps) => {
   const before = [...given, ...event], begin = start(before), starts = begin.slice(0, STARTS);
   if (!begin.slice(STARTS).every(slack => slack >= 0)) return null;
+  if (SOLVES) {
+    const memories = starts.slice(STATES), states = settle(x => rest([...before, ...x, ...memories]), starts.slice(0, STATES));
+    if (states === null) return null;
+    starts.splice(0, STATES, ...states);
+  }
   const lane = [...before, ...starts, ...constant([...before, ...starts])];
   const step = event[STEP], length = step / substeps, samples = inputs.U.length, outputs = [];
   let y = starts.slice(0, STATES), memories = starts.slice(STATES);

@@ -20,6 +20,7 @@ from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import Identity, describe_identities, title
 from tractexp.report.candidates import candidates
 from tractexp.report.disagreement import noise, places
+from tractexp.report.explained import answer_clicks
 from tractexp.report.extended import equations, interval, laws, parameters, value
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
@@ -167,6 +168,7 @@ def report(
     overlaid(
         page.heading("Measured, before, after" if findings.names else "Measured and calculated"),
         findings.graded_overlays,
+        answer_clicks(findings),
     )
     _smaller(page, findings, content)
     if findings.verdict.word == UNEXPLAINED:

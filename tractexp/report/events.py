@@ -9,13 +9,14 @@ import numpy as np
 
 from tractexp.blocks import style
 from tractexp.blocks.chart import MOST_LINE_POINTS, Chart
-from tractexp.record import Event
+from tractexp.record import Base, Event, Record
 
 EXCESS = "#E69F00"  # shades what stands out
 BAND_DEVIATIONS = 2.0  # standard deviations of the noise band
 PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
 HEIGHTS = (0.9, 1.5, 1.0, 1.5, 1.0)
 PIXELS = 580
+MOST_HIDDEN_POINTS = 1000  # samples of a curve that is drawn on demand only
 CAPTION = (
     "ΔP and ΔQ are measured less calculated. Dotted: the dip begins and ends. Drag to zoom,"
     " double-click to go back."
@@ -29,6 +30,7 @@ class CalculatedCurve(NamedTuple):
     power: np.ndarray
     color: str
     dash: str = "solid"
+    hidden: bool = False  # until its name is clicked
 
 
 def event_chart(
@@ -68,10 +70,30 @@ def event_chart(
                         opacity=0.25,
                     )
         chart.line("measured", t, measured, style.MEASURED, above, width=3)
-        for name, power, color, dash in curves:
-            chart.line(name, t, power[c], color, above, dash=dash)
-            chart.line(name, t, measured - power[c], color, above + 1, width=1.1, dash=dash)
+        for name, power, color, dash, hidden in curves:
+            some = slice(None, None, -(-len(t) // MOST_HIDDEN_POINTS) if hidden else 1)
+            look: dict[str, Any] = {"dash": dash, "hidden": hidden}
+            left = measured - power[c]
+            chart.line(name, t[some], power[c][some], color, above, **look)
+            chart.line(name, t[some], left[some], color, above + 1, width=1.1, **look)
+    show_units(chart, PANELS, find_base(record))
     return chart.edge(event.t_start).edge(event.t_end).limits(None, float(t[0]), float(t[-1]))
+
+
+def find_base(record: Record) -> Base | None:
+    """The base of a record, None where nobody said what one per unit is."""
+    return record.base if record.file_base.in_mva else None
+
+
+def show_units(chart: Chart, panels: Sequence[str], base: Base | None) -> Chart:
+    """Panels labeled in pu are shown in kV, MW and Mvar; as they are where no base is known."""
+    if base is None:
+        return chart
+    kilovolt = ("kV", base.voltage) if base.voltage != 1.0 else ("pu", 1.0)
+    by_quantity = {"U": kilovolt, "P": ("MW", base.power), "Q": ("Mvar", base.power)}
+    units = [by_quantity[panel.lstrip("Δ")[0]] for panel in panels]
+    labels = [panel.replace("pu", unit) for panel, (unit, _) in zip(panels, units, strict=True)]
+    return chart.units(labels, [factor for _, factor in units])
 
 
 def _noise_band(

@@ -2,9 +2,7 @@
 sure, what next.
 """
 
-import itertools
 from collections.abc import Sequence
-from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +11,6 @@ from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
 from tractexp.identification.agreement import EventAgreement
 from tractexp.identification.estimate import EstimationResult
-from tractexp.identification.forecast import draw_dip
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
@@ -23,19 +20,15 @@ from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.provenance import command
 from tractexp.record.identity import Identity, describe_identities, title
-from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
+from tractexp.report.fitted_curves import MOST_OPEN_EVENTS, ROLES, add_curves, add_next_dip
 from tractexp.report.race import tabulate_race
 from tractexp.report.sliders import add_sliders
-from tractexp.report.waves import CAPTION as WAVE_CAPTION
-from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, spectrum_chart, wave_chart
 from tractexp.wording import as_sentence, epsilon, in_words, shown_in_words
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification
 
-ROLES = {"train": "fitted", "validate": "held out"}
 KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
-MOST_OPEN_EVENTS = 4  # events whose curves are not folded away
 CHANNELS = (style.ACTIVE, style.REACTIVE, style.PALETTE[2])  # of what is compared
 EXACT = (
     "Nothing but noise is left: the estimate is the most likely set, noise whitened, the power"
@@ -52,12 +45,6 @@ MODEL_ERROR = (
     " response, both in"
     " apparent power S. epsilon: Eq. (20)."
 )
-NEXT_DIP = (
-    "A dip that was not recorded, as long as those that were. The bands hold the worst sample of"
-    " 95 % of such events: noise, what the model misses of the known events, and the parameters'"
-    " scatter."
-)
-WITHIN = "the load is here in 95 % of events"
 FIXED = "fixed"
 SAME_END_SHARE = 0.01  # of the deviance: starts closer than this ended in the same place
 
@@ -166,8 +153,8 @@ def report(fit: "Identification") -> Report:
         kind=KIND[fit.grade],
     )
     page.heading("Measured and calculated")
-    _curves(page, details.fits, uncertainty)
-    _add_next_dip(page, fit)
+    add_curves(page, details.fits, uncertainty, fit.spec.validate)
+    add_next_dip(page, fit)
     page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
     _parameters(page, fit, uncertainty)
     page.add(*tabulate_race(result.race))
@@ -191,28 +178,6 @@ def report(fit: "Identification") -> Report:
     _correlation(page, uncertainty)
     page.heading("How this page was made")
     return page.table(["", ""], list_origin(result, command()), words=(1,))
-
-
-def _add_next_dip(page: Report, fit: "Identification") -> None:
-    """P and Q of the dip that is told of, with their bands; its sentence where there are none."""
-    told = fit.result.next_dip
-    if not told:
-        return
-    page.heading("The next dip").text(as_sentence(told["sentence"]))
-    if told["P"] is None:
-        return
-    first = fit.details.fits[0].event
-    t, U, start = draw_dip(first.U0, told["duration"], first.record.step)
-    response = fit.predict(t=t, U=U)
-    assert response.band is not None
-    chart = Chart("t [s]", ["U [pu]", "P [pu]", "Q [pu]"], heights=(0.9, 1.5, 1.5), pixels=460)
-    chart.line("voltage", t, U, style.VOLTAGE)
-    for panel, (power, half) in enumerate(
-        zip((response.P, response.Q), response.band, strict=True)
-    ):
-        chart.band(WITHIN, t, power - half, power + half, style.FAINT, panel + 1)
-        chart.line("calculated", t, power, style.PALETTE[0], panel + 1)
-    page.chart(chart.edge(t[start]), NEXT_DIP)
 
 
 def _of_currents(result: Any) -> str:
@@ -239,59 +204,6 @@ def headline(result: Any) -> str:
         + (f"; {', '.join(poor)}" if poor else "")
         + "."
     )
-
-
-def _curves(page: Report, fits: Sequence[Any], uncertainty: Uncertainty) -> None:
-    """Add measured and calculated curves with the band of the noise."""
-    problem = uncertainty.likelihood.problem
-    waves, deviation = problem.model.waves, uncertainty.of_noise.noise.deviation(problem.drive)
-    page.text(*[IN_WAVES] * waves).text(CAPTION)
-    all_curves(
-        page, fits, [deviation[:, problem.drive.part(e)] for e in range(problem.drive.events)]
-    )
-    if waves:
-        page.heading("What was done to the records", level=3).items(
-            describe_preparation(problem, fits)
-        )
-
-
-def all_curves(page: Report, fits: Sequence[Any], noises: Sequence[np.ndarray] = ()) -> None:
-    """The charts of each event, with the noise of those fitted, the first; of many the later ones
-    are folded away.
-    """
-    for fit, noise, k in itertools.zip_longest(fits, noises, range(len(fits))):
-        with (
-            page.fold_blocks(f"{fit.event.record.name}, {ROLES[fit.role]}")
-            if k >= MOST_OPEN_EVENTS
-            else nullcontext()
-        ):
-            event_curves(page, fit, noise)
-
-
-def event_curves(page: Report, fit: Any, noise: np.ndarray | None) -> None:
-    """The currents of an event in waveforms and their spectra, then P and Q; `noise` (2, N) is that
-    of phasors.
-    """
-    record, power = fit.event.record, np.stack((fit.P, fit.Q))
-    about, notes = f"{record.name}, {ROLES[fit.role]}", [f"{note}." for note in record.notes]
-    if fit.waves is not None:
-        page.chart(
-            wave_chart(fit.waves, [Drawn("estimate", fit.currents, style.PALETTE[0])]),
-            " ".join([f"{about}: epsilon_i {epsilon(fit.epsilon_i)}.", WAVE_CAPTION, *notes]),
-        )
-        page.chart(*spectrum_chart(fit.waves, fit.currents))
-        noise, notes = (
-            None,
-            ["Measured and calculated are phasors of the currents above, by the same estimator."],
-        )
-    chart = event_chart(
-        fit.event,
-        [CalculatedCurve("estimate", power, style.PALETTE[0])],
-        deviation=noise,
-        around=power,
-    )
-    errors = f"epsilon_p {epsilon(fit.epsilon_p)}, epsilon_q {epsilon(fit.epsilon_q)}"
-    page.chart(chart, " ".join([f"{about}: {errors}.", *notes]))
 
 
 def parameters(fit: "Identification") -> Table:

@@ -6,7 +6,8 @@ from tractexp.blocks import Report, Table
 from tractexp.inference.model_error import in_percent
 from tractexp.provenance import command
 from tractexp.record.identity import title_of
-from tractexp.report.identify import all_curves, error_table
+from tractexp.report.fitted_curves import all_curves
+from tractexp.report.identify import error_table
 from tractexp.wording import as_sentence
 
 if TYPE_CHECKING:

@@ -1,5 +1,6 @@
 """Measured, before, after: the charts in which one sees whether a model describes an event."""
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ from tractexp.discrepancy.overlay import Overlay
 from tractexp.domain.playback import as_phasors
 from tractexp.record import WaveEvent, describe
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
+from tractexp.report.explained import Answer
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import Drawn, wave_chart
 
@@ -19,16 +21,25 @@ IN_PHASORS = (
     " window cancels; a dip"
     " of few cycles is smeared alike in both."
 )
+CLICK = "Click a curve: below it is said which candidates would explain what is left there."
 MOST_OPEN_OVERLAYS = 4  # events of each role that are not folded
 
 
-def overlaid(page: Report, overlays: Sequence[Overlay]) -> Report:
-    """A chart of each event, the fitted ones first; those beyond the first few are folded."""
+def overlaid(
+    page: Report, overlays: Sequence[Overlay], answers: Sequence[Sequence[Answer]] = ()
+) -> Report:
+    """A chart of each event, the fitted ones first; those beyond the first few are folded. Clicked,
+    a fitted one gives its `answers`.
+    """
     page.text(WAVE_CAPTION if any(isinstance(o.event, WaveEvent) for o in overlays) else CAPTION)
+    if any(answers):
+        page.text(CLICK)
     for role, held_out in (("fitted", False), ("held out", True)):
         group = [o for o in overlays if o.held_out == held_out]
-        for overlay in group[:MOST_OPEN_OVERLAYS]:
-            _add_overlay(page, overlay, role)
+        told = () if held_out else answers
+        for overlay, own in itertools.zip_longest(group[:MOST_OPEN_OVERLAYS], told[: len(group)]):
+            if overlay is not None:
+                _add_overlay(page, overlay, role, own or ())
         if more := group[MOST_OPEN_OVERLAYS:]:
             with page.fold_blocks(f"{len(more)} more events, {role}"):
                 for overlay in more:
@@ -36,14 +47,14 @@ def overlaid(page: Report, overlays: Sequence[Overlay]) -> Report:
     return page
 
 
-def _add_overlay(page: Report, overlay: Overlay, role: str) -> None:
+def _add_overlay(page: Report, overlay: Overlay, role: str, answers: Sequence[Answer] = ()) -> None:
     """Add an event, measured and calculated before and after."""
     event = overlay.event
     page.heading(f"{event.record.name}, {role}", level=3)
     if not isinstance(event, WaveEvent):
-        page.chart(chart(overlay), f"{describe(event)}.")
+        page.chart(chart(overlay).answers(answers), f"{describe(event)}.")
         return
-    page.chart(currents(event, overlay), f"{describe(event.phasors)}.")
+    page.chart(currents(event, overlay).answers(answers), f"{describe(event.phasors)}.")
     with page.fold_blocks("The same in phasors: P and Q"):
         page.chart(in_phasors(event, overlay), IN_PHASORS)
 
