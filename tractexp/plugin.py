@@ -15,6 +15,7 @@ import dataclasses
 import functools
 import importlib
 import inspect
+import re
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -77,7 +78,8 @@ _schemas: dict[type[Plugin], type] = {}
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 def plugin(cls: Class) -> Class:
-    """Register a plugin class under its module's name, in its base's group.
+    """Register a plugin class under its module's name, in its base's group; one that is defined in
+    a program or a notebook itself goes by the class: `DrawAgain` is `draw_again`.
 
     Its annotated fields become its settings: the class is a frozen, keyword-only dataclass then.
 
@@ -99,6 +101,8 @@ def plugin(cls: Class) -> Class:
         "Source:"), and for what its base and its parameters find declared wrongly.
     """
     name = cls.__module__.rpartition(".")[2]
+    if name == "__main__":
+        name = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
     where = f"plugin {cls.__module__}.{cls.__qualname__}"
     if file := getattr(sys.modules.get(cls.__module__), "__file__", None):
         where += f" ({Path(file).name})"

@@ -45,6 +45,7 @@ RESULTS = (
     "interrupted.json",
     "report.html",
     "sheet.html",
+    "sheet.docx",
     "posterior.npz",
     "unexplained.csv",
     "survey.csv",

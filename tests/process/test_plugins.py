@@ -7,6 +7,7 @@ import importlib.metadata
 import json
 import os
 import re
+import runpy
 import subprocess
 import sys
 import tomllib
@@ -587,3 +588,18 @@ def test_what_can_be_chosen_is_known_without_importing_plugins_again(tmp_path):
         check=True,
     )
     assert [run().stdout, run().stdout] == ["True\n", "False\n"]
+
+
+def test_a_plugin_in_a_program_goes_by_its_class(tmp_path):
+    """As in a notebook: there is no file that could name it."""
+    program = tmp_path / "a program.py"
+    program.write_text(
+        "from tractexp.extend import Optimizer, plugin\n"
+        "@plugin\n"
+        "class EvenSteps(Optimizer):\n"
+        '    """Nothing. Source: none. Departures: none."""\n'
+        "    def search(self, evaluate, box, rng):\n"
+        "        yield\n"
+    )
+    runpy.run_path(str(program), run_name="__main__")
+    assert get("optimizer", "even_steps").__name__ == "EvenSteps"

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -16,7 +17,7 @@ from tractexp.api.setup import Setup
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.choices import set_holding
-from tractexp.errors import Stopped, UserError, among
+from tractexp.errors import TASK, Stopped, UserError, among
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.result import Result, by_event, conclude, play, refuse_failed
 from tractexp.identification.search import REFUSED, History, SearchResult
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 
 FIXED = "fixed"
 SHEET = "sheet.html"
+SHEET_DOCUMENT = "sheet.docx"
 USABLE, DOUBTFUL, UNUSABLE = "usable", "doubtful", "unusable"
 USABILITY: dict[str, str] = {
     Grade.ADEQUATE: USABLE,
@@ -784,14 +786,30 @@ class Identify(Task, call=identify):
     figures: bool | None = None  # write the page; null: in single runs, not in sweeps
     # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
     predictor: bool | None = None
+    document: bool = False  # write sheet.docx beside sheet.html (pip install 'tractexp[word]')
 
     def perform(self, job: Job, **instead: Any) -> Identification:
-        """Identify; what is read is told where everything is asked for."""
+        """Identify; what is read is told where everything is asked for.
+
+        Raises `UserError` where a document is asked for and python-docx is not installed.
+        """
+        if self.document and not find_spec("docx"):
+            raise UserError(
+                f"{TASK.document}=true needs python-docx; install it by: pip install"
+                " 'tractexp[word]'"
+            )
         return super().perform(job, **{"progress": job.tell_beside, **instead})
 
     def draws(self, job: Job) -> bool:
         """Whether this run draws figures: as set, else in single runs."""
         return not job.of_many if self.figures is None else self.figures
+
+    def draw(self, job: Job, result: Identification) -> list[Path]:
+        """The page, the sheet, and the sheet as a document where that is asked for."""
+        paths = super().draw(job, result)
+        if self.document:
+            paths.append(result.sheet().save(job.folder / SHEET_DOCUMENT))
+        return paths
 
     def collect_log(self, job: Job, result: Identification) -> dict[str, Any]:
         """Estimates, errors and curves for MLflow, and the model as one that predicts where that is

@@ -15,7 +15,7 @@ from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.errors import check_range
+from tractexp.errors import UserError, check_range
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import counter
@@ -52,6 +52,22 @@ class Sampled(Written):
     def draws(self) -> dict[str, np.ndarray]:
         """Draws (n,) of each free parameter, by name."""
         return dict(zip(self.sample.names, self.sample.draws.T, strict=True))
+
+    def to_inference_data(self) -> Any:
+        """The draws as an `arviz.InferenceData`: group `posterior`, a variable for each free
+        parameter, (chain, draw) with a chain for each walker.
+
+        Raises `UserError` without the extra [arviz].
+        """
+        try:
+            import arviz  # pyright: ignore[reportMissingImports]
+        except ImportError:
+            raise UserError(
+                "to_inference_data() needs ArviZ; install it by: pip install 'tractexp[arviz]'"
+            ) from None
+        walkers = self.settings["walkers"]
+        chains = {name: draws.reshape(-1, walkers).T for name, draws in self.draws.items()}
+        return arviz.from_dict(posterior=chains, attrs={"sampler": "emcee"})
 
     def table(self) -> Table:
         """The intervals by curvature and by the posterior, side by side."""

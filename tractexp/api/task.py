@@ -155,6 +155,10 @@ class Task(Plugin):
         """Whether pages and figures are made."""
         return True
 
+    def draw(self, job: "Job", result: Written) -> list[Path]:
+        """Write pages and figures, where this run makes any; their paths."""
+        return result.write_drawings(job.folder) if self.draws(job) else []
+
     def run(self, job: "Job") -> None:
         """Do the task. Raises `UserError` before anything is logged where the input is wrong."""
         self.conclude(job, self.perform(job))
@@ -163,8 +167,7 @@ class Task(Plugin):
         """Write a result, show it, draw it, log it."""
         paths = job.write(result.write_results, lambda paths: self.track(job, result, paths))
         print_result(job, result)
-        if self.draws(job):
-            paths += result.write_drawings(job.folder)
+        paths += self.draw(job, result)
         print_written(paths, result.page)
         self.log(job, result, paths)
 

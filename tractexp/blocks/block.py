@@ -293,7 +293,13 @@ class Report:
         }
 
     def save(self, path: Path | str) -> Path:
-        """Write the page, whole or not at all. Raises `UserError` where that is impossible."""
+        """Write the page, or a document for a word processor where the path ends in .docx, whole or
+        not at all. Raises `UserError` where that is impossible.
+        """
+        if Path(path).suffix.lower() == ".docx":
+            from tractexp.blocks.docx import save_document
+
+            return save_document(self, Path(path))
         return files.write(Path(path), self.html)
 
     def __str__(self) -> str:

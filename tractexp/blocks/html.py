@@ -5,16 +5,15 @@ figures are inline SVG, equations are typeset into SVG; nothing is loaded from e
 """
 
 import functools
-import io
 import itertools
 import re
 from collections.abc import Sequence
-from typing import Any
 
 from tractexp import files, quoting, store
 from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
 from tractexp.blocks.chart import script
+from tractexp.blocks.drawing import draw_equation
 
 LONGEST_UNBROKEN_WORD = 14  # letters of a word that never needs a second line
 
@@ -174,40 +173,8 @@ def _inline(drawing: str, prefix: str, label: str) -> str:
     return drawing.replace("<svg", f'<svg role="img" aria-label="{quoting.html(label)}"', 1)
 
 
-def _enlarge_fractions(latex: str) -> str:
-    """Fractions that are inside nothing else in their full size, as LaTeX has them in a displayed
-    equation.
-    """
-    depth = itertools.accumulate((c == "{") - (c == "}") for c in latex)
-    outside = {m.start() for m in re.finditer(r"\\frac", latex)} & {
-        i for i, d in enumerate(depth) if d == 0
-    }
-    return "".join(r"\d" if i in outside else c for i, c in enumerate(latex))
-
-
 @functools.cache
 def _typeset(latex: str) -> str:
     """SVG of an equation, from the store or drawn; "" for LaTeX beyond mathtext."""
     key = store.key(store.version("matplotlib"), latex)
-    return store.DRAWINGS.get(key, lambda: _draw_equation(_enlarge_fractions(latex))).decode()
-
-
-def _draw_equation(latex: str) -> bytes:
-    """An SVG document, of no bytes where mathtext refuses the LaTeX."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.mathtext import MathTextParser
-
-    settings: Any = {"svg.fonttype": "path", "mathtext.fontset": "cm", "svg.hashsalt": "tractexp"}
-    with rc_context(settings):
-        font = FontProperties(size=13)
-        try:
-            width, height, depth, *_ = MathTextParser("path").parse(f"${latex}$", dpi=72, prop=font)
-        except ValueError:
-            return b""
-        figure = Figure(figsize=((width + 4) / 72, (height + 4) / 72))
-        figure.text(2 / (width + 4), (depth + 2) / (height + 4), f"${latex}$", fontproperties=font)
-        drawn = io.BytesIO()
-        figure.savefig(drawn, format="svg", transparent=True, metadata={"Date": None})
-    return drawn.getvalue()
+    return store.DRAWINGS.get(key, lambda: draw_equation(latex)).decode()

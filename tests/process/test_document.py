@@ -1,0 +1,59 @@
+"""Pages as documents for a word processor, and charts as pictures."""
+
+import numpy as np
+import pytest
+
+from tractexp.blocks import Report
+from tractexp.blocks.block import Markup
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.docx import LEFT_OUT
+from tractexp.blocks.drawing import draw_chart
+from tractexp.errors import UserError
+
+BLUE = "#0072B2"
+
+
+def chart():
+    x = np.linspace(0, 1, 50)
+    made = Chart("t [s]", ["U [pu]", "P & Q [pu]"]).line("measured", x, x, BLUE)
+    made.band("noise", x, x - 1, x + 1, BLUE, 1).line("rival", x, 2 * x, BLUE, 1, hidden=True)
+    return made.units(["U [kV]", "P & Q [MW]"], [27.5, 40.0])
+
+
+def test_a_page_is_a_document_with_its_tables_charts_and_equations(tmp_path):
+    docx = pytest.importorskip("docx", reason="the extra [word] is not installed")
+    page = Report("Load of <Nord>", "a lead").heading("Numbers").text("one", "two")
+    page.verdict("USABLE.", kind="good").items(["an item"]).code("tractexp a b")
+    page.table(["parameter", "value"], [["M", 0.0123456789]], "a caption").chart(chart(), "a dip")
+    page.equation(r"\frac{a}{b}").equation(r"\begin{pmatrix} 1 \end{pmatrix}")
+    page.add(Markup("<script></script>"))
+    document = docx.Document(str(page.save(tmp_path / "sheet.docx")))
+    told = [paragraph.text for paragraph in document.paragraphs]
+    for text in ("Load of <Nord>", "a lead", "Numbers", "one", "two", "USABLE.", "an item"):
+        assert text in told
+    assert told[-1] == LEFT_OUT
+    assert r"\begin{pmatrix} 1 \end{pmatrix}" in told  # beyond mathtext
+    (table,) = document.tables
+    rows = [[cell.text for cell in row.cells] for row in table.rows]
+    assert rows == [["parameter", "value"], ["M", "0.012346"]]
+    assert len(document.inline_shapes) == 2  # the chart and the first equation
+    width = document.sections[0].page_width - 2 * document.sections[0].left_margin
+    assert all(shape.width <= width for shape in document.inline_shapes)
+
+
+def test_without_the_library_the_sentence_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "docx", None)
+    with pytest.raises(UserError, match=r"pip install 'tractexp\[word\]'"):
+        Report("a").save(tmp_path / "a.docx")
+    assert not (tmp_path / "a.docx").exists()
+
+
+def test_a_chart_is_drawn_in_the_units_of_its_page_without_what_a_click_draws(tmp_path):
+    drawn = draw_chart(chart(), tmp_path / "chart.svg").read_text(encoding="utf-8")
+    assert "U [kV]" in drawn
+    assert "P &amp; Q [MW]" in drawn
+    assert "measured" in drawn
+    assert "rival" not in drawn
+    bars = Chart("gain", [""], log_x=True).bars("gain", ["a", "b"], [2, 1], BLUE)
+    bars.points("best", [2], ["a"], BLUE)
+    assert draw_chart(bars, tmp_path / "bars.png").stat().st_size > 1000
