@@ -56,6 +56,11 @@ def html(text: str) -> str:
     return _html.escape(text)
 
 
+def unescape_html(text: str) -> str:
+    """What `html` was given."""
+    return _html.unescape(text)
+
+
 def script(data: Any) -> str:
     """JSON within a <script> element, which no text in it ends."""
     return json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace(

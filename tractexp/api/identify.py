@@ -804,7 +804,7 @@ class Identify(Task, call=identify):
         """Whether this run draws figures: as set, else in single runs."""
         return not job.of_many if self.figures is None else self.figures
 
-    def draw(self, job: Job, result: Identification) -> list[Path]:
+    def draw(self, job: Job, result: Any) -> list[Path]:
         """The page, the sheet, and the sheet as a document where that is asked for."""
         paths = super().draw(job, result)
         if self.document:

@@ -1,7 +1,6 @@
 """A chart as a picture for what runs no script: the same data as on a page, drawn by matplotlib."""
 
 import base64
-import html
 import io
 import itertools
 import re
@@ -12,6 +11,7 @@ import numpy as np
 
 from tractexp.blocks import style
 from tractexp.blocks.chart import Chart
+from tractexp.quoting import unescape_html
 
 WIDTH, PANEL_HEIGHT = 7.0, 1.25  # inches
 EQUATION_DPI = 200  # of one as PNG
@@ -38,14 +38,14 @@ def draw_chart(chart: Chart, path: Path) -> Path:
         )
         for k, (key, panel) in enumerate(zip(axes, panels, strict=True)):
             label = units["labels"][k] if units else layout[key]["title"]["text"]
-            panel.set_ylabel(html.unescape(label))
+            panel.set_ylabel(unescape_html(label))
             _scale(panel, layout[key], layout["xaxis"])
         factors = units.get("factors", [1.0] * len(axes))
         for trace in plain["data"]:
             if trace.get("visible") != "legendonly":
                 k = _number(trace["yaxis"].replace("y", "yaxis"))
                 _draw_trace(panels[k], trace, factors[k])
-        panels[-1].set_xlabel(html.unescape(layout["xaxis"]["title"]["text"]))
+        panels[-1].set_xlabel(unescape_html(layout["xaxis"]["title"]["text"]))
         _add_legend(figure, panels)
         return style.save(figure, path)
 
@@ -64,18 +64,18 @@ def _scale(panel: Any, vertical: dict[str, Any], horizontal: dict[str, Any]) -> 
     if vertical.get("autorange") == "reversed" or np.diff(vertical.get("range", [0, 1]))[0] < 0:
         panel.invert_yaxis()
     if "ticktext" in vertical:
-        panel.set_yticks(vertical["tickvals"], map(html.unescape, vertical["ticktext"]))
+        panel.set_yticks(vertical["tickvals"], map(unescape_html, vertical["ticktext"]))
     if "ticktext" in horizontal:
-        panel.set_xticks(horizontal["tickvals"], map(html.unescape, horizontal["ticktext"]))
+        panel.set_xticks(horizontal["tickvals"], map(unescape_html, horizontal["ticktext"]))
 
 
 def _draw_trace(panel: Any, trace: dict[str, Any], factor: float) -> None:
     """A curve, a band, marks or bars."""
     x, y = _values(trace["x"]), _values(trace["y"])
-    label = html.unescape(trace["name"]) if trace["showlegend"] else "_"
+    label = unescape_html(trace["name"]) if trace["showlegend"] else "_"
     line, marker = trace.get("line", {}), trace.get("marker", {})
     if trace["type"] == "bar":
-        panel.barh([html.unescape(str(name)) for name in y], x, color=marker["color"], label=label)
+        panel.barh([unescape_html(str(name)) for name in y], x, color=marker["color"], label=label)
     elif trace.get("mode") == "markers":
         panel.plot(x, y, "o", color=marker["color"], markersize=4, label=label)
     elif line.get("width") == 0:

@@ -117,7 +117,7 @@ def write_program(lowered: Lowered, integration: str) -> str:
     read = {symbol.name for symbol in lowered.inputs}
     if not read <= {*PHASOR_INPUTS}:
         raise UserError("a page has sliders for models in phasors, and this one is in waveforms")
-    solves = lowered.rest is not None and bool(lowered.states)
+    rest = lowered.rest if lowered.states else None
     event = tuple(Symbol(name, real=True) for name in EVENT)
     given = (*lowered.parameters, *(Symbol(name, real=True) for name in ("P0", "Q0")))
     before = (*given, *event)
@@ -130,10 +130,10 @@ def write_program(lowered: Lowered, integration: str) -> str:
         _write_function("renewal", moving, lowered.renewal),
         _write_function("output", moving, lowered.output),
     ]
-    if solves:
-        parts.append(_write_function("rest", (*before, *lowered.starts), lowered.rest))
+    if rest is not None:
+        parts.append(_write_function("rest", (*before, *lowered.starts), rest))
     sizes = {
-        "SOLVES": solves,
+        "SOLVES": rest is not None,
         "MOST_ITERATIONS": NEWTON_ITERATIONS,
         "DIFFERENCE": STATE_DIFFERENCE,
         "LEAST_MOVE": LARGEST_SETTLED_MOVE,

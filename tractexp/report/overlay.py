@@ -83,11 +83,15 @@ def currents(event: WaveEvent, overlay: Overlay) -> Chart:
 def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
     """What the record's estimator sees in the currents, calculated and recorded."""
     curves = [
-        (name, as_phasors(event, calculated), *look) for name, calculated, *look in _models(overlay)
+        (name, as_phasors(event, calculated), color, dash)
+        for name, calculated, color, dash in _models(overlay)
     ]
     return event_chart(
         curves[0][1][0],
-        [CalculatedCurve(name, np.stack(power), *look) for name, (_, *power), *look in curves],
+        [
+            CalculatedCurve(name, np.stack(power), color, dash)
+            for name, (_, *power), color, dash in curves
+        ],
     )
 
 
