@@ -13,7 +13,7 @@ from typing import Any
 
 import marked
 
-from tractexp import files
+from tractexp.storage import files
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -15,11 +15,11 @@ import sys
 
 import numpy as np
 
+from tractexp.configuration.plugin import build, get
 from tractexp.exchange.format import Identified
 from tractexp.identification.result import Result
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.plugin import build, get
 from tractexp_plugins.formats.andes import respond
 
 CAGES = {

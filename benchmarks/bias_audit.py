@@ -17,8 +17,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tractexp.configuration.plugin import build, discover
 from tractexp.identification.search import Limits, search
-from tractexp.plugin import build, discover
 
 DIMENSION, HALF_WIDTH, SHIFT = 10, 5.0, 1.0
 # of the shift: no diagonal of the box is favored

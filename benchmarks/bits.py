@@ -19,7 +19,7 @@ from pathlib import Path
 
 from processor import processor
 
-from tractexp import files
+from tractexp.storage import files
 
 SEARCHES = {
     "issa": ["optimizer=issa", "budget=5000"],
@@ -34,7 +34,7 @@ SIMULATED = """if True:
     import numpy as np
     from tractexp.model.drive import Drive, Excitation
     from tractexp.model.model import compose
-    from tractexp.plugin import get
+    from tractexp.configuration.plugin import get
     made = []
     for motor in ("electromechanical", "double_cage"):
         model = compose(get("model/motor", motor)(), get("model/static", "exponential")())

@@ -14,12 +14,12 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 
 import numpy as np  # noqa: E402
 
+from tractexp.configuration.plugin import get  # noqa: E402
 from tractexp.inference.catalogue import Catalogue, catalogue  # noqa: E402
 from tractexp.inference.injection import PUSHES  # noqa: E402
 from tractexp.inference.kernels import Family  # noqa: E402
 from tractexp.model.drive import Drive, Excitation  # noqa: E402
 from tractexp.model.model import Model, compose  # noqa: E402
-from tractexp.plugin import get  # noqa: E402
 from tractexp.record import Record, detect  # noqa: E402
 
 SAMPLES, STEP, SUBSTEPS, LANES, RUNS = 1000, 2e-3, 2, 224, 3

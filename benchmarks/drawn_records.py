@@ -13,11 +13,11 @@ import numpy as np
 import oracle  # noqa: F401
 
 from independent import Dip, Load, Machine, Recorder, Stall, Static, record
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.identification.result import parts
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
-from tractexp.plugin import build
 from tractexp.record import Event, Record, detect
 
 MODEL = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}}

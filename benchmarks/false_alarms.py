@@ -33,6 +33,7 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
     """The rank of the best effect among chance's draws, from 0 to 1, and p of what the base model
     leaves.
     """
+    from tractexp.configuration.plugin import get
     from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.disagreement import disagreement
     from tractexp.inference.base_fit import base_fit
@@ -41,7 +42,6 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
     from tractexp.inference.effort import Effort
     from tractexp.inference.records import Records
     from tractexp.model.model import compose
-    from tractexp.plugin import get
     from tractexp.record import Record, detect
 
     made = make(planned.make().case, planned.seed)[:FITTED]
@@ -88,7 +88,7 @@ def main() -> None:
     chosen = parser.parse_args()
     from joblib import Parallel, delayed
 
-    from tractexp import files
+    from tractexp.storage import files
 
     planned = [
         (noise, one)

@@ -37,7 +37,7 @@ import tractexp
 
 tractexp.__version__  # noqa: B018
 
-from tractexp import files  # noqa: E402
+from tractexp.storage import files  # noqa: E402
 
 STORED = Path(__file__).with_name("faults.json")
 SEARCH = ("optimizer=pso", "optimizer.population=20", "budget=200")
@@ -641,7 +641,7 @@ def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
 
     def investigates(folder: Path, kept: Path) -> Callable[[], int]:
         def act() -> int:
-            from tractexp import store
+            from tractexp.cache import store
 
             store.DESCENTS.folder = store.DRAWS.folder = kept
             return command(folder, *asked)
@@ -864,7 +864,7 @@ def ready() -> None:
     import tractexp.identification.estimate
     import tractexp.identification.profile
     import tractexp.report.identify  # noqa: F401
-    from tractexp.plugin import discover
+    from tractexp.configuration.plugin import discover
 
     discover()
 

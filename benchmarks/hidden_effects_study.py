@@ -125,10 +125,10 @@ def run(group: str, planned: cases.Planned, events: int, held: int) -> dict:
     """One data set investigated, its last `held` events kept for validation. What fails is a row
     with its message.
     """
+    from tractexp.configuration.plugin import discover, get
     from tractexp.discrepancy.investigate import investigate
     from tractexp.errors import UserError
     from tractexp.model.model import compose
-    from tractexp.plugin import discover, get
     from tractexp.record import Record, detect
 
     row = {
@@ -409,7 +409,7 @@ def main() -> None:
         return
     from joblib import Parallel, delayed
 
-    from tractexp import files
+    from tractexp.storage import files
 
     frozen = commit_of(chosen.frozen) if chosen.frozen else None
     salt = int(frozen[:12], 16) if frozen else None

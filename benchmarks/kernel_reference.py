@@ -22,13 +22,13 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
+from tractexp.configuration.plugin import discover, get
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.errors import UserError
 from tractexp.inference.injection import Injection
 from tractexp.model.drive import PHASORS, WAVES, Drive, Excitation, WaveformDrive
 from tractexp.model.model import Model, compose
 from tractexp.parameter import Parameter
-from tractexp.plugin import discover, get
 
 FILE = Path(__file__).parents[1] / "tests" / "model" / "kernel_reference.npz"
 # candidates; those whose responses are kept, of which each such sample

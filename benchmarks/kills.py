@@ -29,10 +29,10 @@ tractexp.__version__  # noqa: B018
 
 from run_machine import ended_at  # noqa: E402
 
-from tractexp import files  # noqa: E402
 from tractexp.__main__ import main as command  # noqa: E402
 from tractexp.api.task import Job  # noqa: E402
-from tractexp.run_folder import LOCK, settle  # noqa: E402
+from tractexp.storage import files  # noqa: E402
+from tractexp.storage.run_folder import LOCK, settle  # noqa: E402
 
 ALWAYS = ("tracking.enabled=false", "hydra.run.dir=run")
 IDENTIFY = ("optimizer=multistart_least_squares", "budget=200", *ALWAYS)

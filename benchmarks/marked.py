@@ -5,7 +5,7 @@ the script.
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from tractexp import files
+from tractexp.storage import files
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
+from tractexp.configuration.plugin import get
 from tractexp.model.drive import Drive, WaveformDrive
 from tractexp.model.model import compose
-from tractexp.plugin import get
 
 # 2.2 kW, 400 V, the machine of motulator's examples; torque [Nm] a little below its rated one.
 MACHINE = {

@@ -35,11 +35,11 @@ import made_pqdif  # noqa: E402
 import numpy as np  # noqa: E402
 from memory import peak, reset  # noqa: E402
 
-from tractexp import files  # noqa: E402
 from tractexp.errors import UserError  # noqa: E402
 from tractexp.filetypes import cev, comtrade  # noqa: E402
 from tractexp.record import reader_of  # noqa: E402
 from tractexp.recording import Channel, Recording, Segment, StatusChannel  # noqa: E402
+from tractexp.storage import files  # noqa: E402
 
 SECONDS, MEGABYTES = 5.0, 500.0
 LEAKS = re.compile(

@@ -32,9 +32,9 @@ tractexp.__version__  # noqa: B018
 import numpy as np  # noqa: E402
 from mutated_files import DAMAGE, LEAKS, NASTY, command  # noqa: E402
 
-from tractexp import files  # noqa: E402
-from tractexp.choices import CONF  # noqa: E402
+from tractexp.configuration.choices import CONF  # noqa: E402
 from tractexp.errors import UserError  # noqa: E402
+from tractexp.storage import files  # noqa: E402
 
 SECONDS = 10  # of processor time; a kernel that is compiled first takes half of it
 WORDS = re.compile(
@@ -271,8 +271,8 @@ def keys_of(arguments):
     from hydra import compose
     from omegaconf import OmegaConf
 
-    from tractexp.composition import leaves
-    from tractexp.overrides import overrides
+    from tractexp.configuration.composition import leaves
+    from tractexp.configuration.overrides import overrides
 
     whole = OmegaConf.to_container(compose("config", overrides(arguments)))
     keys = [key for key, _ in leaves(whole)]
@@ -298,10 +298,10 @@ def perform(arguments, folder):
 
     from tractexp.api.task import Job
     from tractexp.cli.chosen import collect_chosen_settings, refuse_unread
-    from tractexp.overrides import overrides
-    from tractexp.plugin import build
-    from tractexp.refusal import explain_errors
-    from tractexp.schema import check
+    from tractexp.configuration.overrides import overrides
+    from tractexp.configuration.plugin import build
+    from tractexp.configuration.refusal import explain_errors
+    from tractexp.configuration.schema import check
 
     with explain_errors():
         config = compose("config", overrides(arguments), return_hydra_config=True)
@@ -440,7 +440,7 @@ def prepared():
     from hydra import initialize_config_dir
     from hydra.core.global_hydra import GlobalHydra
 
-    from tractexp.config import register
+    from tractexp.sweep.hydra_groups import register
 
     register()
     GlobalHydra.instance().clear()

@@ -28,6 +28,7 @@ import oracle  # noqa: F401
 from hidden_effects import Case, Noise
 from hidden_effects.generator import Scene, scene
 from independent import Dip
+from tractexp.configuration.plugin import get
 from tractexp.discrepancy.investigate import Findings, investigate
 from tractexp.discrepancy.next_event import choose
 from tractexp.discrepancy.next_event.choose import NextEvent
@@ -35,7 +36,6 @@ from tractexp.discrepancy.next_event.imagined import ImaginedDip, imagine_dips
 from tractexp.domain import PHASORS
 from tractexp.inference.context import Context
 from tractexp.model.model import compose
-from tractexp.plugin import get
 from tractexp.record import Event, Record, detect
 
 TABLE = Path(__file__).with_suffix(".json")

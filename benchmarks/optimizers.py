@@ -36,10 +36,11 @@ import drawn_records
 import numpy as np
 import yaml
 
-from tractexp import files, provenance
+from tractexp.cache import provenance
+from tractexp.configuration.plugin import build
 from tractexp.identification.search import Limits, SearchResult, search
 from tractexp.inference.problem import Problem
-from tractexp.plugin import build
+from tractexp.storage import files
 from tractexp.studies.bbob import runs as bbob
 from tractexp.studies.comparison import floor
 from tractexp.studies.comparison.runs import SearchRun

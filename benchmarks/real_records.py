@@ -21,7 +21,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 import marked  # noqa: E402
 from model_error import RECORDS, SHARED  # noqa: E402
 
-from tractexp import files  # noqa: E402
+from tractexp.storage import files  # noqa: E402
 
 FIRST, LAST = "all but the last", "all but the first"  # dips that are fitted
 STORED = Path(__file__).with_suffix(".json")

@@ -18,8 +18,8 @@ import motulator_check
 import numpy as np
 
 import tractexp
+from tractexp.configuration.plugin import build
 from tractexp.exchange.format import Identified
-from tractexp.plugin import build
 from tractexp.record import Event, Record, detect
 from tractexp.record.phasor import measure
 from tractexp.record.record import Base

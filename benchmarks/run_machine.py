@@ -39,11 +39,12 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from tractexp import files, tracking
+from tractexp import tracking
 from tractexp.api.task import Job
 from tractexp.cli.again import build_repeat_command
 from tractexp.errors import UserError
-from tractexp.run_folder import CONFIGURATION, GOES, LOCK, NEXT, WHOLE, run_folder
+from tractexp.storage import files
+from tractexp.storage.run_folder import CONFIGURATION, GOES, LOCK, NEXT, WHOLE, run_folder
 from tractexp.tracking import TrackedRun, runfile, sync
 
 # of `os`: each changes what is on the disk

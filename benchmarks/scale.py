@@ -35,7 +35,7 @@ import numpy as np  # noqa: E402
 import survey  # noqa: E402
 import wave_records  # noqa: E402
 
-from tractexp import files  # noqa: E402
+from tractexp.storage import files  # noqa: E402
 
 STORED = Path(__file__).with_suffix(".json")
 PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"

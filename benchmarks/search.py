@@ -17,8 +17,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from tractexp.configuration.plugin import build, discover
 from tractexp.identification.search import Limits, search
-from tractexp.plugin import build, discover
 
 DIMENSION, POPULATION, EVALUATIONS = 7, 50, 15_000
 

@@ -27,10 +27,10 @@ import arithmetic
 import numpy as np
 import rivals
 
+from tractexp.configuration.plugin import build, get
 from tractexp.exchange.format import Identified
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
-from tractexp.plugin import build, get
 
 TRUTH = np.array([0.12, 0.25, 0.9, 0.006, 0.55, 1.4, 3.0])  # T', X', C, M, T_m, p_v, q_v
 SAMPLES, CANDIDATES, POPULATION, FEW = 1000, 200, 50, 8

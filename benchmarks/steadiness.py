@@ -19,9 +19,9 @@ import marked
 import numpy as np
 
 import tractexp
-from tractexp import files
 from tractexp.errors import UserError
 from tractexp.record import Base, Event, Record, detect
+from tractexp.storage import files
 
 SERIES, COUNT = 2026112702, 200  # seeds of these records, and so many of each kind and noise
 NOISES = (1e-3, 1e-2)

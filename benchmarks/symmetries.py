@@ -11,10 +11,10 @@ import functools
 
 import numpy as np
 
+from tractexp.configuration.plugin import get
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Motor
 from tractexp.parameter import Parameter
-from tractexp.plugin import get
 
 OMEGA = 2 * np.pi * 50
 HERE = "benchmarks/symmetries.py"

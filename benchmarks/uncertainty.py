@@ -122,18 +122,18 @@ def event(t: np.ndarray, U: np.ndarray, power: np.ndarray, name: str = "syntheti
 
 
 def model():
+    from tractexp.configuration.plugin import get
     from tractexp.model.model import compose
-    from tractexp.plugin import get
 
     return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
 
 
 def identified(load, events, seed: int = 0, starts: int = 3, bounds: dict | None = None):
     """Search and judgement as in `task=identify`: the values of Eq. (8), and the `Uncertainty`."""
+    from tractexp.configuration.plugin import get
     from tractexp.identification.profile import check_by_profiles
     from tractexp.identification.search import search
     from tractexp.inference.problem import Problem
-    from tractexp.plugin import get
 
     problem = Problem(load, events, bounds)
     optimizer = get("optimizer", "multistart_least_squares")(starts=starts)
@@ -341,10 +341,10 @@ def timing(repeats: int = 9) -> dict:
     """Seconds for fit, judgement and seven profiles of a record of 1,000 samples, the kernel
     loaded; medians.
     """
+    from tractexp.configuration.plugin import get
     from tractexp.identification.profile import profiles
     from tractexp.identification.search import search
     from tractexp.inference.problem import Problem
-    from tractexp.plugin import get
 
     load, (t, U) = model(), Shape(0.5).voltage()
     clean = printed(TYPICAL, t, U, 0.35)

@@ -24,12 +24,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import wave_records as waves
 from simulation import excitation
 
+from tractexp.configuration.plugin import get
 from tractexp.domain import domain_of
 from tractexp.identification.search import search
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
-from tractexp.plugin import get
 from tractexp.record import in_waves
 
 STORED = Path(__file__).with_suffix(".json")

@@ -143,13 +143,13 @@ def lengths(series: str, seed: int) -> dict:
 
 def told_at_truth(event, truth: dict[str, float]) -> dict[str, float]:
     """Relative standard errors at the true values, under the noise that the event shows there."""
+    from tractexp.configuration.plugin import get
     from tractexp.identification.estimate import noise_at
     from tractexp.identification.uncertainty import conclude
     from tractexp.inference.likelihood import Likelihood
     from tractexp.inference.observed import Observed
     from tractexp.inference.problem import Problem
     from tractexp.model.model import compose
-    from tractexp.plugin import get
 
     load = compose(
         get("model/motor", "stator_flux")(), get("model/static", "branch")(), domain="waves"

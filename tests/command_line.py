@@ -57,8 +57,9 @@ def as_it_was(environment):
     from hydra.core.global_hydra import GlobalHydra
     from hydra.core.hydra_config import HydraConfig
 
-    from tractexp import progress, provenance
+    from tractexp.configuration import run_command
     from tractexp.sweep import identity
+    from tractexp.text import progress
     from tractexp.tracking import process
 
     root, thresholds, handler = (
@@ -79,8 +80,8 @@ def as_it_was(environment):
         progress.console.cache_clear()
         GlobalHydra.instance().hydra = hydra
         HydraConfig.instance().cfg = None
-        provenance.remember_command([])
-        provenance._started.clear()
+        run_command.remember_command([])
+        run_command._started.clear()
         identity._file.cache_clear()
         signal.signal(signal.SIGTERM, handler)
         root.handlers[:], root.level = handlers, level

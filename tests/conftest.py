@@ -74,7 +74,7 @@ def registry_as_it_was():
     For files that register; plugins are discovered once in a process, and a unit test that needs
     none imports none.
     """
-    from tractexp.plugin import discover
+    from tractexp.configuration.plugin import discover
 
     registry = discover()
     kept = {group: dict(classes) for group, classes in registry.items()}

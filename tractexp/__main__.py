@@ -25,11 +25,12 @@ from collections.abc import Sequence
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
-from tractexp import credentials, interpreter  # noqa: E402
 from tractexp.errors import Stopped, UserError  # noqa: E402
-from tractexp.output import outlet  # noqa: E402
-from tractexp.progress import ask_for  # noqa: E402
-from tractexp.wording import one_line  # noqa: E402
+from tractexp.process import interpreter  # noqa: E402
+from tractexp.storage import credentials  # noqa: E402
+from tractexp.text.output import outlet  # noqa: E402
+from tractexp.text.progress import ask_for  # noqa: E402
+from tractexp.text.wording import one_line  # noqa: E402
 
 # what no single job that is logged has: maybe
 UNLOGGED = ("-", "tracking.enabled=", "task=export", "experiment=", "hydra.mode=")
@@ -40,7 +41,7 @@ COMMANDS = {  # beside the tasks: where each is
     "look": "tractexp.cli.look:look",
     "sync": "tractexp.cli.sync:sync",
     "doctor": "tractexp.cli.doctor:doctor",
-    "list": "tractexp.usage:print_choices",
+    "list": "tractexp.configuration.usage:print_choices",
     "new": "tractexp.cli.new:new",
 }
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
@@ -88,7 +89,7 @@ def _run_with_refusals(arguments: list[str]) -> int:
     except Exception as error:
         if traceback:
             raise
-        from tractexp.plugin import place_in_plugin
+        from tractexp.configuration.plugin import place_in_plugin
 
         place = place_in_plugin(error)
         whose = (
@@ -127,7 +128,7 @@ def _dispatch_command(arguments: list[str]) -> int:
         survey = choose_command(*arguments)
         return _run(survey) if survey else 0
     if {"--help", "-h"} & {*arguments}:
-        from tractexp.usage import usage
+        from tractexp.configuration.usage import usage
 
         print(usage())
         return 0
@@ -167,12 +168,12 @@ def _run(arguments: list[str]) -> int:
         start_ahead()
     import hydra
 
-    from tractexp.choices import CONF
     from tractexp.compat.hydra_versions import behavior
-    from tractexp.config import register
-    from tractexp.overrides import overrides
-    from tractexp.provenance import remember_command
-    from tractexp.refusal import explain_errors
+    from tractexp.configuration.choices import CONF
+    from tractexp.configuration.overrides import overrides
+    from tractexp.configuration.refusal import explain_errors
+    from tractexp.configuration.run_command import remember_command
+    from tractexp.sweep.hydra_groups import register
 
     register(arguments)
     remember_command(arguments)

@@ -14,11 +14,11 @@ from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any, ClassVar, Self, get_origin
 
-from tractexp import files
-from tractexp.blas import in_one_thread
 from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
-from tractexp.progress import say
+from tractexp.process.blas import in_one_thread
+from tractexp.storage import files
+from tractexp.text.progress import say
 
 MARK = "tractexp"  # the key by which a saved result is known
 COMPUTING = ("report", "predict", "write_results", "write_drawings")  # methods of results

@@ -8,10 +8,10 @@ import numpy as np
 from cases import Event
 
 import tractexp
+from tractexp.configuration.plugin import build
 from tractexp.identification.result import respond
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
-from tractexp.plugin import build
 from tractexp.record import Event as Dip
 
 FAILED = 1e6  # pu², of a load without a steady state

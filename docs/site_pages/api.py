@@ -4,7 +4,8 @@ import inspect
 from pathlib import Path
 
 import tractexp
-from tractexp import PUBLIC, extend, files
+from tractexp import PUBLIC, extend
+from tractexp.storage import files
 
 TITLE = """# Public calls
 

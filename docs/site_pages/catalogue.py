@@ -7,14 +7,14 @@ from pathlib import Path
 
 from site_pages import markdown, pictures
 from site_pages.markdown import folded, plain, table
-from tractexp import files
-from tractexp.choices import defaults, sentence
+from tractexp.configuration.choices import defaults, sentence
+from tractexp.configuration.plugin import Plugin, discover
 from tractexp.model import sites
 from tractexp.model.declaration import motor_alone
 from tractexp.model.parts import Effect, Motor, Part
 from tractexp.model.printed import list_changed_lines
 from tractexp.parameter import Parameter
-from tractexp.plugin import Plugin, discover
+from tractexp.storage import files
 
 GROUPS = {  # group of plugins: the title of its page, and how one of it is chosen
     "model/motor": ("Motors", "model/motor=NAME"),

@@ -4,8 +4,8 @@ import dataclasses
 from pathlib import Path
 
 from site_pages.markdown import plain, table
-from tractexp import files
 from tractexp.discrepancy.criteria import Criteria
+from tractexp.storage import files
 
 HEAD = """# Criteria
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from site_pages.markdown import plain, table
-from tractexp import files
 from tractexp.model.sites import SITES
+from tractexp.storage import files
 
 HEAD = """# Sites
 

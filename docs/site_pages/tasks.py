@@ -6,10 +6,10 @@ from pathlib import Path
 from site_pages import commands, markdown
 from site_pages.commands import Command
 from site_pages.markdown import plain, table
-from tractexp import files
 from tractexp.api.task import Task
-from tractexp.choices import defaults, sentence
-from tractexp.plugin import discover
+from tractexp.configuration.choices import defaults, sentence
+from tractexp.configuration.plugin import discover
+from tractexp.storage import files
 
 DOCS = Path(__file__).parents[1]
 MOST = 8  # examples on a page

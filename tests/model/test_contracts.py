@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tractexp.testing
+from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
 from tractexp.extend import (
     Connection,
@@ -19,7 +20,6 @@ from tractexp.extend import (
     plugin,
     sites,
 )
-from tractexp.plugin import get
 from tractexp.record.phasor import Averager
 from tractexp.testing import channels, loads, readers, searches
 

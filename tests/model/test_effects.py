@@ -9,12 +9,12 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 from scipy.optimize import fsolve, least_squares
 
+from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, sites
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive, Excitation, slopes
 from tractexp.model.model import compose
-from tractexp.plugin import discover, get
 from tractexp.record import Record, detect
 
 TRUTH = np.array([0.12, 0.25, 0.9, 0.006, 0.55, 1.4, 3.0])  # T', X', C, M, T_m, p_v, q_v

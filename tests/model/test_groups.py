@@ -7,12 +7,12 @@ import pytest
 from waves_of import dip, event
 
 import tractexp
+from tractexp.configuration.overrides import overrides
+from tractexp.configuration.plugin import build, get
 from tractexp.errors import UserError
 from tractexp.identification.result import parts
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.overrides import overrides
-from tractexp.plugin import build, get
 
 ONE = {
     "T_prime": 0.12,

@@ -12,6 +12,7 @@ import pytest
 import sympy
 from llvmlite import binding as llvm
 
+from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
 from tractexp.kernel import arrays, emit, listing, math, objects
 from tractexp.kernel.expressions import Expressions
@@ -24,7 +25,6 @@ from tractexp.kernel.stencil import Stencil
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.lowering import lower
 from tractexp.model.model import compose
-from tractexp.plugin import get
 
 X, Y = sympy.symbols("x y", real=True)
 

@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import Akima1DInterpolator
 
 import tractexp
+from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError
 from tractexp.kernel.layout import LANES
 from tractexp.model import operations
@@ -23,7 +24,6 @@ from tractexp.model.sites import SITES
 from tractexp.model.states import State
 from tractexp.model.symbols import phasor_parts, real_symbol, start_symbol, vector_symbol
 from tractexp.parameter import Parameter
-from tractexp.plugin import discover, get
 
 OMEGA_S = 2 * np.pi * 50
 TRUTH = np.array([0.12, 0.25, 0.9, 0.006, 0.55, 1.4, 3.0])  # T', X', C, M, T_m, p_v, q_v
@@ -273,7 +273,7 @@ def test_a_kernel_just_compiled_gives_the_bits_of_the_same_kernel_loaded(tmp_pat
         import numpy as np
         from tractexp.model.drive import Drive, Excitation
         from tractexp.model.model import ModelResponse, compose
-        from tractexp.plugin import get
+        from tractexp.configuration.plugin import get
         model = compose(get("model/motor", "double_cage")(), get("model/static", "exponential")())
         values = np.array([p.default for p in model.parameters]) * \
 np.linspace(0.95, 1.05, 20)[:, None]
@@ -389,7 +389,7 @@ def test_good_values_are_not_refused(model):
 
 def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
     program = (
-        "from tractexp.plugin import get; from tractexp.model.model import compose;"
+        "from tractexp.configuration.plugin import get; from tractexp.model.model import compose;"
         "m = compose(get('model/motor', 'electromechanical')(), get('model/static',"
         " 'exponential')());"
         "m.compile()"
@@ -403,7 +403,7 @@ def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
 
 
 def test_a_text_is_remembered_until_code_or_settings_change(tmp_path, monkeypatch):
-    from tractexp import texts
+    from tractexp.cache import texts
 
     monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path))
     motor, static = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
@@ -498,7 +498,7 @@ def test_whether_an_effect_fits_and_what_stands_before_an_event_are_remembered_w
     tmp_path,
 ):
     program = (
-        "import sys, numpy as np; from tractexp.plugin import discover, get; from"
+        "import sys, numpy as np; from tractexp.configuration.plugin import discover, get; from"
         " tractexp.model.model import compose;"
         "from tractexp.model.drive import Drive, Excitation;"
         "m = compose(get('model/motor', 'voltage')(), get('model/static', 'exponential')());"
@@ -546,7 +546,7 @@ def test_what_stands_before_an_event_is_what_the_equations_say(motor):
 def test_two_plugins_of_one_class_name_in_one_folder_have_sources_of_their_own(
     tmp_path, monkeypatch
 ):
-    from tractexp import texts
+    from tractexp.cache import texts
 
     monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path))
     made = []

@@ -10,9 +10,9 @@ from scipy.interpolate import Akima1DInterpolator
 
 from independent import Machine
 from independent.source import OMEGA
+from tractexp.configuration.plugin import discover, get
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.plugin import discover, get
 
 MOTORS = ("mechanical", "voltage", "electromechanical", "stator_flux", "double_cage")
 STATICS = (

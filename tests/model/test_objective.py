@@ -7,11 +7,11 @@ import pytest
 import uncertainty as study
 
 import tractexp
+from tractexp.configuration.plugin import build, get
 from tractexp.errors import UserError
 from tractexp.identification.search import search
 from tractexp.inference.problem import Problem
 from tractexp.parameter import even
-from tractexp.plugin import build, get
 
 
 def loss(name, **settings):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.configuration.plugin import get
 from tractexp.identification.estimate import held_to_usual
 from tractexp.inference.blocks import blocks_of
 from tractexp.inference.least_squares import descend
@@ -15,7 +16,6 @@ from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.prior import departures, held_in_words
 from tractexp.inference.problem import Problem
 from tractexp.inference.sandwich import scatter
-from tractexp.plugin import get
 
 # R_s, X_s, X_m, R_r, X_r, H, load factor of the seven types of the source
 TYPES = (

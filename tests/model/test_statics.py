@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from sympy import Piecewise
 
+from tractexp.configuration.plugin import build, get
 from tractexp.errors import UserError
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.model.parts import Static
 from tractexp.parameter import Parameter
-from tractexp.plugin import build, get
 from tractexp.record import Record, detect
 
 

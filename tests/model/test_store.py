@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tractexp import store, texts
+from tractexp.cache import store, texts
 from tractexp.errors import UserError
 from tractexp.kernel import objects, target
 
@@ -395,7 +395,8 @@ def test_in_the_place_of_a_usual_folder_that_is_not_the_users_own_comes_a_new_on
 @pytest.mark.parametrize("home", ["/dev/null/nobody", ""])
 def test_without_a_home_a_command_stores_kernels_until_it_ends(home):
     program = (
-        "import os, sys; from pathlib import Path; from tractexp.store import CODE, cache_folder\n"
+        "import os, sys; from pathlib import Path\n"
+        "from tractexp.cache.store import CODE, cache_folder\n"
         "if not sys.argv[1]:\n"
         "    def unknown(*_): raise RuntimeError\n"
         "    Path.home = unknown\n"  # as for a user that the system does not know

@@ -10,10 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
+from tractexp.configuration.plugin import discover, get
 from tractexp.kernel.layout import INPUTS, SMOOTH
 from tractexp.model.drive import WAVES, Drive
 from tractexp.model.model import compose
-from tractexp.plugin import discover, get
 from tractexp.testing import drives
 
 OMEGA_N, P0, Q0 = 100 * np.pi, drives.P0, drives.Q0

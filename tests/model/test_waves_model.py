@@ -11,11 +11,11 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from waves_of import OMEGA, dip, event, smooth, times, vector
 
+from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.plugin import discover, get
 
 MOTORS = ("stator_flux", "electromechanical", "double_cage", "voltage")
 STATICS = ("branch", "constant_impedance", "exponential", "zip", "constant_power", "none")

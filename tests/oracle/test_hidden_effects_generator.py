@@ -55,7 +55,7 @@ from hidden_effects.site import Response
 from hidden_effects.supply import Moment, Relay, Supply
 from independent import Dip, Load, Machine, Static, simulate
 from independent.source import OMEGA
-from tractexp.plugin import discover
+from tractexp.configuration.plugin import discover
 
 PACKAGE = Path(__file__).parent / "hidden_effects"
 LOAD = Load(

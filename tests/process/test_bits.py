@@ -15,7 +15,7 @@ BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 PAGE = Path(__file__).parents[2] / "docs" / "sweeps.md"
 DERIVED = """if True:
     from tractexp.model.model import compose
-    from tractexp.plugin import get
+    from tractexp.configuration.plugin import get
     effects = [get("effect", name)() for name in ("stator_resistance", "undervoltage_trip")]
     plain, extended = ("double_cage", "zip", ()), ("electromechanical", "exponential", effects)
     for motor, static, some in (plain, extended):

@@ -101,8 +101,8 @@ def test_the_main_job_writes_the_contracted_result(main_job):
 
 def test_the_objective_is_that_of_the_calculated_power(main_job):
     """Eq. (8) and Eq. (20) recomputed from predictions for the recorded voltage."""
+    from tractexp.configuration.plugin import build
     from tractexp.identification.result import load
-    from tractexp.plugin import build
     from tractexp.record import detect
 
     folder, _ = main_job
@@ -374,8 +374,8 @@ def test_the_help_is_short_narrow_and_tells_what_each_task_does(tmp_path):
 def test_the_list_tells_every_choice_as_it_is_registered_and_composed(tmp_path):
     from hydra import compose, initialize_config_dir
 
-    from tractexp.config import register
-    from tractexp.plugin import CONF, discover
+    from tractexp.configuration.plugin import CONF, discover
+    from tractexp.sweep.hydra_groups import register
 
     done = run_command("list", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")

@@ -24,9 +24,9 @@ from test_settings import check, hydra  # noqa: F401  a fixture of this module, 
 
 import tractexp
 from site_pages import commands
+from tractexp.configuration.overrides import overrides
+from tractexp.configuration.plugin import build
 from tractexp.filetypes.comtrade_writer import write
-from tractexp.overrides import overrides
-from tractexp.plugin import build
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -204,7 +204,7 @@ def model_of(folder: Path) -> Path:
 
 
 def modeled(folder: Path) -> object:
-    from tractexp.composition import read_choice
+    from tractexp.configuration.composition import read_choice
 
     return read_choice("model", str(folder / "m.yaml"))
 

@@ -17,12 +17,12 @@ from scipy.interpolate import Akima1DInterpolator
 import tractexp
 from tractexp.api.export import Exported
 from tractexp.api.identify import Identification
+from tractexp.configuration.plugin import build, discover
 from tractexp.errors import UserError
 from tractexp.exchange.circuit import TCircuit
 from tractexp.exchange.format import Identified
 from tractexp.exchange.playback import play_back_export
 from tractexp.model.drive import Drive, Excitation
-from tractexp.plugin import build, discover
 
 OMEGA = 2 * np.pi * 50
 VALUES = {

@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 
 import tractexp
-from tractexp import files
 from tractexp.errors import UserError
+from tractexp.storage import files
 
 ROOT = Path(__file__).parents[2]
-DOOR = ROOT / "tractexp" / "files.py"
+DOOR = ROOT / "tractexp" / "storage" / "files.py"
 WRITERS = {  # calls that make or change a file, whatever they are called on
     "write_text",
     "write_bytes",
@@ -111,7 +111,7 @@ def heard(event, told):
     writes = event == "open" and isinstance(told[2], int) and told[2] & (os.O_WRONLY | os.O_RDWR)
     if writes and sys.argv[1] in str(told[0]):
         frames = [f.filename for f in traceback.extract_stack()]
-        ours = any(name.endswith("tractexp/files.py") for name in frames)
+        ours = any(name.endswith("tractexp/storage/files.py") for name in frames)
         opened.add((os.path.basename(str(told[0])), ours))
 import tractexp
 motor = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55}
@@ -148,7 +148,7 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_half(tmp_path, monkeypatc
 def test_a_process_killed_while_it_writes_leaves_the_old_file(tmp_path):
     path = files.write(tmp_path / "a.txt", "old")
     script = """
-import os, sys; from tractexp import files
+import os, sys; from tractexp.storage import files
 os.replace = lambda *_: os._exit(9)
 files.write(sys.argv[1], 'new')"""
     assert subprocess.run([sys.executable, "-c", script, str(path)]).returncode == 9
@@ -192,7 +192,7 @@ def test_a_full_disk_is_nothing_for_what_is_printed(tmp_path):
 
 def test_a_lock_is_waited_for_no_longer_than_told(tmp_path):
     script = """
-import sys, time; from pathlib import Path; from tractexp import files
+import sys, time; from pathlib import Path; from tractexp.storage import files
 with files.lock_file(Path(sys.argv[1]), 1):
     print("held", flush=True); time.sleep(60)"""
     holder = subprocess.Popen(
@@ -317,15 +317,16 @@ PARSERS = {
     "pickle": {"load", "loads"},
     "OmegaConf": {"load"},
 }
-READ = {  # {module: {call: why it may}}; all else that is read goes through `tractexp/files.py`
-    "tractexp/choices.py": {
+# {module: {call: why it may}}; all else that is read goes through `tractexp/storage/files.py`
+READ = {
+    "tractexp/configuration/choices.py": {
         "read_text": "installed files",
         "yaml.safe_load": "installed files",
         "read_bytes": "code",
     },
     "tractexp/cli/look.py": {"yaml.safe_load": "a setting as it was typed"},
     "tractexp/cli/new/__init__.py": {"read_text": "an installed file"},
-    "tractexp/composition.py": {
+    "tractexp/configuration/composition.py": {
         "read_text": "installed files",
         "yaml.safe_load": "installed files",
     },
@@ -333,13 +334,13 @@ READ = {  # {module: {call: why it may}}; all else that is read goes through `tr
         "read_text": "an installed file",
         "read_bytes": "installed files",
     },
-    "tractexp/texts.py": {"read_bytes": "code"},
-    "tractexp/provenance.py": {"read_bytes": "code"},
+    "tractexp/cache/texts.py": {"read_bytes": "code"},
+    "tractexp/cache/provenance.py": {"read_bytes": "code"},
     "tractexp/model/model.py": {"json.loads": "the store, whose entries are its own"},
     "tractexp/kernel/kernel.py": {"json.loads": "the store"},
-    "tractexp/store.py": {"np.load": "the store; nothing is unpickled"},
+    "tractexp/cache/store.py": {"np.load": "the store; nothing is unpickled"},
     "tractexp/api/survey.py": {"json.loads": "entries with their sums"},
-    "tractexp/config.py": {"json.loads": "the store"},
+    "tractexp/sweep/hydra_groups.py": {"json.loads": "the store"},
     "tractexp/studies/search_store.py": {"json.loads": "the store"},
     "tractexp/sweep/job.py": {"json.loads": "its own text"},
     "tractexp/sweep/elsewhere.py": {"read_bytes": "a folder that it made for its own job"},
@@ -349,7 +350,7 @@ READ = {  # {module: {call: why it may}}; all else that is read goes through `tr
     "tractexp/filetypes/comtrade_samples.py": {
         "memmap": "numbers of a file that `files` has found to be ordinary"
     },
-    "tractexp/zip_archive.py": {"open": "files within an archive, for `files` alone"},
+    "tractexp/storage/zip_archive.py": {"open": "files within an archive, for `files` alone"},
     "tractexp/filetypes/table_text.py": {"loadtxt": "a text that `files` has read"},
     "tractexp/filetypes/workbook.py": {"pickle.load": "the process that it started"},
     "tractexp/tracking/owner.py": {"read_text": "the system's own files"},
@@ -383,7 +384,7 @@ def find_reading_calls(path: Path) -> set[str]:
 
 
 def test_one_door_reads_what_others_may_have_written():
-    """`tractexp/files.py`: it waits for no pipe, ends at a size, and counts what
+    """`tractexp/storage/files.py`: it waits for no pipe, ends at a size, and counts what
     aliases come to.
     """
     sources = {p for place in ("tractexp", "plugins") for p in (ROOT / place).rglob("*.py")} - {

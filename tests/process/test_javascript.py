@@ -7,13 +7,13 @@ import subprocess
 import numpy as np
 import pytest
 
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.kernel.javascript import write_program
 from tractexp.kernel.layout import PHASOR_INPUTS
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.lowering import lower
 from tractexp.model.model import compose
-from tractexp.plugin import build
 from tractexp.testing.loads import choose_active_size
 
 NODE = shutil.which("node")

@@ -16,11 +16,11 @@ from made_recordings import BASE, RATE, constant, recording, waves
 from pages import charts
 
 import tractexp
-import tractexp.progress
+import tractexp.text.progress
 from tractexp.blocks import style
+from tractexp.configuration.overrides import format_assignment, override
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
-from tractexp.overrides import format_assignment, override
 from tractexp.recording import StatusChannel
 from tractexp.recording.quality import spectrum
 from tractexp.recording.trace import half_cycle_rms
@@ -462,7 +462,7 @@ def test_stages_are_told_to_who_listens_and_to_a_log_after_two_seconds(
     assert told == [f"reading {station}", "measuring the quality of the channels"]
     tractexp.look(station)
     assert capsys.readouterr().out == ""
-    monkeypatch.setattr(tractexp.progress, "FIRST_LINE", 0.0)
+    monkeypatch.setattr(tractexp.text.progress, "FIRST_LINE", 0.0)
     tractexp.look(station)
     printed = capsys.readouterr()
     assert "measuring the quality" in printed.err

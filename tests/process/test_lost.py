@@ -192,7 +192,7 @@ def test_a_run_killed_with_its_result_whole_is_brought_in_from_its_folder_once(t
 
 
 def test_what_is_not_whole_or_has_not_its_places_yet_is_no_run_of_its_own(tmp_path, uri):
-    from tractexp.run_folder import NEXT, WHOLE
+    from tractexp.storage.run_folder import NEXT, WHOLE
 
     for place in (f"{NEXT}.17.abc", WHOLE):
         save(tmp_path / "run", run(place), uri, place=tmp_path / "run" / place)
@@ -202,11 +202,11 @@ def test_what_is_not_whole_or_has_not_its_places_yet_is_no_run_of_its_own(tmp_pa
 
 
 def test_a_run_that_is_at_work_logs_itself(tmp_path, uri):
-    from tractexp.run_folder import LOCK
+    from tractexp.storage.run_folder import LOCK
     from tractexp.tracking.sync import WORKS
 
     script = """
-import sys, time; from pathlib import Path; from tractexp.run_folder import hold
+import sys, time; from pathlib import Path; from tractexp.storage.run_folder import hold
 with hold(Path(sys.argv[1])):
     print("held", flush=True); time.sleep(60)"""
     save(tmp_path / "sweep", TrackedRun("e", "a sweep"), uri, sweep=True)

@@ -7,7 +7,7 @@ import pytest
 
 CELL = """
 import time
-from tractexp.progress import count_parts, report_search, tell_stages
+from tractexp.text.progress import count_parts, report_search, tell_stages
 
 with count_parts("searches", 3) as count:
     for _ in range(3):

@@ -12,7 +12,7 @@ import pytest
 from command_line import run_command
 
 import tractexp
-from tractexp.wording import epsilon, escape_text, one_line
+from tractexp.text.wording import epsilon, escape_text, one_line
 
 if os.name == "nt":
     pytest.skip("pipes and locales of a Unix", allow_module_level=True)

@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 from command_line import start_command
 
-from tractexp import plugin as framework
+from tractexp.configuration import plugin as framework
+from tractexp.configuration.plugin import CONF, Plugin, build, discover, get, plugin, schema
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import Optimizer
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Box, Parameter
-from tractexp.plugin import CONF, Plugin, build, discover, get, plugin, schema
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")
 
@@ -116,7 +116,7 @@ import pytest
 import tractexp.testing
 from tractexp.inference.injection import PERTURBATIONS, Injection
 from tractexp.model.model import compose
-from tractexp.plugin import discover, get
+from tractexp.configuration.plugin import discover, get
 
 TestDocumented = tractexp.testing.contract(
     "documented", {"tabbed": [{"files": ["dip.tsv"]}], "raw16": [{"path": "dip.raw16"}]}
@@ -567,7 +567,7 @@ def test_the_framework_names_no_plugin():
 
 def test_of_the_plugins_that_are_named_alone_the_files_are_imported():
     script = (
-        "import sys; from tractexp.plugin import get; get('optimizer', 'pso');"
+        "import sys; from tractexp.configuration.plugin import get; get('optimizer', 'pso');"
         " print(*(name for name in sys.modules if name.startswith('tractexp_plugins.optimizers.')))"
     )
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
@@ -576,7 +576,7 @@ def test_of_the_plugins_that_are_named_alone_the_files_are_imported():
 
 def test_what_can_be_chosen_is_known_without_importing_plugins_again(tmp_path):
     script = (
-        "import sys; from tractexp.config import register; register();"
+        "import sys; from tractexp.sweep.hydra_groups import register; register();"
         " print('tractexp_plugins.motors.electromechanical' in sys.modules)"
     )
     run = functools.partial(

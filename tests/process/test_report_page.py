@@ -84,8 +84,8 @@ def test_the_same_page_has_the_same_bytes(tmp_path, drawing):
 
 
 def test_every_equation_of_the_model_is_typeset(tmp_path):
+    from tractexp.configuration.plugin import build
     from tractexp.model.model import compose
-    from tractexp.plugin import build
 
     model = compose(
         build("model/motor", {"name": "electromechanical"}),

@@ -16,7 +16,7 @@ from tractexp.api.identify import Identification
 from tractexp.blocks import Table
 from tractexp.blocks.block import Report
 from tractexp.blocks.terminal import fold, show
-from tractexp.wording import shorten
+from tractexp.text.wording import shorten
 
 EXACT = ("optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false")
 

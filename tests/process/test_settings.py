@@ -8,11 +8,11 @@ import pytest
 from command_line import run_command, start_command
 
 from tractexp.api.task import Task
-from tractexp.choices import CONF
 from tractexp.cli.chosen import collect_chosen_settings, refuse_unread
-from tractexp.config import register
+from tractexp.configuration.choices import CONF
+from tractexp.configuration.plugin import build, discover
 from tractexp.errors import UserError
-from tractexp.plugin import build, discover
+from tractexp.sweep.hydra_groups import register
 
 EXPERIMENTS = sorted(path.stem for path in (CONF / "experiment").glob("*.yaml"))
 

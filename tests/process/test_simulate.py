@@ -7,9 +7,9 @@ import pytest
 from command_line import run_command
 
 from tractexp.api.simulate import chosen
+from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
 from tractexp.identification.result import Result, load
-from tractexp.plugin import get
 
 TRUTH = {
     "T_prime": 0.12,

@@ -10,10 +10,10 @@ import pytest
 
 from site_pages import api, catalogue, commands, criteria, markdown, tasks
 from tractexp import PUBLIC
+from tractexp.configuration.plugin import discover, get
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.extend import Effect, Parameter
 from tractexp.model.printed import list_changed_lines
-from tractexp.plugin import discover, get
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

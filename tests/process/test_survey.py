@@ -22,9 +22,9 @@ from made_recordings import constant, motor_dip, recording
 
 import tractexp
 from tractexp.api import surveying
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
-from tractexp.plugin import build
 from tractexp.recording import archive
 
 DEPTHS = {"shallow 1": 0.06, "deep 1": 0.5, "shallow 2": 0.08, "deep 2": 0.6, "shallow 3": 0.07}

@@ -74,7 +74,7 @@ def site(tmp_path_factory):
     (info / "entry_points.txt").write_text("[tractexp.plugins]\nfaulty = faulty\n")
     for name, body in PLUGINS.items():
         head = "import os, pathlib\nfrom tractexp.identification.optimizer import Optimizer\n"
-        head += "from tractexp.plugin import plugin\n"
+        head += "from tractexp.configuration.plugin import plugin\n"
         settings = "    odds: float = 0.5\n    marker: str = 'marker'\n    population: int = 20\n"
         text = (
             f'{head}\n@plugin\nclass Faulty(Optimizer):\n    """Fails.\n\n    Source: none.\n   '
@@ -357,7 +357,7 @@ def test_a_job_that_fails_when_it_is_done_again_leaves_the_earlier_result(
 
 @pytest.mark.parametrize("launcher", ["cores", "basic"])
 def test_another_sweeper_finds_a_folder_held_or_another_sweeps(launcher, tmp_path):
-    from tractexp.run_folder import hold
+    from tractexp.storage.run_folder import hold
 
     others = ("hydra/sweeper=basic", f"hydra/launcher={launcher}", "tracking.enabled=false", HERE)
     held = tmp_path / "sweep" / ("0" if launcher == "basic" else "")
@@ -621,7 +621,7 @@ def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(
 def test_workers_end_with_a_parent_that_is_killed():
     script = """
 import time
-from tractexp.workers import Workers
+from tractexp.process.workers import Workers
 for _ in Workers(1, apart=True).run_items(time.sleep, [0, 600], 2):
     print(flush=True)
 """
@@ -863,7 +863,7 @@ import pathlib, subprocess, sys
 from hydra.experimental.callback import Callback
 
 ASK = (
-    "from pathlib import Path; from tractexp.run_folder import find_holder;"
+    "from pathlib import Path; from tractexp.storage.run_folder import find_holder;"
     "print(find_holder(Path('sweep')).partition(' on ')[0])"
 )
 

@@ -11,11 +11,11 @@ from command_line import run_command
 
 import tractexp
 import tractexp.data
-from tractexp import files
 from tractexp.api.surveying import rows_of
 from tractexp.api.task import read_events
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
+from tractexp.storage import files
 
 if os.name == "nt":
     pytest.skip("there is no clock of a processor", allow_module_level=True)

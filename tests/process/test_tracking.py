@@ -22,7 +22,8 @@ import numpy as np
 import pytest
 from command_line import free_port, run_command
 
-from tractexp import provenance, tracking
+from tractexp import tracking
+from tractexp.cache import provenance
 from tractexp.errors import UserError
 from tractexp.tracking import TrackedRun, model, process, runfile
 from tractexp.tracking import store as tracking_store

@@ -191,7 +191,7 @@ def test_a_job_of_a_sweep_is_repeated_too(tmp_path, monkeypatch):
 
 
 def test_a_second_sweep_in_a_folder_says_who_holds_it(tmp_path):
-    from tractexp.run_folder import hold
+    from tractexp.storage.run_folder import hold
 
     sweep = ("-m", "seed=1,2", *QUICK[:2], "tracking.enabled=false", "hydra.sweep.dir=sweep")
     with hold(tmp_path / "sweep"):

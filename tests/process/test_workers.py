@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from tractexp import interpreter
 from tractexp.errors import UserError
-from tractexp.workers import BARREN, Workers
+from tractexp.process import interpreter
+from tractexp.process.workers import BARREN, Workers
 
 GROWING = """
 import sys
 import time
-from tractexp.workers import Workers
+from tractexp.process.workers import Workers
 
 def grow(k):  # past the 300 MB at which joblib lets a worker end; it looks once in a second
     sys.__dict__.setdefault("kept", []).append(b"x" * 150_000_000)

@@ -14,9 +14,9 @@ from made_recordings import constant
 from test_wave_input import columns, table
 
 import tractexp
+from tractexp.cache.provenance import digest
 from tractexp.errors import UserError
 from tractexp.exchange.format import Identified
-from tractexp.provenance import digest
 from tractexp.record import Base, OwnBase, WaveEvent, detect, in_waves, on_own_base
 from tractexp.record.own_base import convert_base
 from tractexp.tracking.model import Predictor

@@ -12,9 +12,9 @@ import pytest
 from command_line import run_command
 from pages import read
 
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.identification.search import Limits, search
-from tractexp.plugin import build
 from tractexp.studies.api.benchmark import BenchmarkResult
 from tractexp.studies.bbob import page as report
 from tractexp.studies.bbob import runs as bbob

@@ -481,7 +481,7 @@ def test_every_part_of_the_configuration_makes_a_problem_a_variant_or_neither():
     """A key of no part would be swept and pooled under one name, unseen."""
     import dataclasses
 
-    from tractexp.schema import Config
+    from tractexp.configuration.schema import Config
 
     assert {field.name for field in dataclasses.fields(Config)} == {*PROBLEM, *SETTINGS, *REST}
 
@@ -561,7 +561,7 @@ SHIPPED = {"data.name": "csv", "data.train": ["pkg://tractexp.data/tibet_50pct.c
 @pytest.fixture(scope="module")
 def problem():
     from tractexp.api.setup import Setup
-    from tractexp.plugin import build
+    from tractexp.configuration.plugin import build
     from tractexp.record import detect
 
     (record,) = build("data", {"name": "csv", "train": SHIPPED["data.train"]}).read().train

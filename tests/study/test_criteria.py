@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from test_discrepancy import FEW, base, events, steady
 
+from tractexp.configuration.plugin import get
 from tractexp.discrepancy import criteria, disagreement, judgement
 from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
 from tractexp.discrepancy.decide import decide, holds, needs_all_events
@@ -36,7 +37,6 @@ from tractexp.inference.noise_in_quiet import WALK_SEEN
 from tractexp.inference.score_test import Score
 from tractexp.noise.random_walk import Rest, find
 from tractexp.parameter import Box
-from tractexp.plugin import get
 
 
 def at_fit(c, p, names=(), fault_p=1.0, blur=0.0, left=1.0):

@@ -21,7 +21,8 @@ from screens import LINES, WIDTH, count_rows
 from written_out import dense_normal
 
 from hidden_effects import Case, Noise, Recorder, make, write
-from tractexp import store
+from tractexp.cache import store
+from tractexp.configuration.plugin import get
 from tractexp.discrepancy import explanations
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.criteria import Criteria
@@ -57,7 +58,6 @@ from tractexp.noise.quiet import estimate
 from tractexp.noise.random_walk import Load, RandomWalk, Rest
 from tractexp.noise.random_walk import find as wandering
 from tractexp.noise.voltage import smooth_voltage
-from tractexp.plugin import get
 from tractexp.record import Record, detect
 
 FEW = ("stator_resistance", "speed_dependent_torque", "exponential_recovery")

@@ -27,7 +27,7 @@ from tractexp.report.candidate_rows import (
     why_not_the_most_helpful,
 )
 from tractexp.report.events import BAND_DEVIATIONS
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 
 @pytest.fixture

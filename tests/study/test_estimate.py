@@ -139,7 +139,7 @@ def test_the_end_of_a_search_and_the_estimate_stand_in_one_table_with_a_word_whe
 
 
 def test_equal_numbers_have_equal_digests_and_others_have_not():
-    from tractexp.provenance import digest
+    from tractexp.cache.provenance import digest
 
     one, two = recorded().record, recorded(seed=6).record
     assert digest(one) == digest(replace(one, name="renamed"))
@@ -149,7 +149,7 @@ def test_equal_numbers_have_equal_digests_and_others_have_not():
 def test_a_commit_is_that_of_the_package_not_of_the_folder_one_stands_in(tmp_path, monkeypatch):
     import subprocess
 
-    from tractexp.provenance import commit
+    from tractexp.cache.provenance import commit
 
     subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
     assert commit(tmp_path) == ""  # a repository that does not keep these files

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from test_discrepancy import FAST, LOUD, base, bench, events
 
 import tractexp.discrepancy.investigate as investigating
+from tractexp.configuration.plugin import discover, get
 from tractexp.discrepancy import families, held_out, rival_sets
 from tractexp.discrepancy.all_events import AllEvents, JointFit
 from tractexp.discrepancy.criteria import Criteria
@@ -34,7 +35,6 @@ from tractexp.inference.injection import PUSHES
 from tractexp.inference.kernels import Family, Kernels
 from tractexp.inference.linearization import tangent
 from tractexp.model.declaration import Refused
-from tractexp.plugin import discover, get
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")
 

@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 from waves_of import dip, event, vector
 
 import tractexp
+from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
 from tractexp.model.drive import Drive
 from tractexp.model.model import compose
-from tractexp.plugin import get
 
 OMEGA, RATE, KV, MVA = 2 * np.pi * 50.0, 5000.0, 25.0, 10.0
 TRUTH = {

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.cache.provenance import digest
+from tractexp.configuration.plugin import build, get
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
-from tractexp.plugin import build, get
-from tractexp.provenance import digest
 from tractexp.record import Event, Record, detect
 from tractexp.record.dips import around
 

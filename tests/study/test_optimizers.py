@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import tractexp_plugins.optimizers as folder
+from tractexp.configuration.plugin import build, discover, schema
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import REFUSED, Box
 from tractexp.identification.search import Limits, search
-from tractexp.plugin import build, discover, schema
 
 CONF = Path(__file__).parents[2] / "conf"
 NAMES = sorted(

@@ -12,7 +12,7 @@ import optimizers
 import optimizers_tables
 import pytest
 
-from tractexp.plugin import build, discover, schema
+from tractexp.configuration.plugin import build, discover, schema
 from tractexp.studies.comparison.statistics import vargha_delaney
 
 STORED = json.loads(optimizers.STORED.read_text(encoding="utf-8"))

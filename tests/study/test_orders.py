@@ -11,11 +11,11 @@ from command_line import run_command
 from test_shipped_data import DATA
 
 import tractexp
-from tractexp.choices import set_holding
+from tractexp.configuration.choices import set_holding
+from tractexp.configuration.plugin import discover, get
 from tractexp.discrepancy.investigate import investigate
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.plugin import discover, get
 from tractexp.record import Record, detect
 from tractexp.record.window import average, averaged_power
 

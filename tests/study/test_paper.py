@@ -246,7 +246,7 @@ def test_generalise_writes_eq_21_of_the_model_it_identified(generalised):
     from scipy.integrate import solve_ivp
     from scipy.interpolate import Akima1DInterpolator
 
-    from tractexp.plugin import build
+    from tractexp.configuration.plugin import build
     from tractexp.record import detect
 
     content = json.loads((generalised[0] / "run" / "generalise.json").read_text())
@@ -336,7 +336,7 @@ def test_workers_change_no_result():
 @pytest.fixture
 def memory(tmp_path, monkeypatch):
     """A store of its own for searches, empty; the kernels are those of the others."""
-    from tractexp import store
+    from tractexp.cache import store
 
     monkeypatch.setattr(store.SEARCHES, "folder", tmp_path)
     return tmp_path / "searches"
@@ -376,7 +376,7 @@ def test_a_search_made_before_is_read_back_bit_for_bit(memory, monkeypatch):
 
 
 def test_a_search_of_anything_else_is_never_read_back(memory, monkeypatch):
-    from tractexp import provenance
+    from tractexp.cache import provenance
 
     searched(monkeypatch)
     assert searched(monkeypatch, settings={"population": 20})[1] == 2
@@ -389,7 +389,7 @@ def test_a_search_of_anything_else_is_never_read_back(memory, monkeypatch):
 
 
 def test_a_damaged_search_is_made_again_and_the_oldest_are_forgotten(memory, monkeypatch):
-    from tractexp import store
+    from tractexp.cache import store
 
     searched(monkeypatch)
     for k, path in enumerate(memory.iterdir()):
@@ -527,7 +527,7 @@ def test_only_the_literal_readings_search_the_model_as_it_is_printed(memory):
 @pytest.mark.parametrize("name", printed.READINGS)
 def test_a_reading_is_the_optimizer_of_its_name(name):
     from tractexp.api.arguments import Choice
-    from tractexp.plugin import build
+    from tractexp.configuration.plugin import build
 
     reading = printed.READINGS[name]
     chosen = (
@@ -542,10 +542,10 @@ def test_a_reading_is_the_optimizer_of_its_name(name):
 
 
 def _recipe(motor="electromechanical", shift=0.0, integration="classical", **known):
+    from tractexp.configuration.plugin import build
     from tractexp.identification.result import parts
     from tractexp.inference.problem import Problem
     from tractexp.model.model import compose
-    from tractexp.plugin import build
     from tractexp.record import detect
 
     node = {"motor": {"name": motor}, "static": {"name": "exponential"}, "integration": integration}
@@ -739,8 +739,8 @@ def test_every_experiment_composes_to_its_part(name):
 def composed(*overrides):
     from hydra import compose, initialize_config_dir
 
-    from tractexp.choices import CONF
-    from tractexp.config import register
+    from tractexp.configuration.choices import CONF
+    from tractexp.sweep.hydra_groups import register
 
     register()
     with initialize_config_dir(str(CONF), version_base="1.3"):

@@ -7,9 +7,9 @@ import pytest
 
 import tractexp
 from tractexp.api.compose import model_of
+from tractexp.configuration.plugin import get
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.plugin import get
 
 MACHINE = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55}
 STEP, FIELD = 5e-3, {"base_voltage": 27.5, "base_power": 20.0}

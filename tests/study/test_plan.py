@@ -15,6 +15,7 @@ from command_line import run_command
 from pages import charts, read, unpacked
 
 import tractexp as public
+from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.advice import advise
@@ -31,7 +32,6 @@ from tractexp.identification.profile import check_by_profiles
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
-from tractexp.plugin import get
 from tractexp.report.plan import marks
 
 GOOD = Adequacy(Grade.ADEQUATE, "the model describes this load: use it", 0.5)

@@ -13,6 +13,7 @@ import hidden_effects
 import tractexp
 from hidden_effects import Case, Recorder, make
 from tractexp.blocks import Report
+from tractexp.configuration.plugin import get
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import decide, find_predicting
 from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, PredictedError, SetEvidence
@@ -33,7 +34,6 @@ from tractexp.inference.records import Records
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.noise import Noise
-from tractexp.plugin import get
 from tractexp.record import Record, detect
 from tractexp.report.predicted import add_prediction_section
 

@@ -15,6 +15,7 @@ from nasty import NASTY
 
 import tractexp
 from hidden_effects import EFFECTS, Case, Noise, Recorder, make
+from tractexp.configuration.plugin import get
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement
 from tractexp.discrepancy.proposal import generate
@@ -47,7 +48,6 @@ from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import refit
 from tractexp.inference.records import Records
 from tractexp.model.model import compose
-from tractexp.plugin import get
 from tractexp.record import Record, detect
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")

@@ -7,11 +7,11 @@ import pytest
 
 import tractexp
 from tractexp.api.compose import model_of
+from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
 from tractexp.identification.race import AS_GOOD
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.plugin import get
 
 TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55}
 STATIC = {"p_v": 1.2, "q_v": 3.0}

@@ -10,13 +10,13 @@ from scipy.integrate import quad
 from test_discrepancy import FAST, base, events
 
 import tractexp
+from tractexp.configuration.plugin import chosen
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
 from tractexp.domain.excitation import phasors
 from tractexp.errors import UserError
 from tractexp.inference.recorder_window import RecorderWindow, windows_of
 from tractexp.model.drive import Drive
-from tractexp.plugin import chosen
 from tractexp.record.window import average
 
 

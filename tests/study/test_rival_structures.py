@@ -10,12 +10,12 @@ import uncertainty as study
 
 from hidden_effects import Case, Noise
 from hidden_effects.generator import make, truth
+from tractexp.configuration.plugin import get
 from tractexp.identification.estimate import estimate_without_search
 from tractexp.identification.rivals import RivalStructure, _structures, with_rivals
 from tractexp.identification.verdict import IDENTIFIED, WEAK
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
-from tractexp.plugin import get
 from tractexp.record import Record, detect
 
 SEED = 5

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tractexp import progress
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
 from tractexp.identification.polish import (
@@ -22,7 +22,7 @@ from tractexp.identification.polish import (
 )
 from tractexp.identification.search import Limits, search
 from tractexp.parameter import best_distinct
-from tractexp.plugin import build
+from tractexp.text import progress
 
 LOWER, UPPER = np.array([-2.0, 0.5, 100.0]), np.array([3.0, 0.75, 900.0])
 TRUTH = np.array([1.25, 0.6, 400.0])

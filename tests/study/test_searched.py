@@ -10,8 +10,8 @@ import pytest
 from command_line import run_command
 
 import tractexp
-from tractexp import files
 from tractexp.errors import UserError
+from tractexp.storage import files
 
 BRIEF = {"name": "pso", "population": 10}
 PLUGINS = {
@@ -170,7 +170,7 @@ def test_a_search_that_fails_is_a_row_with_the_reason_and_counts_as_the_worst(di
 
 
 def test_each_search_is_told_and_one_made_before_is_read_back(dip, tmp_path, monkeypatch):
-    from tractexp import store
+    from tractexp.cache import store
 
     monkeypatch.setattr(store.SEARCHES, "folder", tmp_path)
     told = []

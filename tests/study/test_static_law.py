@@ -5,10 +5,10 @@ power.
 import numpy as np
 import pytest
 
+from tractexp.configuration.plugin import get
 from tractexp.discrepancy.investigate import investigate
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.plugin import get
 from tractexp.record import Record, detect
 
 STEP, NOISE, Q0 = 5e-3, 1e-3, 0.6

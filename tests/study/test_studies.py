@@ -13,8 +13,8 @@ from test_compare import samples, write_sweep
 import tractexp
 from tractexp.api.arguments import Choice
 from tractexp.api.setup import Setup
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.plugin import build
 
 
 @pytest.fixture(scope="module")
@@ -229,7 +229,7 @@ def test_a_setup_poses_the_same_problem_after_travel(dips, model):
     )
     one = setup.problem
     middle = (one.lower + one.upper)[None] / 2
-    told = json.loads(json.dumps(tractexp.files.plain(setup.to_dict())))
+    told = json.loads(json.dumps(tractexp.storage.files.plain(setup.to_dict())))
     packed = pickle.dumps(setup)
     assert len(packed) < 3 * len(pickle.dumps([setup.train, setup.validate]))
     for back in (

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.configuration.plugin import get
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.plugin import get
 
 TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55}
 STEP = 5e-3

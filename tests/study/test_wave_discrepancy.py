@@ -14,6 +14,7 @@ import pytest
 from wave_records import case, events
 
 import tractexp
+from tractexp.configuration.plugin import get
 from tractexp.discrepancy.next_event.choose import next_event
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.proposal.propose import propose
@@ -23,7 +24,6 @@ from tractexp.inference.catalogue import catalogue
 from tractexp.inference.injection import Injection
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
-from tractexp.plugin import get
 from tractexp.record import in_waves
 from tractexp.report import overlay
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.configuration.plugin import get
 from tractexp.domain import WAVES, domain_of
 from tractexp.domain.playback import as_phasors, measure_unsteadiness
 from tractexp.errors import UserError
@@ -19,7 +20,6 @@ from tractexp.identification.adequacy import Grade
 from tractexp.identification.advice import advise, better_domain
 from tractexp.identification.plan import DipShape, forecast
 from tractexp.inference.problem import Problem
-from tractexp.plugin import get
 from tractexp.record import in_waves
 from tractexp.report.waves import Drawn, spectra, wave_chart
 

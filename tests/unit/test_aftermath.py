@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.provenance import digest
+from tractexp.cache.provenance import digest
 from tractexp.record import Record, detect
 
 BEGIN, END = 1.0, 1.15  # s, of the dip

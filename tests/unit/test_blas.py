@@ -4,7 +4,7 @@ import pytest
 from threadpoolctl import ThreadpoolController
 
 from tractexp.api.arguments import public
-from tractexp.blas import OF_PROCESS, in_one_thread, limit_threads
+from tractexp.process.blas import OF_PROCESS, in_one_thread, limit_threads
 
 
 @pytest.fixture

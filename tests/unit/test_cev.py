@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes import cev
-from tractexp.plugin import build
 from tractexp.record.reader import reader_of
 
 KILOVOLT, AMPERE, LAG, F, PER_CYCLE = 63.5, 200.0, np.deg2rad(30), 49.98, 32

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tractexp.api.read import record_from_dict, record_to_dict
+from tractexp.configuration.plugin import chosen
 from tractexp.errors import UserError
-from tractexp.plugin import chosen
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording import Channel, Feeder, Recording, Segment
 from tractexp.recording.measure import phasors_of

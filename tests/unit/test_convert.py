@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import tractexp
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.filetypes.sidecar import read_sidecar
@@ -21,7 +22,6 @@ from tractexp.filetypes.tidy import (
     write_record,
     write_recording,
 )
-from tractexp.plugin import build
 from tractexp.record import Base, Record
 from tractexp.record.window import Window
 from tractexp.recording import Channel, Recording, Segment, StatusChannel

@@ -16,7 +16,7 @@ from tractexp.errors import UserError
 from tractexp.inference import cores
 from tractexp.inference.cores import each_apart
 from tractexp.inference.effort import Effort
-from tractexp.workers import Workers
+from tractexp.process.workers import Workers
 
 forked = pytest.mark.skipif(not cores.FORKS, reason="processes are forked on Linux only")
 

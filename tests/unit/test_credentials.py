@@ -2,8 +2,8 @@
 
 import pytest
 
-from tractexp import credentials
 from tractexp.errors import UserError
+from tractexp.storage import credentials
 from tractexp.tracking import address
 from tractexp.tracking.store import open_store
 

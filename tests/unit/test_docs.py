@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from tractexp.api.discrepancy import Misfit
+from tractexp.configuration.plugin import discover
 from tractexp.exchange.operating_point import OperatingPoint
 from tractexp.identification.result import Result
-from tractexp.plugin import discover
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]

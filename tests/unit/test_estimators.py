@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_phasor import three_phase, waves
 
+from tractexp.configuration.plugin import chosen
 from tractexp.errors import UserError
-from tractexp.plugin import chosen
 from tractexp.record import Window
 from tractexp.record.phasor import measure
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.configuration.plugin import chosen
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.plugin import chosen
 from tractexp.recording import Channel, Recording, Segment
 
 RATE = 3200.0

@@ -104,7 +104,9 @@ def test_plugins_of_ours_import_what_a_plugin_of_others_may():
 
 
 def test_one_module_starts_another_python():
-    """`tractexp/interpreter.py`: with -P, so that a module beside the records is never imported."""
+    """`tractexp/process/interpreter.py`: with -P, so that a module beside the records is never
+    imported.
+    """
     sources = [*PACKAGE.rglob("*.py"), *(ROOT / "plugins").rglob("*.py")]
     named = {
         str(path.relative_to(ROOT))
@@ -115,7 +117,7 @@ def test_one_module_starts_another_python():
     # a script that needs no other module of ours, and what may be another program's Python: both
     # say -P themselves
     assert named == {
-        "tractexp/interpreter.py",
+        "tractexp/process/interpreter.py",
         "tractexp/filetypes/workbook.py",
         "plugins/formats/andes.py",
     }
@@ -124,13 +126,13 @@ def test_one_module_starts_another_python():
 
 
 def test_one_module_quotes():
-    """`tractexp/quoting.py`: what quotes for a language elsewhere would be a second door."""
+    """`tractexp/text/quoting.py`: what quotes for a language elsewhere would be a second door."""
     sources = [*PACKAGE.rglob("*.py"), *(ROOT / "plugins").rglob("*.py")]
     imports = {
         f"{path.relative_to(ROOT)}: {name}"
         for path in sources
         for name, _ in modules(path)
-        if name.split(".")[0] in ("html", "shlex") and path != PACKAGE / "quoting.py"
+        if name.split(".")[0] in ("html", "shlex") and path != PACKAGE / "text" / "quoting.py"
     }
     assert imports == set()
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from field_waves import KA, KV, load, noise, phases, recording, wave
 
+from tractexp.configuration.plugin import build
 from tractexp.filetypes import comtrade, comtrade_samples
-from tractexp.plugin import build
 from tractexp.recording import Feeder
 from tractexp.recording.excursion import SLIDING, _inside
 from tractexp.recording.measure import FeederWaves, phasors_of

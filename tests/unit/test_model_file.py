@@ -5,12 +5,12 @@ a sentence.
 import pytest
 
 import tractexp
-from tractexp.composition import read_choice
+from tractexp.configuration.composition import read_choice
+from tractexp.configuration.model_file import LARGEST, read_model_file
+from tractexp.configuration.overrides import overrides
+from tractexp.configuration.repeatable import refusal
 from tractexp.errors import UserError
-from tractexp.files import DEEPEST
-from tractexp.model_file import LARGEST, read_model_file
-from tractexp.overrides import overrides
-from tractexp.repeatable import refusal
+from tractexp.storage.files import DEEPEST
 
 GOOD = """\
 # A comment, and @package hydra within it

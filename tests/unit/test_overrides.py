@@ -9,14 +9,14 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from nasty import NASTY
 from omegaconf import OmegaConf
 
-from tractexp.errors import UserError
-from tractexp.overrides import (
+from tractexp.configuration.overrides import (
     build_typed_command,
     format_assignment,
     override,
     overrides,
     survey_of,
 )
+from tractexp.errors import UserError
 
 FILES = [
     "站北.cfg",

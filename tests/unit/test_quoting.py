@@ -18,7 +18,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from nasty import NASTY
 from omegaconf import OmegaConf
 
-from tractexp import quoting
+from tractexp.text import quoting
 
 
 @pytest.mark.parametrize("name", NASTY)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.plugin import build
 from tractexp.record import detect, find_dips
 from tractexp.record.phasor import measure
 

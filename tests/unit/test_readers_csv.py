@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.plugin import build
 from tractexp.record import detect
 
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from tractexp import plugin as plugins
 from tractexp.api.look import Look
 from tractexp.api.task import Task
+from tractexp.configuration import plugin as plugins
 from tractexp.exchange.format import Format
 from tractexp.extend import Box, Channel, Effect, Reader, Static, WaveformReader
 from tractexp.model.equations import Equations

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from tractexp import files, run_folder
 from tractexp.errors import UserError
-from tractexp.run_folder import CONFIGURATION, LOCK, WHOLE, settle
+from tractexp.storage import files, run_folder
+from tractexp.storage.run_folder import CONFIGURATION, LOCK, WHOLE, settle
 
 # of `os`: each changes what is on the disk
 CALLS = ("replace", "mkdir", "unlink", "rmdir", "open", "fsync")
@@ -142,7 +142,8 @@ def test_a_second_run_says_who_holds_the_folder_and_changes_nothing(earlier):
     before = state(earlier)
     with run_folder.run_folder(earlier, configured(2), frozenset()):
         code = (
-            "import sys; from pathlib import Path; from tractexp.run_folder import run_folder\n"
+            "import sys; from pathlib import Path\n"
+            "from tractexp.storage.run_folder import run_folder\n"
             "with run_folder(Path(sys.argv[1]), {}, frozenset()): pass"
         )
         done = subprocess.run(

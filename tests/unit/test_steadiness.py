@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.cache.provenance import digest
 from tractexp.errors import UserError
-from tractexp.provenance import digest
 from tractexp.record import Record, detect
 
 BEGIN, END = 2.0, 2.15  # s, of the dip

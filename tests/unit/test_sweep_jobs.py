@@ -14,7 +14,6 @@ from pathlib import Path
 import pytest
 
 from tractexp.errors import UserError
-from tractexp.progress import FIRST_LINE
 from tractexp.sweep import launcher, progress, recorder
 from tractexp.sweep.elsewhere import Delivery, unpack_job
 from tractexp.sweep.job import SweepJob, find_shared_overrides, read_shared_events
@@ -30,6 +29,7 @@ from tractexp.sweep.status import (
     read,
     select_returned_metrics,
 )
+from tractexp.text.progress import FIRST_LINE
 from tractexp.tracking import TrackedRun, runfile
 from tractexp.tracking.sweepfile import folder_of
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes.cells import find_group_mark, numbers
 from tractexp.filetypes.clock import times
-from tractexp.plugin import build
 from tractexp.record import detect
 
 START = dt.datetime(2024, 3, 1, 10, 15, 30)

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes.tabulated import kind_of
-from tractexp.plugin import build
 from tractexp.record import detect
 
 RATE = 200.0

@@ -2,7 +2,14 @@
 
 import pytest
 
-from tractexp.wording import alternatives, in_words, join_words, list_figures, percent, with_error
+from tractexp.text.wording import (
+    alternatives,
+    in_words,
+    join_words,
+    list_figures,
+    percent,
+    with_error,
+)
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ import pytest
 
 import tractexp
 import tractexp.data
-from tractexp import files, zip_archive
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.plugin import build
+from tractexp.storage import files, zip_archive
 
 DATA = Path(tractexp.data.__file__).parent
 TABLE, CFG, DAT = (
@@ -103,7 +103,7 @@ def test_a_survey_reads_what_is_in_a_zip(pack, folder):
         f"{above}south.csv",
     ]
     assert all(row["worth"] for row in made.content["rows"])
-    from tractexp.plugin import build
+    from tractexp.configuration.plugin import build
 
     names = [row["event"] for row in made.content["rows"]]
     assert len(build("data", {"name": "archive", "path": folder, "train": names}).read().train) == 2

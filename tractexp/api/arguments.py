@@ -9,13 +9,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar, get_type_hints
 
-from tractexp import plugin
-from tractexp.blas import limit_threads
-from tractexp.choices import defaults
-from tractexp.composition import read_choice
+from tractexp.configuration import plugin
+from tractexp.configuration.choices import defaults
+from tractexp.configuration.composition import read_choice
+from tractexp.configuration.kinds import check_kind
 from tractexp.errors import UserError, among, check_distinct, settings_as
-from tractexp.kinds import check_kind
 from tractexp.outcome import Plain
+from tractexp.process.blas import limit_threads
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -10,14 +10,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tractexp import quoting
 from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Table
-from tractexp.choices import choices, defaults, read_replacements
-from tractexp.composition import read_choice
+from tractexp.configuration.choices import choices, defaults, read_replacements
+from tractexp.configuration.composition import read_choice
+from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError, among, check_choice, setting
 from tractexp.outcome import Plain, Tabulated
-from tractexp.plugin import discover, get
+from tractexp.text import quoting
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model

@@ -10,16 +10,16 @@ from tractexp.api.read import GROUP, node_of
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
+from tractexp.configuration.plugin import build, discover, plugin
 from tractexp.errors import TASK, UserError, check_choice
-from tractexp.files import limit_time
 from tractexp.filetypes.tidy import unique
 from tractexp.outcome import Tabulated
-from tractexp.plugin import build, discover, plugin
-from tractexp.progress import console
 from tractexp.record import Event, Reader, Record
 from tractexp.recording import Recording, Writer
 from tractexp.recording.cut import cut_recording
 from tractexp.recording.reader import WaveformReader
+from tractexp.storage.files import limit_time
+from tractexp.text.progress import console
 
 WHAT = ("recording", "events")
 # s of waveforms kept about a dip's record, for the windows of its first and last phasors

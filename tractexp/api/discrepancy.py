@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp import files, quoting
 from tractexp.api.arguments import Choice, public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
@@ -23,16 +22,18 @@ from tractexp.api.response import Response
 from tractexp.api.setup import Given, describe_records
 from tractexp.api.task import Job, Task, print_result, print_written
 from tractexp.blocks import Report, Table
+from tractexp.configuration.plugin import get, plugin
+from tractexp.configuration.run_command import build_again_command
 from tractexp.errors import MODEL, UserError, check_range
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.result import Result, conclude, refuse_failed
 from tractexp.identification.search import History, SearchResult, search
 from tractexp.inference.problem import Problem
 from tractexp.outcome import Written
-from tractexp.plugin import get, plugin
-from tractexp.progress import Progress, say, tell_stages
-from tractexp.provenance import build_again_command
-from tractexp.wording import join_words, shorten, shown_in_words, with_error
+from tractexp.storage import files
+from tractexp.text import quoting
+from tractexp.text.progress import Progress, say, tell_stages
+from tractexp.text.wording import join_words, shorten, shown_in_words, with_error
 
 NEXT = "next: "
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.read import Dips, read
+from tractexp.storage import files
 
 SHIPPED = [f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (50, 30, 65)]
 

@@ -4,19 +4,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.configuration.plugin import build, plugin
+from tractexp.configuration.run_command import build_again_command
 from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.result import load
 from tractexp.outcome import Outcome
-from tractexp.plugin import build, plugin
-from tractexp.progress import say
-from tractexp.provenance import build_again_command
 from tractexp.record.identity import describe_identities
+from tractexp.storage import files
+from tractexp.text.progress import say
 
 if TYPE_CHECKING:
     from tractexp.exchange.format import Identified

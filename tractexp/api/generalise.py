@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.api.arguments import Choice, public
 from tractexp.api.setup import Setup
 from tractexp.api.task import SEARCH, Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.configuration.plugin import build, plugin
 from tractexp.errors import DATA, UserError, check_range, setting
 from tractexp.outcome import Drawing, Written
-from tractexp.plugin import build, plugin
-from tractexp.progress import Progress, tell
+from tractexp.storage import files
+from tractexp.text.progress import Progress, tell
 
 if TYPE_CHECKING:
     from tractexp.identification.result import Fit, Result

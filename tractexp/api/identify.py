@@ -16,7 +16,9 @@ from tractexp.api.response import Response, respond_to
 from tractexp.api.setup import Setup
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.choices import set_holding
+from tractexp.configuration.choices import set_holding
+from tractexp.configuration.plugin import plugin
+from tractexp.configuration.run_command import build_again_command, build_folder_command
 from tractexp.errors import TASK, Stopped, UserError, among
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.result import Result, by_event, conclude, play, refuse_failed
@@ -25,11 +27,9 @@ from tractexp.inference.model_error import ModelError
 from tractexp.inference.prior import departures
 from tractexp.inference.problem import Problem
 from tractexp.outcome import Drawing, Written
-from tractexp.plugin import plugin
-from tractexp.progress import Progress, counter, tell
-from tractexp.provenance import build_again_command, build_folder_command
 from tractexp.record import OwnBase
-from tractexp.wording import epsilon, join_words
+from tractexp.text.progress import Progress, counter, tell
+from tractexp.text.wording import epsilon, join_words
 
 if TYPE_CHECKING:
     from tractexp.exchange.operating_point import OperatingPoint

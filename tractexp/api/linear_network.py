@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tractexp import files, provenance, quoting
 from tractexp.api.arguments import public
 from tractexp.api.compose import DOMAIN
 from tractexp.api.read import Dips, dips_of, dips_together
@@ -15,13 +14,16 @@ from tractexp.api.response import Response, response_of
 from tractexp.api.setup import describe_records
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.choices import choices, defaults
+from tractexp.cache import provenance
+from tractexp.configuration.choices import choices, defaults
+from tractexp.configuration.plugin import plugin
 from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Written
-from tractexp.plugin import plugin
-from tractexp.progress import tell
 from tractexp.record import Event, OwnBase
 from tractexp.record.identity import Identity
+from tractexp.storage import files
+from tractexp.text import quoting
+from tractexp.text.progress import tell
 
 if TYPE_CHECKING:
     from tractexp.identification.linear_network import BlackBox

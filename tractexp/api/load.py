@@ -3,10 +3,10 @@
 import importlib.util
 from pathlib import Path
 
-from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.errors import UserError, among
 from tractexp.outcome import MARK, Outcome, read_saved_result
+from tractexp.storage import files
 
 
 @public

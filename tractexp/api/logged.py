@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp import quoting
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.search import REFUSED
+from tractexp.text import quoting
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Estimate, Identification

@@ -11,14 +11,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from tractexp import files, plugin
 from tractexp.api.arguments import public
 from tractexp.api.read import node_of, record_from_dict, record_to_dict, table
 from tractexp.blocks import Report, Table
+from tractexp.configuration import plugin
+from tractexp.configuration.overrides import build_typed_command
 from tractexp.errors import UserError
 from tractexp.outcome import Tabulated, Written
-from tractexp.overrides import build_typed_command
-from tractexp.progress import Progress, tell_stages
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, describe_smearing
 from tractexp.recording.event_views import join_event, propose_joining
@@ -26,7 +25,9 @@ from tractexp.recording.feeder import can_be_named, explain_unrecognized
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
 from tractexp.recording.railway import direct_voltage
 from tractexp.recording.recording import unit_of
-from tractexp.wording import count_noun
+from tractexp.storage import files
+from tractexp.text.progress import Progress, tell_stages
+from tractexp.text.wording import count_noun
 
 NAME_THEM = "name the channels of one load: voltages=[...] currents=[...]"
 # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tractexp import files
 from tractexp.api.setup import Setup
 from tractexp.blocks import Report, Table
 from tractexp.errors import MODEL, TASK, UserError, setting
 from tractexp.outcome import Written
-from tractexp.progress import Progress, tell_stages
 from tractexp.record.identity import title_of
+from tractexp.storage import files
+from tractexp.text.progress import Progress, tell_stages
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.next_event.choose import NextEvent

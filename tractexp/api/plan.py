@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
 from tractexp.api.next_event import Recommended, recommend_event
 from tractexp.api.setup import Setup
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.configuration.plugin import plugin
 from tractexp.errors import MODEL, TASK, UserError, check_range, setting
 from tractexp.identification import plan as planning
 from tractexp.identification.adequacy import Grade
@@ -25,10 +25,10 @@ from tractexp.identification.result import Result, load, play
 from tractexp.inference.model_error import ModelError, in_percent, model_error
 from tractexp.noise import Noise
 from tractexp.outcome import Written
-from tractexp.plugin import plugin
 from tractexp.record import Event
 from tractexp.report import plan as shown
 from tractexp.report.plan import DEPTH, DURATION, JUMP, RATE, UNBALANCE, Planned, rest
+from tractexp.storage import files
 
 DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
 GRIDS = {  # of what only some domains' dips have: degrees, negative sequence over the depth

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.configuration.plugin import plugin
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Written
-from tractexp.plugin import plugin
-from tractexp.progress import counter
+from tractexp.storage import files
+from tractexp.text.progress import counter
 
 if TYPE_CHECKING:
     from tractexp.identification.posterior import PosteriorSample

@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.configuration.plugin import plugin
 from tractexp.errors import check_range
 from tractexp.identification.result import Result
 from tractexp.outcome import Written
-from tractexp.plugin import plugin
-from tractexp.progress import counter
+from tractexp.storage import files
+from tractexp.text.progress import counter
 
 if TYPE_CHECKING:
     from tractexp.identification.profile import Profiles

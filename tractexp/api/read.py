@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Report, Table
-from tractexp.composition import choices
+from tractexp.configuration.composition import choices
 from tractexp.errors import UserError, among
 from tractexp.outcome import Plain, Tabulated
 from tractexp.record import (
@@ -27,7 +26,8 @@ from tractexp.record import (
 from tractexp.record.angle import unwrap_angle
 from tractexp.record.dips import around
 from tractexp.recording.event_views import settings_of
-from tractexp.wording import count_noun
+from tractexp.storage import files
+from tractexp.text.wording import count_noun
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2", "U_angle")
 GROUP = "data"

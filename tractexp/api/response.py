@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.record import Event, OwnBase
-from tractexp.wording import epsilon
+from tractexp.storage import files
+from tractexp.text.wording import epsilon
 
 if TYPE_CHECKING:
     from tractexp.identification.result import Fit

@@ -11,13 +11,13 @@ from tractexp.api.arguments import Choice
 from tractexp.api.compose import LoadModel, Portable, model_of
 from tractexp.api.read import Dips, dips_together
 from tractexp.api.task import OF_MODEL
+from tractexp.configuration.schema import LEAST
 from tractexp.errors import check_range
 from tractexp.outcome import Plain
-from tractexp.progress import Progress, report_search
 from tractexp.record import Event, describe
 from tractexp.record.identity import Identity
-from tractexp.schema import LEAST
-from tractexp.wording import shown_in_words
+from tractexp.text.progress import Progress, report_search
+from tractexp.text.wording import shown_in_words
 
 if TYPE_CHECKING:
     from tractexp.identification.search import Limits, SearchResult

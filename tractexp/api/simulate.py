@@ -14,11 +14,11 @@ from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.api.task import LOAD, Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.configuration.plugin import plugin
 from tractexp.domain import domain_of
 from tractexp.errors import TASK, UserError, among, check_range, setting
 from tractexp.identification.result import load
 from tractexp.outcome import Drawing, Written
-from tractexp.plugin import plugin
 
 # a dip by hand, where nothing else is known
 BEFORE = {"U0": 1.0, "P0": 1.0, "Q0": 0.5, "frequency": 50.0}

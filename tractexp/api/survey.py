@@ -8,23 +8,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tractexp import files, quoting
 from tractexp.api.arguments import public
 from tractexp.api.look import Listed
 from tractexp.api.surveying import keys, look_at_files
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.cache.store import Store
+from tractexp.configuration.overrides import build_typed_command
+from tractexp.configuration.plugin import discover, get, plugin
 from tractexp.errors import DATA, UserError, check_range
 from tractexp.outcome import Written
-from tractexp.overrides import build_typed_command
-from tractexp.plugin import discover, get, plugin
-from tractexp.progress import Progress, count_parts, tell_stages
 from tractexp.record import detect
 from tractexp.recording import archive
 from tractexp.recording.record_files import find_records
 from tractexp.report import survey as shown
 from tractexp.report.survey import UNREAD
-from tractexp.store import Store
+from tractexp.storage import files
+from tractexp.text import quoting
+from tractexp.text.progress import Progress, count_parts, tell_stages
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import ChosenEvent

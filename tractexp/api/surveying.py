@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.api.look import command, event_row, hide_secondary, series
+from tractexp.cache.store import key
 from tractexp.errors import UserError
+from tractexp.process.workers import Workers
 from tractexp.recording import archive
 from tractexp.recording.event_views import list_within, propose_joining, shows_load
 from tractexp.recording.overview import LoadEvent, Sight, View
 from tractexp.report.look import describe_dead_phases
 from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
-from tractexp.store import key
-from tractexp.workers import Workers
+from tractexp.storage import files
 
 Rows = list[dict[str, Any]]
 

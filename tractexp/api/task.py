@@ -13,13 +13,14 @@ from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar, Union, get_args, get_origin
 
-from tractexp import provenance, quoting
 from tractexp.blocks.terminal import show
+from tractexp.cache import provenance
+from tractexp.configuration.plugin import Plugin, build, get
 from tractexp.errors import UserError
 from tractexp.outcome import Written
-from tractexp.plugin import Plugin, build, get
-from tractexp.progress import console, is_everything_asked, say, text_width
-from tractexp.run_folder import Write
+from tractexp.storage.run_folder import Write
+from tractexp.text import quoting
+from tractexp.text.progress import console, is_everything_asked, say, text_width
 
 if TYPE_CHECKING:
     from tractexp.record.identity import Identity

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tractexp import files
 from tractexp.errors import UserError, check_choice
+from tractexp.storage import files
 
 if TYPE_CHECKING:
     from tractexp.blocks.chart import Chart

@@ -16,8 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tractexp import files, quoting, store
 from tractexp.blocks import plotly, style
+from tractexp.cache import store
+from tractexp.storage import files
+from tractexp.text import quoting
 
 # points of a line that are kept: beyond, each stretch keeps its lowest and highest
 MOST_LINE_POINTS = 20_000

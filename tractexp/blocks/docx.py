@@ -7,11 +7,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
 from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
 from tractexp.blocks.drawing import draw_chart, draw_equation
 from tractexp.errors import UserError
+from tractexp.storage import files
 
 PAPER, MARGIN = (21.0, 29.7), 2.0  # cm, A4
 TEXT_WIDTH = PAPER[0] - 2 * MARGIN

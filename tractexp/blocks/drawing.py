@@ -11,7 +11,7 @@ import numpy as np
 
 from tractexp.blocks import style
 from tractexp.blocks.chart import Chart
-from tractexp.quoting import unescape_html
+from tractexp.text.quoting import unescape_html
 
 WIDTH, PANEL_HEIGHT = 7.0, 1.25  # inches
 EQUATION_DPI = 200  # of one as PNG

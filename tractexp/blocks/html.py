@@ -9,11 +9,13 @@ import itertools
 import re
 from collections.abc import Sequence
 
-from tractexp import files, quoting, store
 from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
 from tractexp.blocks.chart import script
 from tractexp.blocks.drawing import draw_equation
+from tractexp.cache import store
+from tractexp.storage import files
+from tractexp.text import quoting
 
 LONGEST_UNBROKEN_WORD = 14  # letters of a word that never needs a second line
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from tractexp import quoting
 from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
+from tractexp.text import quoting
 
 
 def markdown(report: Report) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp import files
+from tractexp.storage import files
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from tractexp.blocks.block import CodeBlock, Heading, Items, Paragraphs, Report, Table, VerdictBlock
-from tractexp.wording import one_line
+from tractexp.text.wording import one_line
 
 PLAIN_LINE_WIDTH = 200  # characters of a line of text that is no terminal's
 COLUMN_GAP = 2  # characters between two columns

@@ -8,15 +8,16 @@ from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
 
-from tractexp import files, quoting
 from tractexp.cli.chosen import reads
+from tractexp.configuration.plugin import get
+from tractexp.configuration.repeatable import refusal
+from tractexp.configuration.run_command import group_of
 from tractexp.errors import UserError
-from tractexp.plugin import get
-from tractexp.progress import say
-from tractexp.provenance import group_of
-from tractexp.repeatable import refusal
-from tractexp.run_folder import CONFIGURATION as FOLDER
-from tractexp.run_folder import settle
+from tractexp.storage import files
+from tractexp.storage.run_folder import CONFIGURATION as FOLDER
+from tractexp.storage.run_folder import settle
+from tractexp.text import quoting
+from tractexp.text.progress import say
 
 RESULT = "result.json"
 SEARCHED = "--config-dir"

@@ -60,7 +60,7 @@ def _by_experiment(experiment: str) -> Mapping[str, str]:
     """What an experiment's file sets, wherever Hydra looks for it."""
     from hydra.core.hydra_config import HydraConfig
 
-    from tractexp.composition import folders, set_by_experiment
+    from tractexp.configuration.composition import folders, set_by_experiment
 
     sources = HydraConfig.get().runtime.config_sources if HydraConfig.initialized() else ()
     return set_by_experiment(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tractexp.composition import texts
+from tractexp.configuration.composition import texts
 
 
 def contents(config: Any) -> Mapping[str, str]:

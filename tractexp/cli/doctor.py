@@ -12,11 +12,13 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from tractexp import files, quoting, tracking
+from tractexp import tracking
 from tractexp.cli.sync import FOLDER, brought
 from tractexp.errors import UserError
-from tractexp.progress import say
-from tractexp.run_folder import WHOLE, settle
+from tractexp.storage import files
+from tractexp.storage.run_folder import WHOLE, settle
+from tractexp.text import quoting
+from tractexp.text.progress import say
 from tractexp.tracking import owner
 from tractexp.tracking.store import database_of, open_store, sentences
 
@@ -95,7 +97,7 @@ def cores() -> Iterator[Finding]:
     """
     from joblib import cpu_count
 
-    from tractexp.workers import Workers
+    from tractexp.process.workers import Workers
 
     try:
         list(Workers(1, apart=True).results(abs, [1], trace=lambda item: False))
@@ -128,7 +130,7 @@ def disk(folder: Path) -> Iterator[Finding]:
 
 def caches() -> Iterator[Finding]:
     """Whether the store can be written and its entries be read."""
-    from tractexp.store import CODE, cache_folder, find_damaged_files
+    from tractexp.cache.store import CODE, cache_folder, find_damaged_files
 
     try:
         folder = cache_folder()

@@ -4,10 +4,10 @@ happened.
 
 from pathlib import Path
 
-from tractexp import quoting
-from tractexp.overrides import format_assignment
-from tractexp.progress import say
-from tractexp.run_folder import RESULTS
+from tractexp.configuration.overrides import format_assignment
+from tractexp.storage.run_folder import RESULTS
+from tractexp.text import quoting
+from tractexp.text.progress import say
 
 PAGES = tuple(name for name in (*RESULTS, "look.html") if name.endswith(".html"))
 

@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
 from tractexp.errors import UserError
-from tractexp.progress import console, text_width
+from tractexp.storage import files
+from tractexp.text.progress import console, text_width
 
 FOLDER = Path("outputs", "looks")
 DOES = (

@@ -4,13 +4,14 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
-from tractexp import credentials, provenance
 from tractexp.api.task import Job
 from tractexp.cli import configuration
 from tractexp.cli.chosen import collect_chosen_settings, refuse_unread
+from tractexp.configuration import run_command
+from tractexp.configuration.plugin import build, get
 from tractexp.errors import Stopped, UserError
-from tractexp.plugin import build, get
-from tractexp.run_folder import RunFolder, run_folder
+from tractexp.storage import credentials
+from tractexp.storage.run_folder import RunFolder, run_folder
 
 TERMINATED = 143  # the exit code of a process that SIGTERM ended
 
@@ -33,8 +34,8 @@ def run(config: Any) -> None:
         folder, configuration.contents(config), configuration.list_named_files(plain)
     ) as place:
         try:
-            provenance.remember_folder(folder)
-            provenance.remember_roles(plain["data"].get("train"), plain["data"].get("validate"))
+            run_command.remember_folder(folder)
+            run_command.remember_roles(plain["data"].get("train"), plain["data"].get("validate"))
             perform(
                 Job(
                     plain,
@@ -90,7 +91,7 @@ def perform(job: Job) -> None:
     """Check a job's configuration and run its task: the same for a single job and for one of a
     sweep.
     """
-    from tractexp.schema import check
+    from tractexp.configuration.schema import check
 
     check(job.config)
     task = build("task", job.config["task"])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tractexp import tracking
 from tractexp.errors import UserError
-from tractexp.progress import say
+from tractexp.text.progress import say
 
 FOLDER = Path("outputs")
 OWN = "outputs/mlflow.db of the current folder, for the runs that name it"

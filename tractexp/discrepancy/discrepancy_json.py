@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files, quoting
+from tractexp.configuration.run_command import build_again_command, list_settings_of_all
 from tractexp.discrepancy.decide import CANDIDATE, NAMED, TIED, UNEXPLAINED, shows_more
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.explain import find_status
@@ -26,8 +26,9 @@ from tractexp.errors import DATA
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.grade import Misfit
 from tractexp.inference.model_error import ModelError, in_percent
-from tractexp.provenance import build_again_command, list_settings_of_all
-from tractexp.wording import join_words
+from tractexp.storage import files
+from tractexp.text import quoting
+from tractexp.text.wording import join_words
 
 PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
 MODEL_FILE = Path("conf", "model", "extended.yaml")  # beside the page

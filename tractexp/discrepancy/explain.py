@@ -37,7 +37,7 @@ from tractexp.inference.model_error import describe_stall, in_percent
 from tractexp.inference.recorder_window import RecorderWindow
 from tractexp.noise import Noise
 from tractexp.record import Event
-from tractexp.wording import alternatives, join_words, list_figures, percent
+from tractexp.text.wording import alternatives, join_words, list_figures, percent
 
 CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
 CONFIRMED_IN_TURN = "each event, left out in turn, confirms it"

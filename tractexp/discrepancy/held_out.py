@@ -17,7 +17,7 @@ from tractexp.inference.noise_in_quiet import QuietNoise, white
 from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
-from tractexp.wording import count_noun
+from tractexp.text.wording import count_noun
 
 # of what an effect explains: no formula is exact to this, and a fault of the measurement mends it
 MENDED = 0.05

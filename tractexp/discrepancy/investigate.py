@@ -64,7 +64,7 @@ from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
 from tractexp.record import Event
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 HELD = "held"  # the verdict on a parameter that the extended model does not search
 

@@ -10,7 +10,7 @@ from scipy.special import ndtr, ndtri
 from tractexp.discrepancy.investigate import Findings
 from tractexp.inference.catalogue import Candidate
 from tractexp.inference.score_test import Score
-from tractexp.wording import in_words
+from tractexp.text.wording import in_words
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %
 # power at the smallest relevant size, as of a planned test (Saris, Satorra and van der Veld 2009)

@@ -9,11 +9,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from tractexp import files, quoting
+from tractexp.configuration.run_command import build_again_command
 from tractexp.discrepancy.remainder import Remainder
-from tractexp.provenance import build_again_command
 from tractexp.record import Event
 from tractexp.record.identity import Identity
+from tractexp.storage import files
+from tractexp.text import quoting
 
 POWERS = ("P", "Q")  # channels of phasors; those of waveforms are currents
 SAME_FREQUENCY = 0.12  # of a frequency: so far off it counts as that

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tractexp.configuration.plugin import discover, find
 from tractexp.errors import MODEL, UserError, among
 from tractexp.model.model import WAVES, Model
-from tractexp.plugin import discover, find
 from tractexp.record import Event
 from tractexp.record.window import LONGEST_WINDOW, mean_weights
 from tractexp.recording.estimator import Estimator, estimator_of

@@ -21,7 +21,7 @@ from tractexp.noise.waves import of_waves
 from tractexp.record import Event, WaveEvent, in_waves
 from tractexp.record.synthetic import synthetic_event
 from tractexp.record.wave_event import COARSEST
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import DipShape

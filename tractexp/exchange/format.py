@@ -8,15 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tractexp.configuration.plugin import Plugin, build, discover
 from tractexp.errors import TASK, UserError
 from tractexp.exchange.circuit import TCircuit
 from tractexp.identification.result import Result, parts
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
-from tractexp.plugin import Plugin, build, discover
 from tractexp.record.identity import label
 from tractexp.record.own_base import scale_parameter
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 
 @dataclass(frozen=True, eq=False)

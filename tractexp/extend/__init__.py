@@ -7,6 +7,7 @@
 `declare`, `law` and `edit` take and return.
 """
 
+from tractexp.configuration.plugin import build, plugin
 from tractexp.errors import DATA, TASK, Unfit, UserError, check_choice, check_distinct, check_range
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Iterative, Optimizer
 from tractexp.inference.loss import Loss
@@ -15,7 +16,6 @@ from tractexp.kernel.stencil import Stencil
 from tractexp.model import sites
 from tractexp.model.parts import Curve, Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
-from tractexp.plugin import build, plugin
 from tractexp.record import Base, Events, Reader, Record
 from tractexp.record.phasor import Averager, one_cycle
 from tractexp.recording import Channel, Connection, Estimator, Recording, Segment, Writer

@@ -2,7 +2,7 @@
 a record.
 """
 
-from tractexp.files import PACKAGE, locate_file
+from tractexp.configuration.overrides import survey_of
 from tractexp.filetypes import cev, comtrade, pqdif, tidy
 from tractexp.filetypes.mapping import QUANTITIES
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar
@@ -10,13 +10,13 @@ from tractexp.filetypes.table import ENDINGS
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
 from tractexp.filetypes.tabulated_waves import recording
 from tractexp.filetypes.tidy import restore_recording
-from tractexp.overrides import survey_of
 from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, cut_dips, level, signs
 from tractexp.record.record import DECLARATION, LOAD, SIZES
 from tractexp.recording.archive import records
 from tractexp.recording.estimator import estimator_of
 from tractexp.recording.event_files import check_joined, event_paths
-from tractexp.wording import count_noun
+from tractexp.storage.files import PACKAGE, locate_file
+from tractexp.text.wording import count_noun
 
 __all__ = [
     "DECLARATION",

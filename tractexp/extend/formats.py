@@ -2,10 +2,10 @@
 text.
 """
 
-from tractexp import quoting
 from tractexp.exchange.circuit import TCircuit
 from tractexp.exchange.format import Format, Restored, Simulated
 from tractexp.exchange.playback import dip
-from tractexp.files import lock_file
+from tractexp.storage.files import lock_file
+from tractexp.text import quoting
 
 __all__ = ["Format", "Restored", "Simulated", "TCircuit", "dip", "lock_file", "quoting"]

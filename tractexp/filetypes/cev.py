@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes import timeline
 from tractexp.filetypes.comtrade_fields import number, quote_field
@@ -23,6 +22,7 @@ from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.table import Rows
 from tractexp.filetypes.text import decode
 from tractexp.recording.recording import Channel, Recording, StatusChannel, unit_of
+from tractexp.storage import files
 
 ROOT = float(np.sqrt(2))
 LARGEST = 32 * 2**20  # bytes: event reports last seconds

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import DATA, UserError, nearest
 from tractexp.filetypes import timeline
 from tractexp.filetypes.comtrade_header import Analog, Header, parse
@@ -21,6 +20,7 @@ from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode, lines
 from tractexp.filetypes.timeline import Stretch
 from tractexp.recording.recording import Channel, Recording, StatusChannel, quantity_of
+from tractexp.storage import files
 
 LARGEST_CFG = 4 * 2**20  # bytes: fifty thousand channels
 FIRST_WITH_RATIO = 1999  # revision of the standard whose files say primary or secondary

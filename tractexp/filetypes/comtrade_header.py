@@ -14,7 +14,7 @@ from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_fields import date, number, quote_field
 from tractexp.filetypes.remarks import Remarks
 from tractexp.recording.recording import unit_of
-from tractexp.wording import count_noun
+from tractexp.text.wording import count_noun
 
 VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_fields import number, quote_field
 from tractexp.filetypes.comtrade_header import VALUE, Header
 from tractexp.filetypes.remarks import Remarks
+from tractexp.storage import files
 
 LACKING = 0.01  # of the announced samples: so many may be missing at the end, with a note
 LARGE = 64 * 2**20  # bytes: a larger binary file stays on the disk and is mapped

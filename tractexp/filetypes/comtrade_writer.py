@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import UserError, check_choice
 from tractexp.filetypes.comtrade_fields import date
 from tractexp.filetypes.comtrade_header import EPOCH, VALUE
 from tractexp.filetypes.comtrade_samples import NONE, row
 from tractexp.recording.recording import Channel, Recording
+from tractexp.storage import files
 
 # ever more values fit
 KINDS = {1999: ("BINARY", "ASCII"), 2013: ("BINARY", "BINARY32", "FLOAT32", "ASCII")}

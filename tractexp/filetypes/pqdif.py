@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes import timeline
 from tractexp.filetypes.pqdif_channels import (
@@ -26,6 +25,7 @@ from tractexp.filetypes.pqdif_records import SIGNATURE, tag
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.table import Rows
 from tractexp.recording.recording import Channel, Recording
+from tractexp.storage import files
 
 ZERO = datetime(1899, 12, 30)
 # of the standard

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.pqdif_records import Collection, records, tag
 from tractexp.filetypes.remarks import Remarks
+from tractexp.storage import files
 
 SOURCE, OBSERVATION = (
     tag("89738619-f1c3-11cf-9d89-0080c72e70a3"),

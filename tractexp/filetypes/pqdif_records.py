@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode
-from tractexp.wording import count_noun
+from tractexp.storage import files
+from tractexp.text.wording import count_noun
 
 SIGNATURE = uuid.UUID("4a111440-e49f-11cf-9900-505144494600").bytes_le
 HEADER, ENTRY = struct.Struct("<16s16siiiI"), struct.Struct("<16sBBBxii")

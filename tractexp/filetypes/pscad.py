@@ -11,12 +11,12 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.table import TableColumn, TableFile, TableForm
 from tractexp.filetypes.table_text import TextTable, open_text
 from tractexp.filetypes.text import decode
+from tractexp.storage import files
 
 ENDING = ".out"
 LARGEST = 4 * 2**20  # bytes of names

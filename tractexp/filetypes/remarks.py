@@ -1,6 +1,6 @@
 """Remarks on what was mended in a file, one for all lines concerned."""
 
-from tractexp.wording import list_first
+from tractexp.text.wording import list_first
 
 NAMED_LINES = 5  # of those concerned that are told
 

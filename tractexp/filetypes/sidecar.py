@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tractexp import files
 from tractexp.errors import UserError
-from tractexp.files import locate_file
 from tractexp.record.record import DECLARATION, LOAD, SIZES, Base
 from tractexp.record.window import Window
+from tractexp.storage import files
+from tractexp.storage.files import locate_file
 
 
 @dataclass(frozen=True)

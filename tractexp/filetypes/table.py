@@ -12,14 +12,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import DATA, UserError, among, check_choice, nearest
-from tractexp.files import locate_file
 from tractexp.filetypes.cells import BadCell, find_group_mark, is_number, numbers
 from tractexp.filetypes.clock import is_time, times
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, check_column_count, heading
 from tractexp.filetypes.workbook import BadWorkbook, Workbook
+from tractexp.storage import files
+from tractexp.storage.files import locate_file
 
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"

@@ -28,7 +28,7 @@ from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, heading
 from tractexp.filetypes.table import TableColumn, TableFile, TableForm, column
 from tractexp.filetypes.text import MARKS, decode
-from tractexp.wording import count_noun
+from tractexp.text.wording import count_noun
 
 HEAD = 1 << 18  # bytes in which the heading is looked for
 SAMPLE = 400  # lines of them, at most

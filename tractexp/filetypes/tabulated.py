@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import DATA, UserError
-from tractexp.files import locate_file
 from tractexp.filetypes.columns import PER_UNIT, factor
 from tractexp.filetypes.direct_table import check_alternating, describe_direct_table
 from tractexp.filetypes.mapping import (
@@ -31,6 +30,7 @@ from tractexp.record.phasor import sequences
 from tractexp.recording.nominal_voltage import is_between_phases, off_nominal
 from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
 from tractexp.recording.unit import SECONDARY_LINES
+from tractexp.storage.files import locate_file
 
 # the positive sequence of line voltages over that of phase voltages
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)

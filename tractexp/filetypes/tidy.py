@@ -20,11 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files, quoting
 from tractexp.errors import UserError
 from tractexp.filetypes.table import TableForm, open_table
 from tractexp.record.record import Record
 from tractexp.recording.recording import Channel, Recording, Segment, StatusChannel
+from tractexp.storage import files
+from tractexp.text import quoting
 
 UNITS = {"t": "s", "U": "pu", "P": "pu", "Q": "pu", "f": "Hz"}  # as data.units; U2 is as U
 

@@ -4,6 +4,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from tractexp.configuration.run_command import build_again_command
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.plan import DipShape, Forecast, over_depth
@@ -20,7 +21,6 @@ from tractexp.identification.verdict import (
 )
 from tractexp.inference.information import SHARE
 from tractexp.inference.problem import Problem
-from tractexp.provenance import build_again_command
 from tractexp.record.change import runs
 
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.inference.differences import Rows
 from tractexp.inference.information import Information
 from tractexp.inference.least_squares import MOST_NUMBERS, descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.separable import Sensitivities
+from tractexp.storage import files
 
 DISAGREES = 0.01  # p-value below which an event does not fit with the others
 SUSPECTS = 4  # events that are fitted by themselves, and the others without them

@@ -29,7 +29,7 @@ from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.model_error import ModelError, model_error
 from tractexp.inference.problem import Problem
 from tractexp.record import Event
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp import store
+from tractexp.cache import store
 from tractexp.domain import Domain, Playback
 from tractexp.domain.port import Complex, Port
 from tractexp.errors import UserError

@@ -10,10 +10,10 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
+from tractexp.configuration.plugin import Plugin
 from tractexp.errors import check_choice, check_range
 from tractexp.inference.loss import REFUSED
 from tractexp.parameter import Box
-from tractexp.plugin import Plugin
 
 __all__ = ["REFUSED", "Box", "Evaluate", "Iterative", "Optimizer"]
 

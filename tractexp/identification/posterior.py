@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.errors import TASK, UserError, setting
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.inference.interval import INTERVAL_LEVEL
-from tractexp.progress import Counting, make_silent_counter
+from tractexp.text.progress import Counting, make_silent_counter
 
 BURN = 0.3  # of the steps are thrown away
 ENOUGH = 50.0  # autocorrelation times that a chain should last (emcee's own advice)

@@ -28,7 +28,7 @@ from tractexp.identification.verdict import (
     ParameterVerdict,
     size,
 )
-from tractexp.progress import Counting, make_silent_counter
+from tractexp.text.progress import Counting, make_silent_counter
 
 RESTARTS = 5
 DOUBTFUL = 0.05  # of the value: wider half intervals are checked by a profile

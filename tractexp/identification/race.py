@@ -20,8 +20,8 @@ from tractexp.inference.multistart import distinct, explore_minima, screen_point
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model
 from tractexp.noise.color import SMALLEST_DEVIATION
-from tractexp.progress import Counting, make_silent_counter
 from tractexp.record import Event
+from tractexp.text.progress import Counting, make_silent_counter
 
 STRETCHES = 5  # of a single dip
 AS_GOOD = 1.05  # times the least error: a simpler structure within it wins

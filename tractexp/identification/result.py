@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files, provenance
+from tractexp.cache import provenance
+from tractexp.configuration.plugin import build
 from tractexp.domain import DOMAINS, Playback, domain_of
 from tractexp.domain.playback import relative_error
 from tractexp.errors import MODEL, UserError
@@ -27,10 +28,10 @@ from tractexp.inference.problem import Problem
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.outcome import Plain
-from tractexp.plugin import build
 from tractexp.record import Event, OwnBase, Record, find_dips
 from tractexp.record.identity import Identity
 from tractexp.record.own_base import scale_parameter
+from tractexp.storage import files
 
 TRAIN, VALIDATE = "train", "validate"
 BEFORE = ("U0", "P0", "Q0", "frequency")  # of the first event, what its steady state stands on

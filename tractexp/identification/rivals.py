@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError
 from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import IDENTIFIED, IDENTIFIED_SHARE, ParameterVerdict, size
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
 from tractexp.parameter import even
-from tractexp.plugin import discover, get
-from tractexp.progress import Counting, make_silent_counter
+from tractexp.text.progress import Counting, make_silent_counter
 
 STARTS = 5  # of the parameters that the rival alone has
 RIVAL_ITERATIONS = 25

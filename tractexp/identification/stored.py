@@ -9,9 +9,9 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
+from tractexp.configuration.kinds import check_kind
 from tractexp.errors import UserError, among
-from tractexp.kinds import check_kind
-from tractexp.wording import count_noun
+from tractexp.text.wording import count_noun
 
 
 def check_fields(cls: type[Any], content: Any, where: str) -> None:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.identification.verdict import ParameterVerdict, judge
 from tractexp.inference.differences import CENTRAL
 from tractexp.inference.information import Information
@@ -22,6 +21,7 @@ from tractexp.inference.residual_tests import jarque_bera, ljung_box
 from tractexp.inference.sandwich import scatter
 from tractexp.inference.separable import Sensitivities
 from tractexp.noise.color import FEWEST_NOISE_SAMPLES
+from tractexp.storage import files
 
 if TYPE_CHECKING:
     from tractexp.identification.rivals import RivalStructure

@@ -16,7 +16,7 @@ from tractexp.errors import UserError
 from tractexp.identification.linear_network import BlackBox, black_boxes, choose_network
 from tractexp.identification.result import TRAIN, Fit, model_errors
 from tractexp.inference.model_error import STALL, in_percent
-from tractexp.wording import count_noun
+from tractexp.text.wording import count_noun
 
 
 def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:

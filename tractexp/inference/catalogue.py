@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.configuration.plugin import discover, get
 from tractexp.errors import TASK, UserError, among
 from tractexp.model.model import Model
 from tractexp.model.parts import COMPARED, Effect, Measurement
 from tractexp.parameter import Parameter
-from tractexp.plugin import discover, get
 from tractexp.record import Event
 
 MOST_SETTINGS = 16  # combinations of an effect's scanned parameters

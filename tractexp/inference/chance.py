@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from tractexp import store
+from tractexp.cache import store
 from tractexp.inference import goodness_of_fit
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
@@ -20,7 +20,7 @@ from tractexp.inference.linearization import Linearization, rich_residuals
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.score_test import ScoreTest
 from tractexp.noise import Noise
-from tractexp.wording import in_words
+from tractexp.text.wording import in_words
 
 NULL_DRAWS = 199
 # Independent quiet samples below which every draw estimates its noise anew: the error of the

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp import store
+from tractexp.cache import store
 from tractexp.domain import Domain, domain_of
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.differences import finite, slopes, two_sided

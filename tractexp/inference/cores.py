@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 
 from tractexp.errors import UserError
 from tractexp.inference.effort import Effort
-from tractexp.workers import end_with_parent
+from tractexp.process.workers import end_with_parent
 
 FORKS = sys.platform == "linux"  # elsewhere it is not safe, or not there
 Item = TypeVar("Item")

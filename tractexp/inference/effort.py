@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event, Thread
 
-from tractexp.progress import STILL, describe_remaining_time
+from tractexp.text.progress import STILL, describe_remaining_time
 
 SILENCE = 4.0  # s after which a line says that a step goes on
 

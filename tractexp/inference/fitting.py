@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp import store
+from tractexp.cache import store
 from tractexp.inference import fit_effort
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.parameter import Parameter
-from tractexp.wording import with_error
+from tractexp.storage import files
+from tractexp.text.wording import with_error
 
 INTERVAL_LEVEL = 0.95
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from tractexp.configuration.plugin import Plugin
 from tractexp.errors import UserError, check_range
 from tractexp.model.drive import Drive
-from tractexp.plugin import Plugin
 from tractexp.record import Event
 
 # objectives from here up mark candidates that could not be simulated, ranked by how far they miss

@@ -19,7 +19,7 @@ from tractexp.domain import Playback
 from tractexp.inference.blocks import LENGTH, reach
 from tractexp.noise.random_walk import WANDERING_COSINES, without_drift, without_slow
 from tractexp.record import Event
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 BLOCKS = 10  # of short records: two or three would tell nothing of chance
 COHERENT_SECONDS = 0.02  # s: what is left within a phasor's window hangs together

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 
 import sympy
 
-from tractexp import files
 from tractexp.errors import UserError
 from tractexp.kernel.emit import HALF_WAY
 from tractexp.kernel.expressions import OURS, Expressions
@@ -21,6 +20,7 @@ from tractexp.kernel.steady import (
     SETTLED,
     STATE_DIFFERENCE,
 )
+from tractexp.storage import files
 
 COMPARISONS = {"olt": "<", "ole": "<=", "ogt": ">", "oge": ">=", "oeq": "===", "une": "!=="}
 LOGIC = {"and": "&&", "or": "||", "xor": "!=="}

@@ -1,8 +1,8 @@
 """Object code of kernels: compiled from IR, stored under all that it depends on, loaded once a
 process.
 
-An entry is executed, so it is read through `tractexp.store`, which takes nothing that was not
-written there whole.
+An entry is executed, so it is read through `tractexp.cache.store`, which takes nothing that was
+not written there whole.
 """
 
 import functools
@@ -10,8 +10,8 @@ import itertools
 import threading
 from typing import Any
 
+from tractexp.cache.store import CODE, key
 from tractexp.kernel import target
-from tractexp.store import CODE, key
 
 FUNCTIONS = ("run", "steady")  # what a text may define for callers, one each
 _numbers = itertools.count()

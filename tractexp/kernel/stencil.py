@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.cache.texts import text_in
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NUMBERS, WHOLE
 from tractexp.kernel.layout import VECTOR_LANES
 from tractexp.kernel.numbers import ORDERED, Numbers
-from tractexp.texts import text_in
 
 FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.cache.texts import text_of
 from tractexp.errors import MODEL, UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel
@@ -20,7 +21,6 @@ from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
 from tractexp.record.window import averaged_power
-from tractexp.texts import text_of
 
 SUBSTEP_TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256

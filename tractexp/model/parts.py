@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from tractexp.configuration.plugin import Plugin
 from tractexp.errors import UserError, among
 from tractexp.model import sites
 from tractexp.model.names import check_name
 from tractexp.model.signature import check_signature
-from tractexp.plugin import Plugin
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol

@@ -6,8 +6,8 @@ import inspect
 from collections.abc import Sequence
 from typing import Any
 
+from tractexp.configuration.plugin import Plugin
 from tractexp.errors import UserError, among
-from tractexp.plugin import Plugin
 
 NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 

@@ -3,10 +3,10 @@
 from typing import Any
 
 from tractexp.blocks import Table
+from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError
 from tractexp.model.model import Model
 from tractexp.model.sites import SITES
-from tractexp.plugin import discover, get
 
 
 def sites(model: Any) -> Table:

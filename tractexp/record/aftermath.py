@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.provenance import digest
+from tractexp.cache.provenance import digest
 from tractexp.record.change import CHANGED, clause, from_to, load_changes, smear, without_gaps
 from tractexp.record.record import Record
 

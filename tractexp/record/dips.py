@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.cache.provenance import digest
 from tractexp.errors import DATA, UserError
-from tractexp.provenance import digest
 from tractexp.record.direction import OUTWARD, direction
 from tractexp.record.event import Event, detect, steady
 from tractexp.record.fall import find_dips

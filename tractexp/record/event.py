@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tractexp.cache.provenance import digest
 from tractexp.errors import UserError
-from tractexp.provenance import digest
 from tractexp.record.aftermath import loss, until_change
 from tractexp.record.direction import direction
 from tractexp.record.fall import FEWEST_BEFORE, STEADY, falls

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.wording import count_noun
+from tractexp.text.wording import count_noun
 
 # of all samples: where more are missing, they were not lost but recorded in another way
 MOST_BRIDGED_SHARE = 0.05

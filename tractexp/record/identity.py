@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tractexp.provenance import digest
+from tractexp.cache.provenance import digest
 from tractexp.record.record import Base, Record
 
 UNKNOWN = "kV and MVA of one per unit unknown"

@@ -13,8 +13,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from tractexp.cache.provenance import digest
 from tractexp.errors import DATA, UserError
-from tractexp.provenance import digest
 from tractexp.record.event import Event, detect
 from tractexp.record.record import DECLARATION, LOAD, Base, Record
 from tractexp.record.wave_event import WaveEvent, in_waves

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tractexp import files
+from tractexp.configuration.overrides import survey_of
+from tractexp.configuration.plugin import Plugin, build, discover
 from tractexp.errors import UserError
-from tractexp.overrides import survey_of
-from tractexp.plugin import Plugin, build, discover
 from tractexp.record import foreign
+from tractexp.storage import files
 
 if TYPE_CHECKING:
     from tractexp.record.dips import FileDip

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import DATA, UserError
-from tractexp.files import PACKAGE
 from tractexp.record.angle import measure_frequency
 from tractexp.record.gap import (
     bridge_values,
@@ -19,6 +18,7 @@ from tractexp.record.gap import (
 )
 from tractexp.record.waves import Waves
 from tractexp.record.window import Window
+from tractexp.storage.files import PACKAGE
 
 LARGEST_JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
 # s: at coarser sampling a dip of 100 ms has fewer than two samples, and a transient time constant

@@ -4,13 +4,13 @@ import functools
 import re
 from pathlib import Path
 
-from tractexp import files
 from tractexp.errors import UserError, nearest
 from tractexp.record import Record
 from tractexp.recording.event_views import settings_of
 from tractexp.recording.overview import LoadEvent, Sight, View, view_of
 from tractexp.recording.record_files import find_records
-from tractexp.wording import count_noun
+from tractexp.storage import files
+from tractexp.text.wording import count_noun
 
 NAMED = re.compile(r"(?P<file>.+?)(?:#(?P<load>\d+)(?:\.(?P<dip>\d+))?)?")
 

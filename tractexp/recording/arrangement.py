@@ -14,8 +14,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from tractexp.configuration.plugin import chosen
 from tractexp.errors import DATA, UserError, setting
-from tractexp.plugin import chosen
 from tractexp.record.direction import at_level, direction
 from tractexp.record.phasor import sequences
 from tractexp.recording.connection import usual

@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.record.gap import describe_bridged, estimate_wave_values, find_single_gaps
 from tractexp.recording.recording import NOTHING_BRIDGED, Channel, Recording, Segment
-from tractexp.wording import list_first
+from tractexp.text.wording import list_first
 
 NAMED_CHANNELS = 3  # that are told
 

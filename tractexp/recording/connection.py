@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tractexp.plugin import Plugin, discover
+from tractexp.configuration.plugin import Plugin, discover
 
 SINGLE = (
     "a single-phase load: U is its own voltage, P + jQ = V I* of the fundamental; static loads and"

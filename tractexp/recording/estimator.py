@@ -5,8 +5,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tractexp.configuration.plugin import Plugin, chosen, discover
 from tractexp.errors import UserError
-from tractexp.plugin import Plugin, chosen, discover
 from tractexp.record.phasor import Averager, make_weighted_averager
 from tractexp.record.window import Window
 

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import UserError, check_distinct, setting
-from tractexp.quoting import shell
 from tractexp.recording.phase_mark import plain, spell_marks
 from tractexp.recording.record_files import find_packed
-from tractexp.wording import join_words, list_first
+from tractexp.storage import files
+from tractexp.text.quoting import shell
+from tractexp.text.wording import join_words, list_first
 
 MOST_FILES = 24  # of one event
 NAMED_FILES = 5  # of an archive that are told

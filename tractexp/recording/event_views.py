@@ -4,18 +4,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
+from tractexp.configuration.overrides import format_assignment
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.overrides import format_assignment
-from tractexp.plugin import build
-from tractexp.quoting import shell
 from tractexp.record import endings, reader_of
 from tractexp.recording.event_files import MOST_FILES, PART, name_one_event, say_several
 from tractexp.recording.feeder import propose
 from tractexp.recording.overview import View, view_of
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.record_files import find_packed
-from tractexp.wording import join_words
+from tractexp.storage import files
+from tractexp.text.quoting import shell
+from tractexp.text.wording import join_words
 
 MOST_UNNAMED = 6  # files that are tried together although their names do not say so
 

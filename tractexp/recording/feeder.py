@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.configuration.plugin import chosen
 from tractexp.errors import UserError
-from tractexp.plugin import chosen
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.kirchhoff import closed_sums

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.configuration.plugin import chosen
 from tractexp.errors import DATA, UserError
-from tractexp.plugin import chosen
 from tractexp.record.phasor import Phasors, measure
 from tractexp.recording.bridge import find_bridged
 from tractexp.recording.estimator import estimator_of

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.plugin import build
 from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.dips import FileDip, check_load
 from tractexp.record.phasor import Phasors, join_phasors

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-from tractexp import plugin, quoting
+from tractexp.configuration import plugin
+from tractexp.configuration.overrides import format_assignment
 from tractexp.errors import DATA, UserError, check_range, setting
-from tractexp.overrides import format_assignment
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
 from tractexp.record.dips import (
     FileDip,
@@ -32,7 +32,8 @@ from tractexp.recording.label import order, shared_name
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.recording import Recording
 from tractexp.recording.unit import check_doubt, check_units, in_units
-from tractexp.wording import count_noun
+from tractexp.text import quoting
+from tractexp.text.wording import count_noun
 
 Stream = tuple[Phasors, Sequence[Waves]]  # of segments that follow each other without a gap
 # cycles of waveforms stored beside a record's phasors, for the windows of its first and last

@@ -6,11 +6,11 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
+from tractexp.configuration.plugin import discover
 from tractexp.errors import DATA, UserError
-from tractexp.plugin import discover
 from tractexp.record import Reader, endings
 from tractexp.record.foreign import is_record
+from tractexp.storage import files
 
 BEGINNING = 65536  # bytes
 CELL = re.compile(rb"[\s,;\"]+")

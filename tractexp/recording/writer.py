@@ -4,7 +4,7 @@ from abc import abstractmethod
 from pathlib import Path
 from typing import ClassVar
 
-from tractexp.plugin import Plugin
+from tractexp.configuration.plugin import Plugin
 from tractexp.record.record import Record
 from tractexp.recording.recording import Recording
 

@@ -14,7 +14,7 @@ from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import effect_sizes
 from tractexp.inference.chance import by_draws
 from tractexp.inference.interval import ParameterEstimate
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 CHOSEN = "added"
 FITTED, ONE_STEP = "refitted", "one step"

@@ -23,7 +23,7 @@ from tractexp.report.candidate_rows import (
     why_not_the_most_helpful,
 )
 from tractexp.report.predicted import BAR, add_prediction_section
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 COLORS = {CHOSEN: PALETTE[2], TIED: PALETTE[4]}
 REFITTED, ESTIMATED = PALETTE[0], MEASURED

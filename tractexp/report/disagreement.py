@@ -3,7 +3,7 @@
 from tractexp.blocks import Report
 from tractexp.discrepancy.investigate import Findings
 from tractexp.inference.chance import BLURRED, by_draws
-from tractexp.wording import in_words
+from tractexp.text.wording import in_words
 
 
 def places(page: Report, findings: Findings) -> None:

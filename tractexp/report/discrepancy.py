@@ -25,7 +25,7 @@ from tractexp.report.extended import equations, interval, laws, parameters, valu
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
 from tractexp.report.proposal import add_proposal_section, headlines
-from tractexp.wording import alternatives, as_sentence, count_noun, epsilon, join_words
+from tractexp.text.wording import alternatives, as_sentence, count_noun, epsilon, join_words
 
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation as Outcome

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tractexp.blocks import Report, Table
 from tractexp.report.discrepancy import describe_nearest, describe_where, gap
 from tractexp.report.screen import describe_load
-from tractexp.wording import alternatives, shorten
+from tractexp.text.wording import alternatives, shorten
 
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation

@@ -9,7 +9,7 @@ import numpy as np
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.investigate import Findings
 from tractexp.inference.goodness_of_fit import residual_windows
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 MOST_TRIED = 8  # sets, those that lower the deviance most
 MOST_TOLD = 4  # of them in a sentence, those that leave least there

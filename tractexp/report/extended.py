@@ -13,7 +13,7 @@ from tractexp.identification.verdict import brief
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.model.model import compose
 from tractexp.model.sites import KINDS
-from tractexp.wording import alternatives, join_words, with_error
+from tractexp.text.wording import alternatives, join_words, with_error
 
 CURVE, TEXTBOOK = "#0072B2", "#D55E00"
 

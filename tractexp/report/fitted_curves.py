@@ -19,7 +19,7 @@ from tractexp.identification.yardstick import play_network
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart, show_units
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, spectrum_chart, wave_chart
-from tractexp.wording import as_sentence, epsilon, join_words
+from tractexp.text.wording import as_sentence, epsilon, join_words
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification

@@ -9,6 +9,7 @@ import numpy as np
 
 from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
+from tractexp.configuration.run_command import command
 from tractexp.identification.agreement import EventAgreement
 from tractexp.identification.estimate import EstimationResult
 from tractexp.identification.result import by_event
@@ -18,12 +19,11 @@ from tractexp.identification.verdict import IDENTIFIED, TRADES, brief
 from tractexp.identification.yardstick import poles_in_words
 from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
-from tractexp.provenance import command
 from tractexp.record.identity import Identity, describe_identities, title
 from tractexp.report.fitted_curves import MOST_OPEN_EVENTS, ROLES, add_curves, add_next_dip
 from tractexp.report.race import tabulate_race
 from tractexp.report.sliders import add_sliders
-from tractexp.wording import as_sentence, epsilon, in_words, shown_in_words
+from tractexp.text.wording import as_sentence, epsilon, in_words, shown_in_words
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification

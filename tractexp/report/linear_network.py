@@ -3,12 +3,12 @@
 from typing import TYPE_CHECKING
 
 from tractexp.blocks import Report, Table
+from tractexp.configuration.run_command import command
 from tractexp.inference.model_error import in_percent
-from tractexp.provenance import command
 from tractexp.record.identity import title_of
 from tractexp.report.fitted_curves import all_curves
 from tractexp.report.identify import error_table
-from tractexp.wording import as_sentence
+from tractexp.text.wording import as_sentence
 
 if TYPE_CHECKING:
     from tractexp.api.linear_network import NetworkFit

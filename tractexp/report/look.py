@@ -12,7 +12,7 @@ from tractexp.blocks import Report, Table
 from tractexp.recording.overview import Sight, View
 from tractexp.report import unfitted
 from tractexp.report.look_charts import add_unassigned_channels, charts
-from tractexp.wording import as_sentence, change, count_noun, degrees, figure, share
+from tractexp.text.wording import as_sentence, change, count_noun, degrees, figure, share
 
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
 LATE = 60.0  # s: nobody counts more in a file; events after it have the clock's time beside

@@ -19,7 +19,7 @@ from tractexp.recording.overview import Sight, View
 from tractexp.recording.quality import spectrum
 from tractexp.recording.recording import unit_of
 from tractexp.recording.trace import half_cycle_rms
-from tractexp.wording import count_noun
+from tractexp.text.wording import count_noun
 
 MOST_PAGE_SAMPLES = 400_000  # samples of waveforms that a page holds: a megabyte
 MOST_PHASORS = 200_000  # values of phasors that a page holds

@@ -26,7 +26,7 @@ from tractexp.report.look import (
     size,
     starts,
 )
-from tractexp.wording import count_noun, figure, join_words, shorten
+from tractexp.text.wording import count_noun, figure, join_words, shorten
 
 NOTES = 3  # of a file that have room
 MOST_LINE_EVENTS = 4  # events of a bus that its line has room for

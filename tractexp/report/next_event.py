@@ -6,7 +6,7 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
 from tractexp.discrepancy.next_event.choose import DECIDED, EventTrial, NextEvent
-from tractexp.wording import as_sentence
+from tractexp.text.wording import as_sentence
 
 MOST_EVENTS_A_KIND = 2  # events of each kind that a table has
 KINDS = (

@@ -16,7 +16,7 @@ from tractexp.blocks.style import PALETTE
 from tractexp.domain import PHASORS, WAVES
 from tractexp.identification.plan import INERTIA, ChosenEvent, Forecast, Needed, column
 from tractexp.inference.problem import Problem
-from tractexp.wording import as_sentence
+from tractexp.text.wording import as_sentence
 
 DEPTH, DURATION, RATE = "depth", "duration [s]", "samples per second"
 JUMP, UNBALANCE = "phase jump [degrees]", "negative sequence, of the depth"

@@ -17,7 +17,7 @@ from tractexp.report.profile import (
     find_declared_parameter,
     span,
 )
-from tractexp.wording import as_sentence
+from tractexp.text.wording import as_sentence
 
 HISTOGRAM_BINS = 60  # of a histogram
 DOTS = 1500  # draws shown of a pair

@@ -13,7 +13,7 @@ from tractexp.discrepancy.precision import effect_sizes
 from tractexp.discrepancy.proposal.library import term
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.model_error import in_percent
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 ADDED, TIED, OTHER, BASE = PALETTE[2], PALETTE[4], PALETTE[0], MEASURED
 MOST_SHOWN_SETS = 16  # sets that are shown beside those named

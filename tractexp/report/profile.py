@@ -14,7 +14,7 @@ from tractexp.identification.profile import End, LikelihoodProfile, Profiles
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, ParameterVerdict, format_half_width
 from tractexp.record.identity import title_of
-from tractexp.wording import as_sentence
+from tractexp.text.wording import as_sentence
 
 LARGEST_END_DIFFERENCE = 0.2  # of the half interval by curvature: closer ends are the same interval
 ABOVE = 2.2  # thresholds that a chart shows

@@ -15,7 +15,7 @@ from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
 from tractexp.inference.model_error import tell_error
 from tractexp.report.extended import interval
-from tractexp.wording import as_sentence, in_words, join_words, percent, with_error
+from tractexp.text.wording import as_sentence, in_words, join_words, percent, with_error
 
 MISSED, TERM = "#9A9A9A", "#0072B2"
 EVENTS = 4  # whose charts are shown at once

@@ -10,7 +10,7 @@ from tractexp.identification.result import Result
 from tractexp.identification.verdict import UNIDENTIFIED, brief
 from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import UNKNOWN, Identity, label
-from tractexp.wording import count_noun, list_first, shorten, with_error
+from tractexp.text.wording import count_noun, list_first, shorten, with_error
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification

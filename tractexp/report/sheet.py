@@ -8,15 +8,15 @@ import numpy as np
 
 from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
+from tractexp.configuration.run_command import build_folder_command, command
 from tractexp.errors import UserError
 from tractexp.exchange.format import choose_format
 from tractexp.exchange.rating import SOURCE, rate_machine
 from tractexp.identification.verdict import brief
-from tractexp.provenance import build_folder_command, command
 from tractexp.record.identity import describe_identities, title
 from tractexp.report.identify import error_rows, list_origin, name_verdicts
 from tractexp.report.screen import choose_units, describe_load
-from tractexp.wording import as_sentence, count_noun, with_error
+from tractexp.text.wording import as_sentence, count_noun, with_error
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp import files, quoting, store
 from tractexp.blocks import Report
 from tractexp.blocks.block import Markup
+from tractexp.cache import store
 from tractexp.errors import UserError
 from tractexp.kernel.layout import PHASOR_INPUTS
-from tractexp.wording import as_sentence
+from tractexp.storage import files
+from tractexp.text import quoting
+from tractexp.text.wording import as_sentence
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification

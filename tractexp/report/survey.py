@@ -5,11 +5,11 @@ thousands of rows.
 from collections.abc import Mapping
 from typing import Any
 
-from tractexp import quoting
 from tractexp.blocks import Report, Table
 from tractexp.blocks.block import Markup
 from tractexp.blocks.style import ACTIVE, VOLTAGE
-from tractexp.files import read_packaged_text
+from tractexp.storage.files import read_packaged_text
+from tractexp.text import quoting
 
 # what stands as the kind of a file without events
 UNREAD, UNEXAMINED, QUIET = "not read", "not examined", "nothing"

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files, store
+from tractexp.cache import store
+from tractexp.cache.store import DAMAGED, SEARCHES
+from tractexp.configuration.plugin import build
 from tractexp.identification.search import History, Limits, SearchResult
 from tractexp.inference.problem import Problem
-from tractexp.plugin import build
-from tractexp.store import DAMAGED, SEARCHES
+from tractexp.storage import files
 
 ARRAYS = ("simulations", "objective", "values", "seconds")  # of a history
 

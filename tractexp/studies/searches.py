@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.configuration.plugin import build, place_in_plugin
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import Optimizer
 from tractexp.identification.search import Limits, SearchResult, search
 from tractexp.inference.problem import Problem
-from tractexp.plugin import build, place_in_plugin
+from tractexp.process.workers import Workers
 from tractexp.studies.search_store import SearchStore
-from tractexp.workers import Workers
 
 CHUNK = 5  # searches that share the composition of a model
 TRIES = 2  # how often searches are made whose worker is killed

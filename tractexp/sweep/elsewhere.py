@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from tractexp import files, tracking
+from tractexp import tracking
+from tractexp.storage import files
 from tractexp.sweep.job import OUTPUT, SweepJob, open_folder, read_shared_events, work
 from tractexp.sweep.status import FILE, FINISHED, Status
 from tractexp.tracking import runfile

@@ -7,10 +7,11 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from tractexp import files, provenance
-from tractexp.composition import texts
+from tractexp.cache import provenance
+from tractexp.configuration.composition import texts
 from tractexp.errors import UserError
-from tractexp.files import locate_file
+from tractexp.storage import files
+from tractexp.storage.files import locate_file
 
 
 def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import credentials, files
 from tractexp.api.task import Job, read_events, variant
 from tractexp.cli.chosen import collect_chosen_settings
 from tractexp.cli.configuration import list_named_files
 from tractexp.errors import UserError
-from tractexp.run_folder import RunFolder, find_holder, run_folder
+from tractexp.storage import credentials, files
+from tractexp.storage.run_folder import RunFolder, find_holder, run_folder
 from tractexp.sweep import identity, status
 from tractexp.sweep.output import printing_to
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status, select_returned_metrics

@@ -16,7 +16,8 @@ from omegaconf import OmegaConf
 from tractexp.api.task import Job
 from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError, check_choice, check_range
-from tractexp.run_folder import hold
+from tractexp.process.workers import Workers, backends
+from tractexp.storage.run_folder import hold
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.elsewhere import pack_job, unpack_job, work_elsewhere
@@ -27,7 +28,6 @@ from tractexp.sweep.placing import await_end, is_finished, place
 from tractexp.sweep.progress import progress
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import ENDED, FAILED, FINISHED, RUNNING, Status
-from tractexp.workers import Workers, backends
 
 # backends whose workers would inherit a half-done import of another thread
 FORKING = ("multiprocessing",)

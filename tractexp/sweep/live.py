@@ -16,15 +16,16 @@ from statistics import median
 
 import numpy as np
 
-from tractexp import files, quoting
 from tractexp.blocks import Report, style
 from tractexp.blocks.block import Markup
 from tractexp.blocks.chart import Chart
 from tractexp.errors import UserError
+from tractexp.storage import files
 from tractexp.sweep import status
 from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.progress import Tally
 from tractexp.sweep.status import FAILED, FINISHED, SEARCHED, Status
+from tractexp.text import quoting
 
 PAGE = "sweep.html"
 LEADS_TO = "comparison.html"

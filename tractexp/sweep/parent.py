@@ -7,13 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import provenance, quoting, tracking
+from tractexp import tracking
 from tractexp.api.task import Job
+from tractexp.cache import provenance
 from tractexp.errors import UserError
-from tractexp.files import write_json
-from tractexp.progress import say
+from tractexp.storage.files import write_json
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import ESTIMATED, FAILED, FINISHED, INTERRUPTED, SEARCHED, read
+from tractexp.text import quoting
+from tractexp.text.progress import say
 from tractexp.tracking.runfile import save
 from tractexp.tracking.sweepfile import FILE, parent_of
 

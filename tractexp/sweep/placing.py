@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from tractexp import quoting
 from tractexp.errors import UserError
 from tractexp.sweep import status
 from tractexp.sweep.job import SweepJob
 from tractexp.sweep.status import ENDED, FINISHED, INTERRUPTED, RUNNING
+from tractexp.text import quoting
 
 
 def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:

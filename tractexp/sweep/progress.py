@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from tractexp.progress import Pace, console, say
 from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.status import FAILED, SEARCHED, Status
+from tractexp.text.progress import Pace, console, say
 
 MOST_NAMED_VARIANTS = 3  # variants named in a line of a log file
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from tractexp.errors import UserError
-from tractexp.progress import say
+from tractexp.text.progress import say
 from tractexp.tracking import log, runfile
 
 

@@ -10,9 +10,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
 from tractexp.errors import UserError, among
-from tractexp.files import write_json
+from tractexp.storage import files
+from tractexp.storage.files import write_json
 
 FILE = "status.json"
 AGAIN = ".tractexp.next.status.json"  # of a job that is done again, until that has ended

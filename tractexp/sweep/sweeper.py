@@ -16,15 +16,14 @@ from hydra.core.plugins import Plugins
 from hydra.plugins.sweeper import Sweeper
 from omegaconf import OmegaConf
 
-from tractexp import files
 from tractexp.api.task import Job
 from tractexp.blocks import Table
 from tractexp.cli.chosen import refuse_unread
 from tractexp.compat.hydra_plugins import NAMESPACE
+from tractexp.configuration.plugin import build, get
 from tractexp.errors import Stopped, UserError
-from tractexp.plugin import build, get
-from tractexp.progress import say
-from tractexp.run_folder import hold
+from tractexp.storage import files
+from tractexp.storage.run_folder import hold
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, find_shared_overrides
@@ -34,6 +33,7 @@ from tractexp.sweep.parent import parent_run
 from tractexp.sweep.placing import await_end, is_finished, place, placement, settle
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, INTERRUPTED
+from tractexp.text.progress import say
 from tractexp.tracking.sweepfile import MULTIRUN, PAGES
 
 REPEAT = "repeat the command to go on with the jobs that are left"

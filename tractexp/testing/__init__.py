@@ -12,8 +12,8 @@ import importlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from tractexp.configuration.plugin import Plugin, discover, import_all
 from tractexp.errors import UserError
-from tractexp.plugin import Plugin, discover, import_all
 from tractexp.testing import channels, loads, readers, searches, writers
 
 SUITES = (*loads.SUITES, searches.SUITE, readers.SUITE, *channels.SUITES, writers.SUITE)

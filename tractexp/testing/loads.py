@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from tractexp.configuration.plugin import discover
 from tractexp.errors import UserError, among
 from tractexp.kernel.layout import INPUTS
 from tractexp.model import sites
@@ -13,7 +14,6 @@ from tractexp.model.drive import PHASORS, WAVES, Drive
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
 from tractexp.parameter import Parameter
-from tractexp.plugin import discover
 from tractexp.testing import drives
 
 EQUATION_ROUNDING = 1e-12  # pu: what rounding leaves between equal equations

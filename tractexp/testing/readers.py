@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.files import PACKAGE
-from tractexp.plugin import build
 from tractexp.record import Reader
+from tractexp.storage.files import PACKAGE
 
 Samples = Mapping[str, Sequence[Mapping[str, Any]]]
 

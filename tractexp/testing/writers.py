@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.plugin import build
 from tractexp.record import Base, Record, endings, reader_of
 from tractexp.recording import Channel, Recording, Segment, Writer
 from tractexp.recording.reader import WaveformReader

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import TASK, UserError, among
+from tractexp.storage import files
 from tractexp.tracking.owner import search
 from tractexp.tracking.store import open_store, sentences
 

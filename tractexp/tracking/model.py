@@ -13,8 +13,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from tractexp import files
 from tractexp.errors import UserError
+from tractexp.storage import files
 
 if TYPE_CHECKING:
     import pandas as pd

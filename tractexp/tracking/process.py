@@ -18,8 +18,8 @@ from collections.abc import Iterable, Iterator
 from types import TracebackType
 from typing import Any
 
-from tractexp import interpreter
 from tractexp.errors import UserError
+from tractexp.process import interpreter
 from tractexp.tracking.run import TrackedRun, log
 from tractexp.tracking.store import import_mlflow, open_store
 

@@ -17,7 +17,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from tractexp import provenance
+from tractexp.cache import provenance
 from tractexp.errors import UserError, check_choice
 from tractexp.tracking import owner
 from tractexp.tracking.store import database_of, open_store, sentences

@@ -14,9 +14,9 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
 from tractexp.errors import UserError
-from tractexp.run_folder import find_run, settle
+from tractexp.storage import files
+from tractexp.storage.run_folder import find_run, settle
 from tractexp.tracking.run import Line, TrackedRun, choose_curve_points, flatten
 
 FILE = "mlflow.json"

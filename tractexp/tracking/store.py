@@ -18,8 +18,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tractexp import credentials, files, quoting
 from tractexp.errors import UserError
+from tractexp.storage import credentials, files
+from tractexp.text import quoting
 from tractexp.tracking.owner import close_quietly
 
 PATIENCE = 15.0  # s to wait for a process that writes to the database
@@ -100,7 +101,7 @@ def _create_database(database: Path) -> None:
     MLflow's migrations take a second of work; what they came to is kept for the next folder.
     """
     # imports NumPy, for which the process that logs does not wait
-    from tractexp.store import DATABASES, key, version
+    from tractexp.cache.store import DATABASES, key, version
 
     makers = [version(name) for name in ("mlflow", "sqlalchemy", "alembic")]
     files.write(database, DATABASES.get(key(makers, sqlite3.sqlite_version), _migrate))

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
 from tractexp.errors import UserError
+from tractexp.storage import files
 
 FILE = "sweep.json"
 MULTIRUN = "multirun.yaml"  # the configuration that every sweeper leaves in a sweep's folder

@@ -9,9 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import files, quoting
 from tractexp.errors import UserError
-from tractexp.run_folder import find_holder
+from tractexp.storage import files
+from tractexp.storage.run_folder import find_holder
+from tractexp.text import quoting
 from tractexp.tracking import runfile
 from tractexp.tracking.run import (
     KEY,

@@ -13,8 +13,8 @@ import webbrowser
 from collections.abc import Callable
 from typing import IO
 
-from tractexp import interpreter
 from tractexp.errors import UserError
+from tractexp.process import interpreter
 from tractexp.tracking.store import database_of
 
 USUAL_START_SECONDS = 10  # s until the server answers: 5 on two free cores, 20 on busy ones

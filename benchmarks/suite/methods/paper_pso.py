@@ -2,8 +2,8 @@
 
 from third_order import ThirdOrderLoad
 
+from tractexp.configuration.plugin import build
 from tractexp.identification.search import search
-from tractexp.plugin import build
 
 
 def fit(events):

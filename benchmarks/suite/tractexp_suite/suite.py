@@ -8,12 +8,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from tractexp import files, provenance, tracking
+from tractexp import tracking
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Table
+from tractexp.cache import provenance
+from tractexp.configuration.plugin import plugin
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Written
-from tractexp.plugin import plugin
+from tractexp.storage import files
 
 SUITE = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(SUITE))

@@ -8,9 +8,9 @@ import keyword
 import re
 from pathlib import Path
 
-from tractexp import files
-from tractexp.choices import choices
+from tractexp.configuration.choices import choices
 from tractexp.errors import UserError
+from tractexp.storage import files
 
 KINDS = {  # {kind: (group, how the plugin is chosen)}
     "effect": ("effect", "model.effects=[{}]"),

@@ -19,7 +19,7 @@ from tractexp.inference.fitting import Names, Start, refit
 from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
 from tractexp.record import Event
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 
 def event_for(

@@ -8,9 +8,9 @@ import inspect
 import re
 from collections.abc import Callable, Mapping
 
-from tractexp import quoting
 from tractexp.discrepancy.proposal import shapes
 from tractexp.discrepancy.proposal.library import Term
+from tractexp.text import quoting
 
 NAME = "proposed_effect"  # of the file, and so of the effect
 PREFIX = "proposed_"  # of the parameters, which share a model with others

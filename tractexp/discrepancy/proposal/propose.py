@@ -21,7 +21,7 @@ from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.noise import Noise
 from tractexp.record import Event
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 LIBRARY_DRAWS = 99  # of noise, for the best of the whole library
 LEAST_ACTING_SHARE = 0.1  # of the largest change: from where a term is said to act

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tractexp.wording import in_words, join_words, percent, with_error
+from tractexp.text.wording import in_words, join_words, percent, with_error
 
 
 def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> list[str]:

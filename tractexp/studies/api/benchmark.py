@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from tractexp import files, provenance
 from tractexp.api.arguments import Choice, public
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.cache import provenance
+from tractexp.configuration.plugin import build, get, plugin
 from tractexp.errors import UserError, check_distinct, check_range
 from tractexp.outcome import Written
-from tractexp.plugin import build, get, plugin
-from tractexp.progress import count_parts
+from tractexp.storage import files
+from tractexp.text.progress import count_parts
 
 if TYPE_CHECKING:
     from tractexp.studies.bbob.runs import BbobRuns

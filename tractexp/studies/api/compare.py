@@ -6,15 +6,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.task import Job, Task, print_paths
 from tractexp.blocks import Report, Table
+from tractexp.configuration.plugin import plugin
 from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Written
-from tractexp.plugin import plugin
-from tractexp.progress import say
+from tractexp.storage import files
 from tractexp.studies.api.search import Searches
+from tractexp.text.progress import say
 
 if TYPE_CHECKING:
     from tractexp.studies.comparison.comparison import Comparison

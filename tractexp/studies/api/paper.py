@@ -8,15 +8,15 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.setup import Setup, describe_records
 from tractexp.api.task import Job, Task, print_paths
 from tractexp.blocks import Report, Table
+from tractexp.configuration.plugin import plugin
 from tractexp.errors import check_choice, check_range
 from tractexp.outcome import Drawing, Written
-from tractexp.plugin import plugin
-from tractexp.progress import NEXT_LINES, Pace, say, tell_stages
+from tractexp.storage import files
+from tractexp.text.progress import NEXT_LINES, Pace, say, tell_stages
 
 if TYPE_CHECKING:
     from tractexp.studies.paper.claims import Claim

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from tractexp import files
 from tractexp.api.arguments import Choice, public
 from tractexp.api.setup import Setup
 from tractexp.blocks import Table
-from tractexp.composition import leaves
+from tractexp.configuration.composition import leaves
 from tractexp.errors import UserError, among, check_distinct, check_range
 from tractexp.outcome import Written
-from tractexp.progress import Progress, count_parts, tell
+from tractexp.storage import files
+from tractexp.text.progress import Progress, count_parts, tell
 
 if TYPE_CHECKING:
     from tractexp.studies.comparison.runs import SearchRun

@@ -4,12 +4,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Any
 
-from tractexp import files
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
+from tractexp.storage import files
 from tractexp.studies.bbob.runs import BbobRuns
 from tractexp.studies.comparison.charts import runtime_curves
-from tractexp.wording import count_noun
+from tractexp.text.wording import count_noun
 
 
 def scale(benchmark: BbobRuns) -> str:

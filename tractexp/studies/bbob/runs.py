@@ -14,8 +14,8 @@ import numpy as np
 from tractexp.errors import UserError, setting
 from tractexp.identification.optimizer import Optimizer
 from tractexp.identification.search import Limits, search
+from tractexp.process.workers import Workers
 from tractexp.studies.comparison.statistics import expected_running_time
-from tractexp.workers import Workers
 
 GROUPS = {
     "separable": range(1, 6),

@@ -7,7 +7,7 @@ from tractexp.studies.comparison.comparison import Comparison, VariantPair, seed
 from tractexp.studies.comparison.floor import FLOOR_SHARE
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
 from tractexp.studies.comparison.summary import Spread
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 LEAST_TOLD_RATIO = 1.2  # times the simulations of another variant are worth a word
 

@@ -15,7 +15,7 @@ from tractexp.inference.least_squares import MOST_NUMBERS, descend
 from tractexp.inference.problem import Problem
 from tractexp.parameter import best_distinct, even
 from tractexp.studies.comparison.runs import SearchRun
-from tractexp.wording import count_noun
+from tractexp.text.wording import count_noun
 
 FLOOR_SHARE = 0.01  # what ends within this share of the floor has reached it
 # starts: the best of a scatter that differ by so much of a range somewhere

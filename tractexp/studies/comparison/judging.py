@@ -6,13 +6,13 @@ from inspect import unwrap
 from pathlib import Path
 from typing import Any
 
-from tractexp import files, provenance
 from tractexp.api.setup import Setup
+from tractexp.cache import provenance
+from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError
 from tractexp.inference.problem import Problem
-from tractexp.plugin import discover, get
-from tractexp.progress import count_parts
 from tractexp.record import detect, read_records
+from tractexp.storage import files
 from tractexp.studies.api.benchmark import BenchmarkResult, benchmark
 from tractexp.studies.comparison.ablation import family
 from tractexp.studies.comparison.comparison import Comparison, compare
@@ -20,7 +20,8 @@ from tractexp.studies.comparison.floor import Polished, polish
 from tractexp.studies.comparison.load import nest_keys
 from tractexp.studies.comparison.overall import Overall, Several, on_functions, on_records, terms_of
 from tractexp.studies.comparison.runs import Gathered, SearchRun, gather
-from tractexp.wording import join_words
+from tractexp.text.progress import count_parts
+from tractexp.text.wording import join_words
 
 # on BBOB; the evaluations where the searches had no budget in common
 DIMENSION, EVALUATIONS = 5, 15_000

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
-from tractexp.composition import leaves
+from tractexp.configuration.composition import leaves
 from tractexp.errors import TASK, UserError
 from tractexp.identification.result import by_event, parse_history
+from tractexp.storage import files
 from tractexp.studies.comparison.runs import SearchRun
 
 FITTING = "identify"  # the task whose runs are compared

@@ -6,7 +6,7 @@ from tractexp.studies.comparison.ablation import SwitchEffect
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.overall import Overall, Several
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
-from tractexp.wording import in_words, join_words, percent
+from tractexp.text.wording import in_words, join_words, percent
 
 
 def answer(several: Several) -> str:

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.blocks import Report, style
 from tractexp.blocks.chart import Chart
+from tractexp.storage import files
 from tractexp.studies.comparison import charts
 from tractexp.studies.comparison import overall_claims as claims
 from tractexp.studies.comparison import page as one

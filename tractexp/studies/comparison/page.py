@@ -4,9 +4,9 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from tractexp import files
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
+from tractexp.storage import files
 from tractexp.studies.comparison import charts, claims
 from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
 from tractexp.studies.comparison.claims import number, p_value

@@ -11,8 +11,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from tractexp import files
 from tractexp.errors import TASK, UserError, among
+from tractexp.storage import files
 
 # The parts of a configuration. Every key belongs to one of them, so that nothing swept is pooled
 # under one name.

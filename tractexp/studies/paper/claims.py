@@ -17,7 +17,7 @@ from tractexp.studies.comparison.statistics import (
 from tractexp.studies.paper import equations, maps, printed, why
 from tractexp.studies.paper.printed import LABELS
 from tractexp.studies.paper.study import BUDGETS, TARGETS, Study
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 CONFIRMED, REFUTED = "confirmed", "not confirmed"
 IMPOSSIBLE = "cannot be reproduced"

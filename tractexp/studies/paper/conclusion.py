@@ -10,7 +10,7 @@ from tractexp.studies.paper import equations, why
 from tractexp.studies.paper.claims import CONFIRMED, DEPENDS, PAIRS, Claim, compare_ends, number
 from tractexp.studies.paper.printed import COMPARED, LABELS
 from tractexp.studies.paper.study import FLOOR_FACTOR, NARROW, TRADED, WIDE, Study
-from tractexp.wording import join_words
+from tractexp.text.wording import join_words
 
 # times the lowest objective: a valley that a search might take for the right one
 LARGEST_NEAR_RATIO = 2.0

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.configuration.plugin import build
 from tractexp.identification.result import ACCEPTED
 from tractexp.identification.search import Limits, search
-from tractexp.plugin import build
 from tractexp.studies.paper import maps, printed
 from tractexp.studies.paper.printed import LABELS
 

@@ -23,7 +23,7 @@ from tractexp.studies.paper.study import (
     TRADED,
     Study,
 )
-from tractexp.wording import as_sentence
+from tractexp.text.wording import as_sentence
 
 SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.configuration.plugin import build
 from tractexp.identification.optimizer import Box
-from tractexp.plugin import build
 
 FLOCK_DRAWS = 200  # flocks of each kind whose discrepancy is taken
 LEVY_STEPS = 200_000  # Lévy steps whose tail is measured

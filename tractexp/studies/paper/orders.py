@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.configuration.plugin import build
 from tractexp.identification.estimate import estimate
 from tractexp.identification.result import Fit, parts, respond
 from tractexp.identification.search import search
@@ -15,7 +16,6 @@ from tractexp.identification.verdict import IDENTIFIED
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
 from tractexp.model.operations import Cost, Operations, count
-from tractexp.plugin import build
 from tractexp.record import Event
 
 # simulated together when the time is taken: some milliseconds, less than a turn of a busy core

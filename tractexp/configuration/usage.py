@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from tractexp.choices import (
+from tractexp.configuration.choices import (
     FEWEST_VARIANTS,
     Option,
     choices,
@@ -178,7 +178,7 @@ def _import_choices(
     """The choices as they are once every plugin is imported, and why those that fit no group cannot
     be.
     """
-    from tractexp.plugin import register_all
+    from tractexp.configuration.plugin import register_all
 
     classes_of, refused = register_all()
     result = {group: dict(names) for group, names in options.items()}

@@ -24,9 +24,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
 
-from tractexp.choices import CONF as CONF
-from tractexp.choices import configuration_folders as configuration_folders
-from tractexp.choices import entry_points, modules
+from tractexp.configuration.choices import CONF as CONF
+from tractexp.configuration.choices import configuration_folders as configuration_folders
+from tractexp.configuration.choices import entry_points, modules
 from tractexp.errors import Unknown, UserError, among, setting
 from tractexp.parameter import Parameter
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tractexp.choices import describe_available, elsewhere
+from tractexp.configuration.choices import describe_available, elsewhere
 from tractexp.errors import UserError, among
 
 HYDRA = ("hydra", "omegaconf", "antlr4")  # whose code composes configurations
@@ -218,7 +218,7 @@ def _unknown_key(key: str, error: Any) -> str:
 
 def _groups() -> list[str]:
     """The groups that a choice can be made in."""
-    from tractexp.plugin import discover
+    from tractexp.configuration.plugin import discover
 
     return sorted({*discover(), "model", "experiment"})
 

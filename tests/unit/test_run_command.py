@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tractexp import plugin, provenance
+from tractexp.configuration import plugin, run_command
 
 
 @pytest.mark.parametrize(
@@ -31,8 +31,8 @@ from tractexp import plugin, provenance
     ],
 )
 def test_records_and_load_of_a_run_are_repeated(monkeypatch, arguments, settings, expected):
-    monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
-    assert provenance.build_again_command(*settings) == expected
+    monkeypatch.setattr(run_command, "_started", ["tractexp", *arguments])
+    assert run_command.build_again_command(*settings) == expected
 
 
 def test_an_extended_model_is_fitted_to_the_records_of_its_run(monkeypatch):
@@ -44,8 +44,10 @@ def test_an_extended_model_is_fitted_to_the_records_of_its_run(monkeypatch):
         "model=old",
         "model.fixed.C=0.8",
     ]
-    monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
-    command = provenance.build_again_command("--config-dir", "conf", "model=extended", of=("data",))
+    monkeypatch.setattr(run_command, "_started", ["tractexp", *arguments])
+    command = run_command.build_again_command(
+        "--config-dir", "conf", "model=extended", of=("data",)
+    )
     assert (
         command == "tractexp --config-dir conf model=extended data=archive 'data.path=my records'"
     )
@@ -59,20 +61,21 @@ def test_a_long_command_is_told_by_the_folder_of_its_run(monkeypatch, tmp_path):
         "data.validate=[2]",
         "domain=waves",
     ]
-    monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
-    monkeypatch.setattr(provenance, "_placed", [])
+    monkeypatch.setattr(run_command, "_started", ["tractexp", *arguments])
+    monkeypatch.setattr(run_command, "_placed", [])
     monkeypatch.chdir(tmp_path)
-    provenance.remember_folder(tmp_path / "outputs" / "run")
+    run_command.remember_folder(tmp_path / "outputs" / "run")
     assert (
-        provenance.build_again_command("task=discrepancy")
+        run_command.build_again_command("task=discrepancy")
         == "tractexp again outputs/run task=discrepancy"
     )
-    assert provenance.build_again_command("model=extended", of=("data",)).startswith(
+    assert run_command.build_again_command("model=extended", of=("data",)).startswith(
         "tractexp model=extended data=comtrade"
     )
-    monkeypatch.setattr(provenance, "_started", ["tractexp", "data=tibet"])
+    monkeypatch.setattr(run_command, "_started", ["tractexp", "data=tibet"])
     assert (
-        provenance.build_again_command("task=discrepancy") == "tractexp task=discrepancy data=tibet"
+        run_command.build_again_command("task=discrepancy")
+        == "tractexp task=discrepancy data=tibet"
     )
 
 
@@ -91,11 +94,11 @@ def test_a_long_command_is_told_by_the_folder_of_its_run(monkeypatch, tmp_path):
     ],
 )
 def test_the_dips_held_out_are_fitted_too(monkeypatch, train, validate, settings):
-    monkeypatch.setattr(provenance, "_roles", {})
-    provenance.remember_roles(train, validate)
-    assert provenance.list_settings_of_all() == settings
-    monkeypatch.setattr(provenance, "_started", ["tractexp", "data.train=[9]", "data.path=a.cfg"])
-    command = provenance.build_again_command("model=m", *settings, of=("data",))
+    monkeypatch.setattr(run_command, "_roles", {})
+    run_command.remember_roles(train, validate)
+    assert run_command.list_settings_of_all() == settings
+    monkeypatch.setattr(run_command, "_started", ["tractexp", "data.train=[9]", "data.path=a.cfg"])
+    command = run_command.build_again_command("model=m", *settings, of=("data",))
     assert ("data.train=[9]" in command) == (not train or not validate)
     assert command.endswith("data.path=a.cfg")
 

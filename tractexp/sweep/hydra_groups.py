@@ -15,12 +15,12 @@ from hydra.plugins.config_source import ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import OmegaConf
 
-from tractexp import plugin
+from tractexp.cache.store import TEXTS, environment, key
 from tractexp.compat import hydra_config_store, hydra_plugins, hydra_versions
-from tractexp.composition import MODEL
-from tractexp.model_file import is_model_path, read_model_file
-from tractexp.schema import Config
-from tractexp.store import TEXTS, environment, key
+from tractexp.configuration import plugin
+from tractexp.configuration.composition import MODEL
+from tractexp.configuration.model_file import is_model_path, read_model_file
+from tractexp.configuration.schema import Config
 
 
 class PluginSearchPath(SearchPathPlugin):

@@ -21,9 +21,9 @@ from tractexp.errors import nearest
 
 ENTRY_POINTS = "tractexp.plugins"
 FEWEST_VARIANTS = 3  # of a plugin that are told as a number
-HERE = Path(__file__).resolve().parent
+PACKAGE = Path(__file__).resolve().parents[1]
 # in a wheel, in a clone
-CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yaml").is_file())
+CONF = next(p for p in (PACKAGE / "conf", PACKAGE.parent / "conf") if (p / "config.yaml").is_file())
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tractexp import plugin
-from tractexp.choices import describe_available, elsewhere
+from tractexp.configuration import plugin
+from tractexp.configuration.choices import describe_available, elsewhere
+from tractexp.configuration.model_file import is_model_path, read_model_file
 from tractexp.errors import UserError
-from tractexp.model_file import is_model_path, read_model_file
 
 MODEL = "model"  # the group
 

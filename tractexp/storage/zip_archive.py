@@ -1,7 +1,8 @@
 """Files within a .zip, by paths such as record.zip/a.cfg: read where they are, and nothing is
 unpacked to the disk.
 
-`tractexp/files.py` alone asks here; it reads a file of an archive as it reads one of a folder.
+`tractexp/storage/files.py` alone asks here; it reads a file of an archive as it reads one of a
+folder.
 """
 
 import contextlib

@@ -30,8 +30,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files, provenance
+from tractexp.cache import provenance
 from tractexp.errors import UserError
+from tractexp.storage import files
 
 CHOICE = "TRACTEXP_CACHE_DIR"
 SUM = hashlib.sha256().digest_size  # bytes a file begins with

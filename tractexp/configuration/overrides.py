@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from tractexp import files, quoting
+from tractexp.configuration.model_file import is_model_path
 from tractexp.errors import UserError, among
-from tractexp.model_file import is_model_path
+from tractexp.storage import files
+from tractexp.text import quoting
 
 # settings that take names of their own
 OPEN = (
@@ -104,7 +105,7 @@ def _refuse_word(word: str) -> None:
     """Raise `UserError` for an argument that is neither KEY=VALUE nor anything else that could be
     meant.
     """
-    from tractexp.choices import elsewhere
+    from tractexp.configuration.choices import elsewhere
 
     raise UserError(
         f"{' '.join(word.split()):.200} is no setting (KEY=VALUE), no command, and no file or"
@@ -192,7 +193,7 @@ def _take_config_folder(arguments: list[str]) -> tuple[list[str], Path | None, l
 @functools.cache
 def groups() -> tuple[str, ...]:
     """What is chosen by a name."""
-    from tractexp.choices import defaults
+    from tractexp.configuration.choices import defaults
 
     own = (name.removeprefix("override ") for name in defaults())
     return ("hydra", *own, "model/motor", "model/static")
@@ -200,7 +201,7 @@ def groups() -> tuple[str, ...]:
 
 def _several(group: str, value: str) -> list[str]:
     """The overrides that a list chosen in a group stands for."""
-    from tractexp.plugin import of_several
+    from tractexp.configuration.plugin import of_several
 
     listed = _parts(value.strip()[1:-1])
     node = of_several(group, [part.strip() for part in listed])

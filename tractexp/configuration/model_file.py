@@ -2,8 +2,8 @@
 
 Hydra does as the files that it composes say: `@package` in a first line, `defaults` that reach any
 group, references that a resolver fills in. A model's file may come from a stranger. So it is read
-here for both the command line (`tractexp.config`) and Python (`tractexp.composition`): keys of a
-model, names of its parts, and values.
+here for both the command line (`.config`) and Python (`.composition`): keys of a model, names of
+its parts, and values.
 """
 
 import re
@@ -12,9 +12,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
+from tractexp.configuration.schema import ModelConfig
 from tractexp.errors import UserError, among
-from tractexp.schema import ModelConfig
+from tractexp.storage import files
 
 ENDINGS = (".yaml", ".yml")
 LARGEST = 1 << 20  # bytes

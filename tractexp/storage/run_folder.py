@@ -18,8 +18,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeAlias
 
-from tractexp import files
 from tractexp.errors import UserError
+from tractexp.storage import files
 
 CONFIGURATION, RESULT = ".hydra", "result.json"
 WHOLE, NEXT, LOCK, GOES = (

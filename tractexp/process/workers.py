@@ -20,8 +20,8 @@ from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from tractexp import interpreter
 from tractexp.errors import UserError
+from tractexp.process import interpreter
 
 BARREN = 3  # times in a row that workers may be killed before they begin a call
 WATCH = 0.5  # s between two looks of a worker at its parent

@@ -11,10 +11,10 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from tractexp.store import TEXTS, version
+from tractexp.cache.store import TEXTS, version
 
 # whose files make texts of parts
-CODE = tuple(Path(__file__).parent / folder for folder in ("kernel", "model"))
+CODE = tuple(Path(__file__).parents[1] / folder for folder in ("kernel", "model"))
 # in the `repr` of what has none of its own
 ADDRESS = re.compile(r" at 0x[0-9a-f]+>", re.IGNORECASE)
 

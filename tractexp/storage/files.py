@@ -25,10 +25,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
-from tractexp import zip_archive
 from tractexp.errors import UserError
-from tractexp.zip_archive import is_archive as is_archive
-from tractexp.zip_archive import is_called_archive as is_called_archive
+from tractexp.storage import zip_archive
+from tractexp.storage.zip_archive import is_archive as is_archive
+from tractexp.storage.zip_archive import is_called_archive as is_called_archive
 
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
 PART = ".tractexp.part"  # ends the name of a file that is being written
@@ -62,7 +62,7 @@ def locate_file(path: str) -> Path:
 
 def read_packaged_text(name: str) -> str:
     """The text of a file that the package brings along, such as `blocks/chart.js`."""
-    return (Path(__file__).parent / name).read_text(encoding="utf-8")
+    return (Path(__file__).parents[1] / name).read_text(encoding="utf-8")
 
 
 def there(path: Path | str) -> bool:

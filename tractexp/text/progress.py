@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-from tractexp.wording import one_line
+from tractexp.text.wording import one_line
 
 LOG_WIDTH = 120  # characters a table may take in a log file
 WIDTH = "COLUMNS"  # the variable by which a user says how many, wherever it is printed

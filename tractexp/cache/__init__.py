@@ -1,0 +1,1 @@
+"""What was computed and is kept, under keys of all that it depends on."""

@@ -1,0 +1,1 @@
+"""Choices and settings: what can be chosen, how it is composed, checked and refused."""

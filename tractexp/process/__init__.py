@@ -1,0 +1,1 @@
+"""Processes: workers of many calls, how another Python is started, threads of libraries."""
