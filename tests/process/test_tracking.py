@@ -185,7 +185,7 @@ def test_artifacts_lie_beside_the_database_wherever_the_process_runs(tmp_path, e
     elsewhere.mkdir()
     (elsewhere / "note.txt").write_text("hello")
     script = """
-import sys; from pathlib import Path; from tractexp import provenance, tracking
+import sys; from pathlib import Path; from tractexp import tracking
 run = tracking.TrackedRun("identify: tibet/50", "r", artifacts=[Path("note.txt")])
 print(tracking.log(run, tracking.default_uri(Path(sys.argv[1]))))"""
     run_id = python(script, str(home), cwd=elsewhere, check=True).stdout.strip()
@@ -199,7 +199,7 @@ print(tracking.log(run, tracking.default_uri(Path(sys.argv[1]))))"""
 def test_processes_that_meet_on_a_fresh_store_all_log_their_run(tmp_path):
     """MLflow's own migrations break when two processes start them together."""
     script = """
-import sys; from pathlib import Path; from tractexp import provenance, tracking
+import sys; from pathlib import Path; from tractexp import tracking
 run = tracking.TrackedRun("sweep", f"job-{sys.argv[2]}", metrics={"x": 1.0})
 tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
     jobs = [
@@ -237,7 +237,7 @@ def test_the_store_of_a_second_folder_needs_no_migrations_and_is_its_own(tmp_pat
 
 def test_a_creation_that_was_killed_leaves_nothing_that_hinders_the_next(tmp_path):
     script = """
-import os, sys; from pathlib import Path; from tractexp import provenance, tracking
+import os, sys; from pathlib import Path; from tractexp import tracking
 os.replace = lambda *_: os._exit(9)
 tracking.open_store(tracking.default_uri(Path(sys.argv[1])))"""
     assert python(script, str(tmp_path)).returncode == 9
