@@ -165,3 +165,15 @@ def test_a_run_goes_on_where_it_stopped_and_a_changed_method_is_run_again(tmp_pa
         (52, None),
         (52, [True, True]),
     ]
+
+
+def test_the_stored_rows_are_whole_and_their_tables_are_shown():
+    """Of every method as its file is now, the public cases and the records."""
+    rows = run.read_rows(page.STORED)
+    methods = {path.stem: run.digest(path) for path in run.METHODS.glob("*.py")}
+    assert {row["method"]: row["file"] for row in rows} == methods
+    cases = {name: sorted(r["case"] for r in rows if r["method"] == name) for name in methods}
+    least = {*run.MADE, *run.RECORDS} - {*run.DRAWN}
+    assert all(least <= {*own} and own == cases["paper_pso"] for own in cases.values())
+    shown = (page.HERE / "README.md").read_text(encoding="utf-8")
+    assert page.marked.parted(shown, page.MARK)[1].strip() == page.make_tables(rows)
