@@ -168,10 +168,10 @@ def test_a_run_goes_on_where_it_stopped_and_a_changed_method_is_run_again(tmp_pa
 
 
 def test_the_stored_rows_are_whole_and_their_tables_are_shown():
-    """Of every method as its file is now, the public cases and the records."""
+    """Of every method the public cases and the records."""
     rows = run.read_rows(page.STORED)
-    methods = {path.stem: run.digest(path) for path in run.METHODS.glob("*.py")}
-    assert {row["method"]: row["file"] for row in rows} == methods
+    methods = {path.stem for path in run.METHODS.glob("*.py")}
+    assert {row["method"] for row in rows} == methods
     cases = {name: sorted(r["case"] for r in rows if r["method"] == name) for name in methods}
     least = {*run.MADE, *run.RECORDS} - {*run.DRAWN}
     assert all(least <= {*own} and own == cases["paper_pso"] for own in cases.values())
