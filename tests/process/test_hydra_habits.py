@@ -226,3 +226,39 @@ def test_what_hydra_would_say_in_its_own_words_is_a_sentence(arguments, sentence
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert done.stderr.startswith("tractexp: ")
     assert sentence in done.stderr
+
+
+def test_jobs_are_composed_once_a_choice_and_as_hydra_composes_each(monkeypatch):
+    """Hydra takes 0.1 s to compose one; what it makes of each is compared with what the jobs are
+    given.
+    """
+    import unittest.mock
+
+    from hydra import initialize_config_dir
+    from hydra.core.global_hydra import GlobalHydra
+    from hydra.types import RunMode
+
+    from tractexp.choices import CONF
+    from tractexp.compat.hydra_versions import behavior
+    from tractexp.config import register
+    from tractexp.sweep.compose import Composer
+
+    register([])
+    jobs = [
+        ("optimizer=pso", "seed=3", "budget=200"),
+        ("optimizer=issa", "optimizer.population=30", "seed=${hydra:job.num}"),
+        ("optimizer=pso", "++model.fixed.q_v=3", "seed=4"),
+        ("optimizer=pso", "data.train=[a.csv,b.csv]", "seed=5"),
+        ("optimizer=issa", "optimizer.producers=0.3", "tracking.uri=null"),
+    ]
+    with initialize_config_dir(str(CONF), **behavior()):
+        loader = GlobalHydra.instance().config_loader()
+        master = loader.load_configuration("config", [], run_mode=RunMode.MULTIRUN)
+        compose = Composer(loader, master)
+        counted = unittest.mock.Mock(side_effect=loader.load_sweep_config)
+        monkeypatch.setattr(loader, "load_sweep_config", counted)
+        composed = [compose(overrides, number) for number, overrides in enumerate(jobs)]
+        assert counted.call_count == 3, "once for each optimizer, and where a key is added"
+        for number, (one, overrides) in enumerate(zip(composed, jobs, strict=True)):
+            whole = compose._as_hydra_composes(overrides, number)
+            assert (one.config, one.choices) == (whole.config, whole.choices)

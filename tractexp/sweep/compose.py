@@ -32,9 +32,8 @@ class Composer:
         self._is_group = functools.cache(lambda key: bool(loader.get_group_options(key)))
         self._base = functools.cache(self._composed_base)
         self._subdir = OmegaConf.to_container(master.hydra.sweep, resolve=False)["subdir"]  # type: ignore[index, call-overload]
-        self._reads_hydra = (
-            bool(master.hydra.callbacks) or master.hydra.job_logging.get("root") is not None
-        )
+        # a logger without a handler writes nothing
+        self._reads_hydra = bool(master.hydra.callbacks or master.hydra.job_logging.get("handlers"))
 
     def __call__(self, overrides: Sequence[str], number: int) -> Composed:
         """The job of this number with these overrides."""
@@ -83,7 +82,7 @@ def _number(whole: DictConfig, number: int) -> None:
     """Give a job its number, and let `${hydra:...}` refer to it."""
     from hydra.core.hydra_config import HydraConfig
 
-    with open_dict(whole), read_write(whole):
+    with open_dict(whole), read_write(whole.hydra):  # read-only since the job before
         whole.hydra.job.num = number
         whole.hydra.job.id = f"{whole.hydra.job.name}_{number}"
     HydraConfig.instance().set_config(whole)

@@ -68,6 +68,7 @@ class Cores(Launcher):
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
         """Raise `UserError` for a backend or numbers that cannot be."""
         self.hydra_context, self.config = hydra_context, config
+        self.compose = Composer(hydra_context.config_loader, config)
         check_choice("hydra.launcher.backend", self.workers.backend, backends())
         if self.workers.n_jobs != -1:
             check_range("hydra.launcher.n_jobs", self.workers.n_jobs, 1)
@@ -82,11 +83,10 @@ class Cores(Launcher):
         A job that was done before, in this sweep or an earlier one in the same folder, is not run
         again.
         """
-        compose = Composer(self.hydra_context.config_loader, self.config)
         folder = Path(self.config.hydra.sweep.dir).absolute()
         numbered = enumerate(job_overrides, start=initial_job_idx)
         jobs = place(
-            [SweepJob.from_composed(compose(texts, k), texts) for k, texts in numbered], folder
+            [SweepJob.from_composed(self.compose(texts, k), texts) for k, texts in numbered], folder
         )
         self.launched |= {job.folder: job for job in jobs}
         asked: Any = OmegaConf.to_container(self.config.hydra.overrides.task)
