@@ -635,9 +635,8 @@ def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
     )
     try:
         said = ui.stdout.readline()
-        assert said.startswith(
-            f"starting the MLflow UI on http://127.0.0.1:{port}/, which takes about"
-        )
+        assert said.startswith(f"starting the MLflow UI on port {port}, which takes about")
+        assert "http" not in said, "MLflow's plain address opens a page on language models"
         assert f"it shows {uri}" in said
         assert re.match(rf"ready after \d+ s: http://127\.0\.0\.1:{port}/", ui.stdout.readline())
         assert answers(f"http://127.0.0.1:{port}/")

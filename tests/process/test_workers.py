@@ -10,6 +10,7 @@ from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import pytest
+from joblib.parallel import BACKENDS, ThreadingBackend
 
 from tractexp.errors import UserError
 from tractexp.process import interpreter
@@ -110,6 +111,18 @@ def pause(seconds):
 def test_what_a_call_had_left_is_its_result():
     ends = list(Killed().results(abs, [1, 2], trace=lambda item: f"end of {item}"))
     assert ends == [(1, "end of 1"), (2, "end of 2")]
+
+
+def test_a_backend_that_gives_its_results_at_the_end_alone_does_the_calls(monkeypatch):
+    """As joblib's "multiprocessing" and Ray's, whose workers are processes."""
+
+    class AtTheEnd(ThreadingBackend):
+        supports_return_generator = False
+
+    monkeypatch.setitem(BACKENDS, "at_the_end", AtTheEnd)
+    for n_jobs in (1, 2):
+        found = Workers(n_jobs, "at_the_end", apart=True).results(abs, [-1, -2, -3])
+        assert [*found] == [(-1, 1), (-2, 2), (-3, 3)]
 
 
 def test_calls_that_are_given_up_end_without_a_warning_whatever_other_threads_filter():

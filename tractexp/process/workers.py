@@ -61,15 +61,11 @@ class Workers:
         Raises `BrokenExecutor` where a worker is killed; a killed worker of a Dask cluster leaves
         its item out.
         """
-        from joblib import Parallel, delayed, effective_n_jobs
+        from joblib import delayed, effective_n_jobs
 
         with self._chosen(), _quiet():
             n = min(self.n_jobs if self.n_jobs > 0 else effective_n_jobs(self.n_jobs), count)
-            # numbers, other than joblib's annotations say
-            dispatch: Any = {"batch_size": 1, "pre_dispatch": n}
-            parallel: Any = Parallel(
-                max(n, 1 + self.apart), return_as="generator_unordered", **dispatch
-            )
+            parallel = _make_parallel(max(n, 1 + self.apart), ahead=n)
             calls = (delayed(_number_result)(function, k, item) for k, item in enumerate(items))
             # One at a time where one is at work: joblib drops a result that waits when the next
             # call kills its worker.
@@ -80,7 +76,8 @@ class Workers:
                 finally:
                     # anew: a thread that ends its own `catch_warnings` takes these filters back
                     with _quiet():
-                        results.close()
+                        if not isinstance(results, list):
+                            results.close()
 
     def results(
         self,
@@ -157,6 +154,22 @@ class Workers:
                 chosen = {"backend": self.backend}
             stack.enter_context(parallel_config(**chosen))
             yield
+
+
+def _make_parallel(n_jobs: int, ahead: int) -> Any:
+    """A `Parallel` of so many workers that takes so many calls ahead, one a time.
+
+    Results come as they are done; all at the end from a backend that knows no other way, as
+    "multiprocessing" and Ray's.
+    """
+    from joblib import Parallel
+
+    # numbers, other than joblib's annotations say
+    dispatch: Any = {"n_jobs": n_jobs, "batch_size": 1, "pre_dispatch": ahead}
+    try:
+        return Parallel(return_as="generator_unordered", **dispatch)
+    except ValueError:
+        return Parallel(**dispatch)
 
 
 def _number_result(function: Callable[[Any], Any], k: int, item: Any) -> tuple[int, Any]:
