@@ -648,8 +648,8 @@ for _ in Workers(1, apart=True).run_items(time.sleep, [0, 600], 2):
         (["optimizer=glob(nothing*)"], "the sweep has no jobs: optimizer=glob(nothing*) is empty"),
         (
             ["hydra.launcher.backend=threads"],
-            "hydra.launcher.backend=threads is not one of dask, loky, multiprocessing, sequential,"
-            " threading",
+            "hydra.launcher.backend=threads is not one of dask, loky, multiprocessing, ray,"
+            " sequential, threading",
         ),
         (
             ["hydra.launcher.n_jobs=0"],

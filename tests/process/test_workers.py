@@ -8,6 +8,7 @@ import time
 import warnings
 from concurrent.futures import BrokenExecutor
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from joblib.parallel import BACKENDS, ThreadingBackend
@@ -113,16 +114,29 @@ def test_what_a_call_had_left_is_its_result():
     assert ends == [(1, "end of 1"), (2, "end of 2")]
 
 
+class AtTheEnd(ThreadingBackend):
+    """Gives its results at the end alone, as joblib's "multiprocessing" and Ray's."""
+
+    supports_return_generator = False
+
+
 def test_a_backend_that_gives_its_results_at_the_end_alone_does_the_calls(monkeypatch):
-    """As joblib's "multiprocessing" and Ray's, whose workers are processes."""
-
-    class AtTheEnd(ThreadingBackend):
-        supports_return_generator = False
-
     monkeypatch.setitem(BACKENDS, "at_the_end", AtTheEnd)
     for n_jobs in (1, 2):
         found = Workers(n_jobs, "at_the_end", apart=True).results(abs, [-1, -2, -3])
         assert [*found] == [(-1, 1), (-2, 2), (-3, 3)]
+
+
+def test_ray_is_asked_for_its_backend_where_it_is_installed(monkeypatch):
+    """Here a stand-in of it; Ray 2.60 itself runs a sweep."""
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(UserError, match="backend=ray needs Ray, which is not installed"):
+        list(Workers(2, "ray").results(abs, [-1]))
+    monkeypatch.setitem(BACKENDS, "ray", None)
+    ray = SimpleNamespace(register_ray=lambda: BACKENDS.update(ray=AtTheEnd))
+    for name in ("ray", "ray.util", "ray.util.joblib"):
+        monkeypatch.setitem(sys.modules, name, ray)
+    assert [*Workers(2, "ray").results(abs, [-1, -2])] == [(-1, 1), (-2, 2)]
 
 
 def test_calls_that_are_given_up_end_without_a_warning_whatever_other_threads_filter():

@@ -9,6 +9,7 @@ watches the parent.
 """
 
 import contextlib
+import importlib
 import multiprocessing
 import os
 import signal
@@ -35,13 +36,13 @@ def backends() -> list[str]:
     """
     from joblib.parallel import BACKENDS
 
-    return sorted({*BACKENDS, "dask"})
+    return sorted({*BACKENDS, "dask", "ray"})
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Workers of a joblib backend: "loky" (processes of this computer), "dask", "threading" or a
-    registered one.
+    """Workers of a joblib backend: "loky" (processes of this computer), "dask", "ray", "threading"
+    or a registered one.
 
     `n_jobs` -1: one for each core this process may use, containers' limits considered, or all of a
     cluster. `address` is that of a Dask scheduler; without one, "dask" starts a cluster here. One
@@ -151,6 +152,8 @@ class Workers:
             elif self.backend == "loky":
                 chosen = {"backend": "loky", "inner_max_num_threads": 1, "initializer": _begin}
             else:
+                if self.backend == "ray":
+                    _register_ray()
                 chosen = {"backend": self.backend}
             stack.enter_context(parallel_config(**chosen))
             yield
@@ -226,6 +229,16 @@ def _end_with(parent: Any) -> None:
     while os.name != "nt" and os.getppid() == parent.pid:
         time.sleep(WATCH)
     os._exit(1)
+
+
+def _register_ray() -> None:
+    """Let joblib know Ray's backend. Raises `UserError` where Ray is not installed."""
+    try:
+        importlib.import_module("ray.util.joblib").register_ray()
+    except ImportError:
+        raise UserError(
+            "hydra.launcher.backend=ray needs Ray, which is not installed: pip install ray"
+        ) from None
 
 
 @contextlib.contextmanager
