@@ -238,10 +238,10 @@ def test_jobs_are_composed_once_a_choice_and_as_hydra_composes_each(monkeypatch)
     from hydra.core.global_hydra import GlobalHydra
     from hydra.types import RunMode
 
-    from tractexp.choices import CONF
     from tractexp.compat.hydra_versions import behavior
-    from tractexp.config import register
+    from tractexp.configuration.choices import CONF
     from tractexp.sweep.compose import Composer
+    from tractexp.sweep.hydra_groups import register
 
     register([])
     jobs = [
