@@ -10,6 +10,4 @@ search = {"name": "multistart_least_squares", "starts": 2}
 fit = tractexp.identify("tibet_50pct", optimizer=search, check_intervals=False)
 made = tractexp.export(fit, "andes", bus=4, power=20.0, doubtful=True)
 print(made)
-page = fit.predict(
-    t=[k / 500 for k in range(500)], U=[1 - 0.4 * (100 < k < 200) for k in range(500)]
-)
+page = fit.sheet()

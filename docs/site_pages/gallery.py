@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tractexp.blocks import Report
-from tractexp.blocks.block import ChartBlock, Charts, Fold
-from tractexp.blocks.chart import Chart
+from tractexp.blocks.block import ChartBlock, Charts, Figure, Fold
 from tractexp.blocks.drawing import draw_chart
+from tractexp.storage import files
 
 EXAMPLES = Path(__file__).parents[1] / "gallery"
 LEAD = (
@@ -51,9 +51,15 @@ def _run_example(path: Path, folder: Path) -> str:
     parts = [f"## {title}", about.strip(), f"```python\n{_without_docstring(text)}\n```"]
     if lines := printed.rstrip().split("\n")[:MOST_LINES]:
         parts.append("```text\n" + "\n".join(lines) + "\n```")
-    if charts := [*_find_charts(page.blocks)]:
-        picture = draw_chart(charts[0], folder / "gallery" / f"{path.stem}.svg")
-        parts.append(f"![{title}](gallery/{picture.name})")
+    picture = folder / "gallery" / f"{path.stem}.svg"
+    match next(_find_pictures(page.blocks), None):
+        case Figure(svg):
+            files.write(picture, svg.encode())
+        case ChartBlock(chart):
+            draw_chart(chart, picture)
+        case None:
+            raise ValueError(f"{path.name}: its page has no picture")
+    parts.append(f"![{title}](gallery/{picture.name})")
     return "\n\n".join(parts)
 
 
@@ -76,12 +82,12 @@ def _without_docstring(text: str) -> str:
     return "\n".join(text.splitlines()[first.end_lineno :]).strip()
 
 
-def _find_charts(blocks: Sequence[object]) -> Iterator[Chart]:
-    """The charts of a page in their order."""
+def _find_pictures(blocks: Sequence[object]) -> Iterator[Figure | ChartBlock]:
+    """The figures and charts of a page in their order."""
     for block in blocks:
-        if isinstance(block, ChartBlock):
-            yield block.chart
+        if isinstance(block, Figure | ChartBlock):
+            yield block
         elif isinstance(block, Charts):
-            yield from (one.chart for one in block.charts)
+            yield from block.charts
         elif isinstance(block, Fold):
-            yield from _find_charts(block.blocks)
+            yield from _find_pictures(block.blocks)

@@ -57,3 +57,6 @@ def test_a_chart_is_drawn_in_the_units_of_its_page_without_what_a_click_draws(tm
     bars = Chart("gain", [""], log_x=True).bars("gain", ["a", "b"], [2, 1], BLUE)
     bars.points("best", [2], ["a"], BLUE)
     assert draw_chart(bars, tmp_path / "bars.png").stat().st_size > 1000
+    waves = Chart("t [s]", ["i [pu]"]).samples("a", 0.0, 1e-3, np.sin(np.arange(300)), BLUE)
+    waves.phasors("a", 0.0, 1e-3, np.ones(300) * (1 + 1j), BLUE, 0)
+    assert "i [pu]" in draw_chart(waves, tmp_path / "waves.svg").read_text(encoding="utf-8")

@@ -2,13 +2,14 @@
 as errors.
 """
 
+import ast
 import dataclasses
 import re
 from pathlib import Path
 
 import pytest
 
-from site_pages import api, catalogue, commands, criteria, markdown, tasks
+from site_pages import api, catalogue, commands, criteria, gallery, markdown, tasks
 from tractexp import PUBLIC
 from tractexp.configuration.plugin import discover, get
 from tractexp.discrepancy.criteria import Criteria
@@ -188,3 +189,23 @@ def test_commands_of_a_page_are_its_code_and_nothing_else(tmp_path):
     assert (first.heading, first.arguments) == ("One", ["look", "a.cfg"])
     assert (second.heading, second.arguments) == ("Two", ["-m", "seed=1,2", "budget=5"])
     assert [c.line for c in commands.inline(path)] == ["tractexp ui"]
+
+
+def test_the_gallery_has_twelve_programs_each_with_what_it_is_for():
+    listed = gallery.list_examples()
+    assert len(listed) == 12
+    assert {*listed} == {*(DOCS / "gallery").glob("*.py")}
+    for path in listed:
+        title, empty, about = (ast.get_docstring(ast.parse(path.read_text())) or "").split("\n", 2)
+        assert title
+        assert not empty
+        assert len(about.split()) > 10, path.name
+
+
+def test_a_program_of_the_gallery_stands_with_what_it_prints_and_its_picture(tmp_path):
+    section = gallery._run_example(DOCS / "gallery" / "draw_again.py", tmp_path)
+    assert section.startswith("## An effect of your own\n")
+    assert "class DrawAgain(Effect):" in section
+    assert "exponential static load with draw_again" in section
+    assert "![An effect of your own](gallery/draw_again.svg)" in section
+    assert "<svg" in (tmp_path / "gallery" / "draw_again.svg").read_text(encoding="utf-8")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.blocks import style
-from tractexp.blocks.chart import Chart
+from tractexp.blocks.chart import GREATEST_CODE, Chart
 from tractexp.text.quoting import unescape_html
 
 WIDTH, PANEL_HEIGHT = 7.0, 1.25  # inches
@@ -42,7 +42,7 @@ def draw_chart(chart: Chart, path: Path) -> Path:
             _scale(panel, layout[key], layout["xaxis"])
         factors = units.get("factors", [1.0] * len(axes))
         for trace in plain["data"]:
-            if trace.get("visible") != "legendonly":
+            if trace.get("visible") != "legendonly" and "phasor" not in trace:
                 k = _number(trace["yaxis"].replace("y", "yaxis"))
                 _draw_trace(panels[k], trace, factors[k])
         panels[-1].set_xlabel(unescape_html(layout["xaxis"]["title"]["text"]))
@@ -71,7 +71,10 @@ def _scale(panel: Any, vertical: dict[str, Any], horizontal: dict[str, Any]) -> 
 
 def _draw_trace(panel: Any, trace: dict[str, Any], factor: float) -> None:
     """A curve, a band, marks or bars."""
-    x, y = _values(trace["x"]), _values(trace["y"])
+    if "samples" in trace:
+        x, y = _read_samples(trace["samples"])
+    else:
+        x, y = _values(trace["x"]), _values(trace["y"])
     label = unescape_html(trace["name"]) if trace["showlegend"] else "_"
     line, marker = trace.get("line", {}), trace.get("marker", {})
     if trace["type"] == "bar":
@@ -105,6 +108,13 @@ def _values(packed: Any) -> Any:
     if isinstance(packed, dict):
         return np.frombuffer(base64.b64decode(packed["bdata"]), f"<{packed['dtype']}").astype(float)
     return [np.nan if value is None else value for value in packed]
+
+
+def _read_samples(packed: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values (n,) of a curve that is kept in 16 bits; nan is a gap."""
+    raw = np.frombuffer(base64.b64decode(packed["bdata"]), "<i2").astype(float)
+    values = np.where(raw < -GREATEST_CODE, np.nan, packed["offset"] + packed["scale"] * raw)
+    return packed["start"] + packed["step"] * np.arange(len(raw)), values
 
 
 def _add_legend(figure: Any, panels: Any) -> None:
