@@ -202,6 +202,7 @@ def test_the_gallery_has_twelve_programs_each_with_what_it_is_for():
         assert len(about.split()) > 10, path.name
 
 
+@pytest.mark.usefixtures("registry_as_it_was")
 def test_a_program_of_the_gallery_stands_with_what_it_prints_and_its_picture(tmp_path):
     section = gallery._run_example(DOCS / "gallery" / "draw_again.py", tmp_path)
     assert section.startswith("## An effect of your own\n")
