@@ -5,7 +5,7 @@ Eq. (3).
 from tractexp.extend import Parameter, sites
 
 # Physical ranges, on the record's own base: machines of the seven types of the IEEE Task Force on
-# Load Representation 1995 have C of 0.89 and more; T_m leaves the static part a tenth of the load.
+# Load Representation 1995 have C of 0.90 and more; T_m leaves the static part a tenth of the load.
 PAPER = "Wu, Fan, Zou 2022, Energies 15(14) 5034"
 
 T_PRIME = Parameter(
@@ -43,8 +43,8 @@ T_M = Parameter(
 
 
 def usual(T_prime, X_prime, C, M, T_m):
-    """What one cage usually is: medians of seven types of motor, and one and a half times the
-    logarithms' scatter.
+    """What one cage usually is: geometric means of seven types of motor, and one and a half times
+    the logarithms' scatter.
 
     An aggregate of unknown machines may lie farther off than the types do, hence the half more.
     X'/X and R_s/X' are the machine's; X' T_m and M/T_m are its transient reactance and 2 H/omega_n

@@ -11,9 +11,17 @@ from test_export import OMEGA, VALUES, identified
 
 import tractexp
 from tractexp.api.identify import Identification
+from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
+from tractexp.exchange.circuit import TCircuit
 from tractexp.exchange.operating_point import OperatingPoint
-from tractexp.exchange.rating import compute_rating, compute_typical_figures, rate_machine
+from tractexp.exchange.rating import (
+    NOMINAL_SPEED,
+    TYPES,
+    compute_rating,
+    compute_typical_figures,
+    rate_machine,
+)
 
 MEGAWATTS = {"power": 40.0, "file_power": 100.0, "in_mva": True, "origin": "given"}
 
@@ -123,3 +131,16 @@ def test_the_json_of_a_load_keeps_its_schema_and_gives_the_load_back(motor):
     content["parameters"] = {"T_prime": 0.1}
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(content, schema)
+
+
+def test_what_a_motor_usually_is_follows_from_the_types_that_a_sheet_shows():
+    """X'/X and T' need no load factor: their geometric means, and 1.5 times their scatter."""
+    motor = get("model/motor", "electromechanical")()
+    usual = motor.usual(T_prime=0.1, X_prime=0.3, C=0.9, M=0.005, T_m=0.5)
+    circuits = [TCircuit(NOMINAL_SPEED, *elements) for *elements, _ in TYPES]
+    ratios = np.log([[c.X_prime / c.X, c.X_prime / c.X * c.T0_prime] for c in circuits])
+    for k in range(2):
+        _, mean, factor = usual[k]
+        assert np.exp(ratios[:, k].mean()) == pytest.approx(mean, rel=0.02)
+        assert np.exp(1.5 * ratios[:, k].std(ddof=1)) == pytest.approx(factor, rel=0.02)
+    assert 1 - np.exp(ratios[:, 0].max()) == pytest.approx(0.90, abs=0.005)
