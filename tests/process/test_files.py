@@ -352,7 +352,7 @@ READ = {
     },
     "tractexp/storage/zip_archive.py": {"open": "files within an archive, for `files` alone"},
     "tractexp/filetypes/table_text.py": {"loadtxt": "a text that `files` has read"},
-    "tractexp/filetypes/workbook.py": {"pickle.load": "the process that it started"},
+    "tractexp/filetypes/reading_process.py": {"pickle.load": "the process that it started"},
     "tractexp/tracking/owner.py": {"read_text": "the system's own files"},
     "tractexp/tracking/process.py": {
         "pickle.load": "the process that started it",

@@ -48,22 +48,22 @@ class TestArithmetic:
     def test_single_gaps_stand_between_two_that_are_there(self):
         missing = np.zeros(200, bool)
         missing[[0, 5, 9, 10, 20, 199]] = True
-        assert gap.find_single_gaps(missing).tolist() == [5, 20]
+        assert gap.find_short_gaps(missing).tolist() == [5, 20]
 
     def test_what_is_missing_too_often_was_recorded_so(self):
         missing = np.arange(200) % 10 == 5
-        assert not len(gap.find_single_gaps(missing))
+        assert not len(gap.find_short_gaps(missing))
 
     def test_single_lost_rows_are_found_by_the_times_that_jump(self):
         t = np.delete(np.arange(300) * 0.02, [50, 90])
-        assert gap.find_single_lost_rows(t).tolist() == [50, 89]
+        assert gap.find_lost_rows(t).tolist() == [50, 89]
         assert gap.insert_times(t, np.array([50, 89])) == pytest.approx(np.arange(300) * 0.02)
 
     @pytest.mark.parametrize("lost", [[50, 51], range(5, 300, 9)])
     def test_longer_gaps_and_uneven_times_are_no_lost_rows(self, lost):
-        assert not len(gap.find_single_lost_rows(np.delete(np.arange(300) * 0.02, [*lost])))
+        assert not len(gap.find_lost_rows(np.delete(np.arange(300) * 0.02, [*lost])))
         steps = np.random.default_rng(3).uniform(0.5, 2.0, 300)
-        assert not len(gap.find_single_lost_rows(np.cumsum(steps)))
+        assert not len(gap.find_lost_rows(np.cumsum(steps)))
 
     @pytest.mark.parametrize(("per_cycle", "error"), [(20, 2e-3), (64, 2e-5), (200, 2e-7)])
     def test_the_cubic_is_as_right_as_it_says(self, per_cycle, error):
@@ -73,6 +73,16 @@ class TestArithmetic:
             lacking[at] = np.nan
             [there] = gap.estimate_wave_values(lacking, np.array([at]))
             assert there == pytest.approx(x[at], abs=error)
+
+    @pytest.mark.parametrize(("per_cycle", "lost", "error"), [(64, 5, 2e-3), (128, 11, 2e-3)])
+    def test_it_is_so_of_as_many_in_a_row_as_are_bridged(self, per_cycle, lost, error):
+        assert gap.limit_wave_gap(50.0 * per_cycle, 50.0) == lost
+        x = np.cos(2 * np.pi * np.arange(4 * per_cycle) / per_cycle + 0.4)
+        for first in range(2, per_cycle):
+            at = np.arange(first, first + lost)
+            lacking = np.where(np.isin(np.arange(len(x)), at), np.nan, x)
+            assert gap.find_short_gaps(np.isnan(lacking), lost).tolist() == at.tolist()
+            assert gap.estimate_wave_values(lacking, at) == pytest.approx(x[at], abs=error)
 
 
 class TestTables:
@@ -86,7 +96,7 @@ class TestTables:
         assert np.flatnonzero(np.isnan(event.record.Q)).tolist() == [BEFORE, INSIDE]
         assert (event.start, event.end) == (whole.start, whole.end)
         assert_allclose([event.P0, event.Q0], [whole.P0, whole.Q0], rtol=1e-4)
-        said = "2 single samples missing at t = 0.2, 0.6 s: bridged, and in no sum of P and Q"
+        said = "2 samples missing at t = 0.2, 0.6 s: bridged, and in no sum of P and Q"
         assert said in event.record.notes
         assert said in notes_of_look(path)
 
@@ -103,10 +113,19 @@ class TestTables:
         assert record.t == pytest.approx(TIMES)
         assert np.isnan(record.P[INSIDE])
 
-    def test_two_frames_in_a_row_are_refused(self, tmp_path):
-        for how in ("lost", "blank"):
-            with pytest.raises(tractexp.UserError, match=r"rows are missing|U = nan is not"):
-                only(written(tmp_path / "a.csv", **{how: (INSIDE, INSIDE + 1)}))
+    @pytest.mark.parametrize("how", ["lost", "blank"])
+    def test_frames_in_a_row_are_bridged_where_the_voltage_stays(self, tmp_path, how):
+        rows = [*range(BEFORE, BEFORE + 3), *range(INSIDE, INSIDE + 3)]
+        record = only(written(tmp_path / "a.csv", **{how: rows})).record
+        assert record.t == pytest.approx(TIMES)
+        assert_allclose(record.U, U, atol=1e-4)
+        assert np.flatnonzero(np.isnan(record.P)).tolist() == rows
+
+    @pytest.mark.parametrize("how", ["lost", "blank"])
+    @pytest.mark.parametrize("rows", [(99, 100), (138, 139, 140), range(BEFORE, BEFORE + 4)])
+    def test_at_an_edge_of_the_dip_or_of_more_they_are_refused(self, tmp_path, how, rows):
+        with pytest.raises(tractexp.UserError, match=r"rows are missing|U = nan is not"):
+            only(written(tmp_path / "a.csv", **{how: rows}))
 
     @pytest.mark.parametrize("how", ["lost", "blank"])
     def test_a_lost_frame_of_a_phasor_unit(self, tmp_path, how):
@@ -140,7 +159,7 @@ class TestTables:
         record = only(written(tmp_path / "a.csv", table, extra={name: marks})).record
         assert_allclose(record.U, U, atol=2e-5)
         assert np.flatnonzero(np.isnan(record.P)).tolist() == [BEFORE, INSIDE]
-        assert f"'{name}' marks 2 single rows as bad: left out" in record.notes
+        assert f"'{name}' marks 2 rows as bad: left out" in record.notes
 
     @pytest.mark.parametrize("fill", [0.0, -9999.0, 1e30])
     def test_a_frame_that_was_filled_in_is_as_missing(self, tmp_path, fill):
@@ -150,7 +169,7 @@ class TestTables:
         record = only(written(tmp_path / "a.csv", table)).record
         assert_allclose(record.U, U, atol=2e-5)
         assert np.flatnonzero(np.isnan(record.P)).tolist() == [BEFORE, INSIDE]
-        assert any(f"2 single rows hold nothing but {fill:g}" in note for note in record.notes)
+        assert any(f"2 rows hold nothing but {fill:g}" in note for note in record.notes)
 
     def test_a_voltage_of_zero_alone_is_no_lost_frame(self, tmp_path):
         table = {key: x.copy() for key, x in COLUMNS.items()}
@@ -196,7 +215,7 @@ class TestWaveforms:
         kept = ~left_out
         assert record.P[kept] == pytest.approx(whole.record.P[kept], abs=2e-6)
         assert_allclose(record.U, whole.record.U, atol=2e-6)
-        said = "2 single samples missing at t = 0.1875, 0.59375 s (0 'UA', 4 'IB', 5 'IC'): bridged"
+        said = "2 samples missing at t = 0.1875, 0.59375 s (0 'UA', 4 'IB', 5 'IC'): bridged"
         assert any(note.startswith(said) for note in record.notes)
         assert said in notes_of_look(tmp_path / "a.cfg")
 
@@ -211,8 +230,26 @@ class TestWaveforms:
             assert record.t[left_out] == pytest.approx(0.59375, abs=0.0101)
             assert any("bridged" in note for note in record.notes)
 
-    def test_two_samples_in_a_row_are_refused_by_name(self, tmp_path):
-        path = recorded(tmp_path / "a.cfg", ((0, 1900), (0, 1901)))
+    def test_a_tenth_of_a_cycle_in_a_row_is_bridged(self, tmp_path):
+        """Five samples of 64."""
+        lost = tuple((channel, k) for channel in range(6) for k in range(600, 605))
+        record = only(recorded(tmp_path / "a.cfg", lost)).record
+        whole = only(recorded(tmp_path / "w.cfg")).record
+        assert_allclose(record.U, whole.U, atol=5e-4)
+        assert_allclose(record.P, whole.P, atol=1e-3)
+        assert any("5 samples missing" in note for note in record.notes)
+
+    def test_a_longer_gap_of_all_channels_parts_the_record(self, tmp_path):
+        lost = [(channel, k) for channel in range(6) for k in range(2600, 2700)]
+        path = recorded(tmp_path / "a.cfg", lost)
+        event, whole = only(path), only(recorded(tmp_path / "w.cfg"))
+        assert (event.depth, event.P0) == pytest.approx((whole.depth, whole.P0), rel=1e-5)
+        assert event.record.t[-1] < 2600 / made_recordings.RATE
+        said = "100 samples have no value in any channel: parts that begin at 0 s, 0.84375 s are"
+        assert said in notes_of_look(path)
+
+    def test_more_samples_in_a_row_are_refused_by_name(self, tmp_path):
+        path = recorded(tmp_path / "a.cfg", [(0, k) for k in range(1900, 1906)])
         with pytest.raises(tractexp.UserError, match="channel 0 'UA' has no value at sample 1901"):
             only(path)
 

@@ -118,7 +118,7 @@ def test_one_module_starts_another_python():
     # say -P themselves
     assert named == {
         "tractexp/process/interpreter.py",
-        "tractexp/filetypes/workbook.py",
+        "tractexp/filetypes/reading_process.py",
         "plugins/formats/andes.py",
     }
     for name in named:

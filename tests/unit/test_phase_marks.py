@@ -10,7 +10,7 @@ import pytest
 
 import tractexp
 from tractexp.filetypes import comtrade
-from tractexp.filetypes.columns import order_of, role
+from tractexp.filetypes.columns import order_of, role, split_unit
 from tractexp.recording import Channel, Recording, Segment
 
 ORDERS = ["ABC", "RST", "RYB", "RWB", "UVW", ("L1", "L2", "L3"), "АВС"]
@@ -197,11 +197,26 @@ def test_where_no_name_tells_the_power_or_the_nominal_voltage_does(tmp_path):
         *((name, True) for name in ("Phase-to-phase voltage", "Gerilim L1-L2", "U12 avg")),
         *((name, False) for name in ("Vph", "Uphase", "VPN", "相電圧 R", "Tension simple V1")),
         *((name, False) for name in ("Tensión simple L1", "Sternspannung L1", "A相电压")),
+        *((name, True) for name in ("VLLab", "V_LL_AB", "Vll 12", "AB_Voltage")),
+        *((name, False) for name in ("V_LN_A", "VLN1", "R-N Volt", "L1-N Voltage")),
     ],
 )
-def test_names_in_other_languages_say_line_or_ground(name, line):
+def test_names_of_programs_and_languages_say_line_or_ground(name, line):
     meant = role(name, "kV", "rst" if "R" in name else "abc")
     assert (meant.quantity, meant.line) == ("U", line)
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("AB_Voltage_kV", ("AB_Voltage", "kV")),
+        ("P_total_MW", ("P_total", "MW")),
+        ("I_L1_kA", ("I_L1", "kA")),
+        ("Voltage, kV", ("Voltage", "kV")),
+    ],
+)
+def test_a_unit_is_the_last_of_several_words(name, parts):
+    assert split_unit(name) == parts
 
 
 @pytest.mark.parametrize(

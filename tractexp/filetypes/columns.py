@@ -336,7 +336,7 @@ def split_unit(name: str) -> tuple[str, str]:
     for pattern in BRACKETED:
         if (match := re.fullmatch(pattern, end)) and is_unit(match[2]):
             return before + match[1].strip(), match[2]
-    match = re.fullmatch(r"(.+?)(?:\s*,\s*|\s+|_)(\S+)", end)
+    match = re.fullmatch(r"(.+?)[\s,_]+([^\s,_]+)", end)
     sure = match is not None and (
         match[2] in UNMISTAKABLE or (not match[2].isascii() and is_unit(match[2]))
     )
@@ -453,16 +453,18 @@ def _is_between_lines(words: Sequence[str], phase: str, ground: bool) -> bool | 
     return False if ground or GROUND.intersection((*words, *ends)) else None
 
 
-def _quantity(words: Sequence[str]) -> tuple[str, str] | None:
-    """(quantity, phase) that words say; None where they say none."""
-    return _compound(words) or _match_words(words)
+def _quantity(words: Sequence[str], ground: bool = False) -> tuple[str, str] | None:
+    """(quantity, phase) that words say; None where they say none. A letter by itself is a phase
+    where `ground` is said.
+    """
+    return _compound(words) or _match_words(words, ground)
 
 
 def _marked_quantity(
     words: Sequence[str], kind: str, ground: bool, electrical: bool
 ) -> tuple[str, str] | None:
     """(quantity, phase) that words say, marks of phases among them; None where they say none."""
-    said = _quantity(words)
+    said = _quantity(words, ground)
     if said and (said[0] in ELECTRICAL or not electrical):
         return said
     return _match_mark(words, kind, ground) or said
@@ -502,13 +504,13 @@ def _compound(words: Sequence[str]) -> tuple[str, str] | None:
     return None
 
 
-def _match_words(words: Sequence[str]) -> tuple[str, str] | None:
+def _match_words(words: Sequence[str], ground: bool) -> tuple[str, str] | None:
     """Quantity and phase of words such as "active power", "phase A voltage", "正序电压"; None
     where they say no quantity.
     """
     quantity = _match_quantity(words)
     if quantity in ("U", "I"):
-        return quantity, _match_phase(words)
+        return quantity, _match_phase(words, ground)
     return (quantity, "") if quantity else None
 
 
@@ -522,10 +524,13 @@ def _match_quantity(words: Sequence[str]) -> str:
     return next((WORDS[word] for word in long if word in text), "")
 
 
-def _match_phase(words: Sequence[str]) -> str:
-    """The phase or sequence that words say, "" for none; a letter says one beside "phase" only."""
+def _match_phase(words: Sequence[str], ground: bool) -> str:
+    """The phase or sequence that words say, "" for none; a letter says one beside "phase", or where
+    `ground` is said, only.
+    """
+    sure = ground or "phase" in words
     for word in words:
-        if word in PHASES and ("phase" in words or len(word) > 1 or not word.isascii()):
+        if word in PHASES and (sure or len(word) > 1 or not word.isascii()):
             return PHASES[word]
     text = " ".join(words)
     if "正序" in text:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.filetypes.table import TableFile
-from tractexp.record.gap import find_single_gaps
+from tractexp.record.gap import MOST_ROWS, find_short_gaps
 
 NAMED = re.compile(
     r"quality|qual\b|\bstat(us)?\b|valid|flag|qualität|güte|gültig|calidad|qualité"
@@ -29,7 +29,7 @@ OPC_GOOD, OPC_QUALITY = 192, 0xC0  # the code of good values; the bits that are 
 
 
 def find_bad_rows(table: TableFile, count: int) -> tuple[np.ndarray, tuple[str, ...]]:
-    """(which of the table's `count` rows are marked bad and stand alone, what is said of marks).
+    """(which of the table's `count` rows are marked bad, few in a row, what is said of marks).
 
     Rows marked in a row are used as they stand: what they are worth, nobody but the reader knows.
     """
@@ -40,31 +40,31 @@ def find_bad_rows(table: TableFile, count: int) -> tuple[np.ndarray, tuple[str, 
         marked = _read_marks(table.cells(number), name)
         if marked is None or len(marked) != count or not marked.any():
             continue
-        alone = np.zeros(len(marked), dtype=bool)
-        alone[find_single_gaps(marked)] = True
-        rest = int(np.count_nonzero(marked & ~alone))
-        if alone.any():
-            said.append(f"'{name}' marks {np.count_nonzero(alone)} single rows as bad: left out")
+        few = np.zeros(len(marked), dtype=bool)
+        few[find_short_gaps(marked, MOST_ROWS)] = True
+        rest = int(np.count_nonzero(marked & ~few))
+        if few.any():
+            said.append(f"'{name}' marks {np.count_nonzero(few)} rows as bad: left out")
         if rest:
             said.append(f"'{name}' marks {rest} rows as bad, one after another: used as they stand")
-        bad |= alone
+        bad |= few
     return bad, tuple(said)
 
 
 def find_filled_rows(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, tuple[str, ...]]:
-    """(which rows of columns (N,) stand alone and hold one number in all of them, what is said).
+    """(which rows of columns (N,), few in a row, hold one number in all of them, what is said).
 
     Zeros, or -9999, are what a concentrator writes where a frame did not come.
     """
     rows = np.array(columns)
     filled = (rows == rows[0]).all(axis=0) if len(rows) >= FEWEST_FILLED else rows[0] != rows[0]
     lost = np.zeros(len(filled), dtype=bool)
-    lost[find_single_gaps(filled)] = True
+    lost[find_short_gaps(filled, MOST_ROWS)] = True
     if not lost.any():
         return lost, ()
     numbers = ", ".join(f"{x:g}" for x in np.unique(rows[0][lost]))
     count = np.count_nonzero(lost)
-    return lost, (f"{count} single rows hold nothing but {numbers}: lost frames, left out",)
+    return lost, (f"{count} rows hold nothing but {numbers}: lost frames, left out",)
 
 
 def _read_marks(cells: Sequence[Any], name: str) -> np.ndarray | None:

@@ -17,7 +17,7 @@ from tractexp.filetypes.cells import BadCell, find_group_mark, is_number, number
 from tractexp.filetypes.clock import is_time, times
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, check_column_count, heading
-from tractexp.filetypes.workbook import BadWorkbook, Workbook
+from tractexp.filetypes.reading_process import BadFile, ReadingProcess
 from tractexp.storage import files
 from tractexp.storage.files import locate_file
 
@@ -253,60 +253,39 @@ def content(path: str, limit: int | None = None) -> bytes:
 
 def _parquet(path: str, data: bytes) -> TableFile:
     """A Parquet file as a table. Raises `UserError` for one that is damaged or too large."""
-    import pyarrow
-    from pyarrow import parquet
-
     try:
-        file = parquet.ParquetFile(pyarrow.BufferReader(data))
-        check_column_count(file.metadata.num_columns, path)
-        if (values := file.metadata.num_rows * file.metadata.num_columns) > MOST_TABLE_VALUES:
-            raise UserError(
-                f"{path}: {values:,} values are more than the {MOST_TABLE_VALUES:,} that can be"
-                " read; give a part of it"
-            )
-        parsed = file.read()
-        names = [str(name) for name in parsed.column_names]
-        columns = [_arrow(parsed.column(k)) for k in range(len(names))]
-    except (pyarrow.ArrowException, OSError, ValueError) as error:
-        raise UserError(
-            f"{path}: not a whole Parquet file; write it again, or give the table as CSV"
-        ) from error
-    parted = [split_unit(name) for name in names]
+        with ReadingProcess("parquet", data) as file:
+            width, rows = file.content
+            check_column_count(width, path)
+            if (values := rows * width) > MOST_TABLE_VALUES:
+                raise UserError(
+                    f"{path}: {values:,} values are more than the {MOST_TABLE_VALUES:,} that can be"
+                    " read; give a part of it"
+                )
+            named = file.read()
+    except BadFile as bad:
+        why = str(bad) or "not a whole Parquet file; write it again"
+        raise UserError(f"{path}: {why}, or give the table as CSV") from bad
+    columns = [cells for _, cells in named]
+    parted = [split_unit(name) for name, _ in named]
     head = TableHeading(tuple(name for name, _ in parted), tuple(unit for _, unit in parted), 0, 0)
     sample = [list(row) for row in zip(*(c[:200] for c in columns), strict=False)]
     return Rows(path, head, columns.__getitem__, sample, first=1)
 
 
-def _arrow(chunked: Any) -> Any:
-    """The cells of a column: an array of numbers where it is one, gaps nan."""
-    import pyarrow
-    from pyarrow import types
-
-    kind, numeric = (
-        chunked.type,
-        (types.is_floating, types.is_integer, types.is_boolean, types.is_null, types.is_decimal),
-    )
-    if any(is_of(kind) for is_of in numeric):
-        return np.asarray(chunked.cast("float64").to_numpy(), dtype=float)
-    if types.is_timestamp(kind):  # Python's own times have microseconds at most
-        moments = chunked.cast(pyarrow.timestamp("us", tz=kind.tz), safe=False)
-        return [None if cell is None else cell.replace(tzinfo=None) for cell in moments.to_pylist()]
-    return chunked.to_pylist()
-
-
 def _sheet(path: str, data: bytes, form: TableForm) -> TableFile:
     """One sheet of a workbook: the chosen one, else the first with rows of numbers."""
     try:
-        with Workbook(data) as book:
+        with ReadingProcess("workbook", data) as book:
             return _sheet_of(path, book, form)
-    except BadWorkbook as bad:
+    except BadFile as bad:
         why = str(bad) or "not a workbook that can be read; save it as .xlsx"
         raise UserError(f"{path}: {why}, or the sheet as CSV") from bad
 
 
-def _sheet_of(path: str, book: Workbook, form: TableForm) -> TableFile:
+def _sheet_of(path: str, book: ReadingProcess, form: TableForm) -> TableFile:
     """The sheet that is named, else the first that can be read as a table."""
-    names = book.names
+    names = book.content
     if form.sheet is not None:
         return _rows_of(path, book, _sheet_name(path, names, form.sheet), form)
     refused: list[UserError] = []
@@ -337,11 +316,11 @@ def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
     )
 
 
-def _rows_of(path: str, book: Workbook, name: str, form: TableForm) -> Rows:
+def _rows_of(path: str, book: ReadingProcess, name: str, form: TableForm) -> Rows:
     """A sheet as a table. Raises `UserError` where it cannot be read."""
     try:
-        rows = book.rows(name)
-    except BadWorkbook as bad:
+        rows = book.read(name)
+    except BadFile as bad:
         if str(bad):
             raise
         raise UserError(f"{path}: sheet '{name}' cannot be read; save it as CSV") from bad

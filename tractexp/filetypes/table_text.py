@@ -267,15 +267,23 @@ def open_text(path: str, data: bytes, form: TableForm) -> TextTable:
             f"{path}: byte {nul + 1} is zero: this is no text; give a table as CSV, Parquet or"
             " Excel"
         )
-    breaks = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
-    lengths = np.diff(breaks, prepend=-1, append=len(data))
-    if len(data) and lengths.max() > LONGEST:
-        i = int(lengths.argmax())
-        raise UserError(
-            f"{path}: line {i + 1} has {lengths[i]:,} characters; a row of a table has at most"
-            f" {LONGEST:,}"
-        )
+    _check_lines(path, data)
     return TextTable(path, data, form, [] if plain else [f"read as {codec} text"])
+
+
+def _check_lines(path: str, data: bytes) -> None:
+    """Raise `UserError` for a line that is too long for a row."""
+    begin = 0
+    while begin + LONGEST < len(data):
+        last = data.rfind(LINE_END, begin, begin + LONGEST + 1)
+        if last < 0:
+            end, line = data.find(LINE_END, begin), data.count(LINE_END, 0, begin) + 1
+            length = (len(data) if end < 0 else end) - begin
+            raise UserError(
+                f"{path}: line {line} has {length:,} characters; a row of a table has at most"
+                f" {LONGEST:,}"
+            )
+        begin = last + 1
 
 
 def _detect_unmarked_utf16(data: bytes) -> str | None:

@@ -13,10 +13,11 @@ from tractexp.filetypes.mapping import LINES, PHASES, Mapped, find_other_columns
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableColumn, TableFile
 from tractexp.record.gap import (
-    find_single_gaps,
-    find_single_lost_rows,
+    find_lost_rows,
+    find_short_gaps,
     insert_missing,
     insert_times,
+    limit_wave_gap,
 )
 from tractexp.record.record import LARGEST_JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
@@ -45,7 +46,9 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
     cells = table.read({**kinds, **numbers})
     _refuse_wild(table, {k: cells[k] for k in numbers})
     read = times_of(table, mapping, cells)
-    lost = find_single_lost_rows(read.t)
+    steps = np.diff(read.t)
+    rate = 1 / max(float(np.median(steps)), 1e-12) if len(steps) else 0.0
+    lost = find_lost_rows(read.t, limit_wave_gap(rate, nominal))
     segments, odd = _segments(table, insert_times(read.t, lost))
     channels = [
         _channel(table, mapping, k, insert_missing(cells[k].values, lost), keys.get(k, ""))
@@ -82,7 +85,7 @@ def _is_sampled(numbers: Sequence[bool]) -> bool:
     ones.
     """
     lacking = ~np.array(numbers, dtype=bool)
-    return not lacking.any() or len(find_single_gaps(lacking)) == np.count_nonzero(lacking)
+    return not lacking.any() or len(find_short_gaps(lacking)) == np.count_nonzero(lacking)
 
 
 def _refuse_other_rates(table: TableFile, numbers: Sequence[int]) -> None:

@@ -1,7 +1,8 @@
-"""Single missing samples: which they are, and what is put in their place.
+"""Short gaps: which samples are missing, and what is put in their place.
 
 One sample between two measured ones is bridged: a voltage moves little within it, but at the very
-edge of a dip. Of two in a row nobody knows what happened between them.
+edge of a dip. So are a few in a row of a wave, by its shape, and of RMS values, where the voltage
+is the same on either side; between others nobody knows what happened.
 """
 
 from collections.abc import Sequence
@@ -12,23 +13,41 @@ from tractexp.text.wording import count_noun
 
 # of all samples: where more are missing, they were not lost but recorded in another way
 MOST_BRIDGED_SHARE = 0.05
-# usual steps: a step within them leaves one row out
-ONE_ROW_LOST = (1.5, 2.5)
+MOST_ROWS = 3  # in a row that a table of RMS values may lack
+SAME_VOLTAGE = 0.01  # of the voltage, by which it differs on either side of several missing rows
+LONGEST_WAVE_GAP = 0.1  # of a cycle, between the samples on either side
 NAMED_TIMES = 3  # of bridged samples that are told
 
 
-def find_single_gaps(missing: np.ndarray) -> np.ndarray:
-    """The numbers (K,) of missing samples (N,) that stand alone between two that are there."""
+def limit_wave_gap(rate: float, frequency: float) -> int:
+    """How many samples in a row are bridged of a wave, one at least."""
+    return max(1, int(LONGEST_WAVE_GAP * rate / frequency) - 1)
+
+
+def find_short_gaps(missing: np.ndarray, most: int = 1) -> np.ndarray:
+    """The numbers (K,) of missing samples (N,) of which at most so many are in a row, between two
+    that are there.
+    """
     if not missing.any() or missing.mean() > MOST_BRIDGED_SHARE:
         return np.empty(0, dtype=int)
-    alone = missing[1:-1] & ~missing[:-2] & ~missing[2:]
-    return np.flatnonzero(alone) + 1
+    edges = np.flatnonzero(np.diff(missing.astype(np.int8), prepend=0, append=0))
+    firsts, stops = edges[::2], edges[1::2]
+    short = (stops - firsts <= most) & (firsts > 0) & (stops < len(missing))
+    return np.flatnonzero(missing & np.isin(_number_runs(missing), np.flatnonzero(short)))
 
 
-def find_single_lost_rows(t: np.ndarray) -> np.ndarray:
-    """The numbers (K,) of the rows before which one row of uniform times (N,) is missing.
+def _number_runs(missing: np.ndarray) -> np.ndarray:
+    """The number (N,) of the gap that each missing sample belongs to, from 0; -1 of the others."""
+    begins = missing & ~np.concatenate([[False], missing[:-1]])
+    return np.where(missing, np.cumsum(begins) - 1, -1)
 
-    None where more than one is missing somewhere, or where the times are not uniform but for that.
+
+def find_lost_rows(t: np.ndarray, most: int = 1) -> np.ndarray:
+    """The numbers (K,) of the rows before which rows of uniform times (N,) are missing, each as
+    often as rows are.
+
+    None where more than so many in a row are missing somewhere, or where the times are not uniform
+    but for that.
     """
     none = np.empty(0, dtype=int)
     if len(t) < 4 or not np.isfinite(t).all():
@@ -37,12 +56,12 @@ def find_single_lost_rows(t: np.ndarray) -> np.ndarray:
     if not (steps > 0).all():
         return none
     ratio = steps / np.median(steps)
-    lost, (least, most) = ratio > ONE_ROW_LOST[0], ONE_ROW_LOST
-    uniform = (ratio[~lost] > 1 / least).all() and (ratio[lost] < most).all()
+    lacking = np.maximum(np.ceil(ratio - 0.5).astype(int) - 1, 0)
+    lost = lacking > 0
     beside = (lost[1:] & lost[:-1]).any()
-    if not uniform or beside or lost.mean() > MOST_BRIDGED_SHARE:
+    if (ratio < 2 / 3).any() or lacking.max() > most or beside or lost.mean() > MOST_BRIDGED_SHARE:
         return none
-    return np.flatnonzero(lost) + 1
+    return np.repeat(np.arange(1, len(t)), lacking)
 
 
 def insert_missing(x: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -51,31 +70,45 @@ def insert_missing(x: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def insert_times(t: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Times (N,) with one in the middle before each of `rows` (K,)."""
-    return np.insert(t, rows, (t[rows - 1] + t[rows]) / 2)
+    """Times (N,) with evenly spaced ones before each of `rows` (K,)."""
+    missing = insert_missing(t, rows)
+    return bridge_values(missing, np.flatnonzero(np.isnan(missing)))
 
 
 def bridge_values(x: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values (N,) in which those `at` (K,) are the means of their neighbors."""
+    """Values (N,) in which those `at` (K,) lie on straight lines between the others."""
     bridged = np.array(x, dtype=float)
-    bridged[at] = (bridged[at - 1] + bridged[at + 1]) / 2
+    there = np.delete(np.arange(len(x)), at)
+    bridged[at] = np.interp(at, there, bridged[there])
     return bridged
 
 
 def estimate_wave_values(x: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """What a wave (N,) has at the samples `at` (K,), by the cubic through two on either side.
+    """What a wave (N,) has at the missing samples `at` (K,), by the cubic through two on either
+    side of a gap.
 
-    Of 20 samples a cycle it is right to 0.2 %, of 64 to 2e-5. Where one of the outer two is missing
-    as well, the mean of the inner two.
+    Of 20 samples a cycle it is right to 0.2 %, of 64 to 2e-5, where one is missing. Where one of
+    the outer two is missing as well, by the straight line through the inner two.
     """
-    outer = np.pad(x, 2, constant_values=np.nan)
-    near, far = outer[at + 1] + outer[at + 3], outer[at] + outer[at + 4]
-    cubic = (4 * near - far) / 6
-    return np.where(np.isfinite(cubic), cubic, near / 2)
+    there = np.flatnonzero(~np.isnan(x))
+    after = there[np.searchsorted(there, at)]
+    before = there[np.searchsorted(there, at) - 1]
+    outer = np.pad(x, 1, constant_values=np.nan)
+    # in samples from the one before the gap: the one that is asked for, and the one after
+    s, g = at - before, after - before
+    weights = (
+        -s * (s - g) * (s - g - 1) / ((1 + g) * (2 + g)),
+        (s + 1) * (s - g) * (s - g - 1) / (g * (g + 1)),
+        (s + 1) * s * (g + 1 - s) / (g * (g + 1)),
+        (s + 1) * s * (s - g) / ((g + 1) * (g + 2)),
+    )
+    values = outer[before], x[before], x[after], outer[after + 2]
+    cubic = np.sum([w * v for w, v in zip(weights, values, strict=True)], axis=0)
+    return np.where(np.isfinite(cubic), cubic, (x[before] * (g - s) + x[after] * s) / g)
 
 
 def describe_bridged(times: Sequence[float]) -> str:
     """How many samples were bridged, and when, as the beginning of a sentence."""
     when = ", ".join(f"{t:.6g}" for t in times[:NAMED_TIMES])
     more = f" and {len(times) - NAMED_TIMES} more" if len(times) > NAMED_TIMES else ""
-    return f"{count_noun(len(times), 'single sample')} missing at t = {when} s{more}"
+    return f"{count_noun(len(times), 'sample')} missing at t = {when} s{more}"

@@ -199,7 +199,7 @@ class Phasors:
     f: np.ndarray  # (M,) Hz, at which the (positive-sequence) voltage turns
     # (M,) each: P_3, ..., P_H [MW], THD_u, THD_i
     more: Mapping[str, np.ndarray] = field(default_factory=dict)
-    bridged: tuple[float, ...] = ()  # s: single samples that were missing in the waveforms
+    bridged: tuple[float, ...] = ()  # s: samples that were missing in the waveforms
 
     @property
     def V1(self) -> NDArray[np.complex128]:

@@ -9,10 +9,12 @@ import numpy as np
 from tractexp.errors import DATA, UserError
 from tractexp.record.angle import measure_frequency
 from tractexp.record.gap import (
+    MOST_ROWS,
+    SAME_VOLTAGE,
     bridge_values,
     describe_bridged,
-    find_single_gaps,
-    find_single_lost_rows,
+    find_lost_rows,
+    find_short_gaps,
     insert_missing,
     insert_times,
 )
@@ -209,14 +211,15 @@ class Record:
         """The record on a uniform time grid; a note says so where more than `JITTER` of a step was
         moved.
 
-        Single missing rows and voltages are bridged. Jitter, and the event instants and steps of a
-        simulator, are resampled linearly; of two rows of one time the second holds from then on.
+        Single missing rows and voltages are bridged, and a few in a row of a steady voltage.
+        Jitter, and the event instants and steps of a simulator, are resampled linearly; of two rows
+        of one time the second holds from then on.
         Raises `UserError` for more missing rows: steps that are multiples of the usual one.
         """
         given = place or self._place
         if any(values.shape != self.t.shape for values in self.channels.values()):
             self._check_values(given)
-        rows = find_single_lost_rows(self.t)
+        rows = self._find_lost_rows()
         return (
             self._with_rows(rows)
             ._bridge()
@@ -241,8 +244,32 @@ class Record:
         )
         return replace(self, U_angle=None, notes=(*self.notes, note))
 
+    def _find_lost_rows(self) -> np.ndarray:
+        """The numbers (K,) of the rows before which rows are missing that can be bridged."""
+        rows = find_lost_rows(self.t, MOST_ROWS)
+        at = rows + np.arange(len(rows))
+        bridged = self._with_rows(rows)._find_bridged()
+        return rows if np.isin(at, bridged).all() else rows[:0]
+
+    def _find_bridged(self) -> np.ndarray:
+        """The samples (K,) of which what drives a model is missing and bridged: single ones, and a
+        few in a row where the voltage is the same on either side.
+        """
+        lacking = np.any(np.isnan(np.stack([*self._drives.values()])), axis=0)
+        at = find_short_gaps(lacking, MOST_ROWS)
+        there = np.flatnonzero(~lacking)
+        near = np.searchsorted(there, at)
+        before, after = (there[near - 1], there[near]) if len(at) else (at, at)
+        alike = np.abs(self.U[after] - self.U[before]) < SAME_VOLTAGE * self.U[before]
+        return at[(after - before == 2) | alike]
+
+    @property
+    def _drives(self) -> dict[str, np.ndarray]:
+        """The channels that drive a model."""
+        return {name: x for name, x in self.channels.items() if name not in ("t", "P", "Q")}
+
     def _with_rows(self, rows: np.ndarray) -> "Record":
-        """The record with a row that is missing (nan) before each of `rows` (K,)."""
+        """The record with rows that are missing (nan) before each of `rows` (K,)."""
         if not len(rows):
             return self
         channels = {name: insert_missing(x, rows) for name, x in self.channels.items()}
@@ -251,15 +278,14 @@ class Record:
         return replace(self, **channels, more=more)
 
     def _bridge(self) -> "Record":
-        """The record with what drives a model bridged where a single sample of it is missing.
+        """The record with what drives a model bridged where a sample of it is missing.
 
         P and Q are not invented: of these samples they are in no sum.
         """
-        drives = {name: x for name, x in self.channels.items() if name not in ("t", "P", "Q")}
-        at = find_single_gaps(np.any(np.isnan(np.stack([*drives.values()])), axis=0))
+        at = self._find_bridged()
         if not len(at):
             return self
-        lacking = {name: x for name, x in drives.items() if np.isnan(x[at]).any()}
+        lacking = {name: x for name, x in self._drives.items() if np.isnan(x[at]).any()}
         channels = {name: bridge_values(x, at) for name, x in lacking.items()}
         gaps = np.isin(np.arange(self.samples), at)
         channels |= {name: np.where(gaps, np.nan, self.channels[name]) for name in "PQ"}

@@ -1,23 +1,31 @@
-"""Single missing samples of channels, bridged where a recording is opened."""
+"""Short gaps of channels, bridged where a recording is opened."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from tractexp.record.gap import describe_bridged, estimate_wave_values, find_single_gaps
+from tractexp.record.change import runs
+from tractexp.record.gap import (
+    describe_bridged,
+    estimate_wave_values,
+    find_short_gaps,
+    limit_wave_gap,
+)
 from tractexp.recording.recording import NOTHING_BRIDGED, Channel, Recording, Segment
 from tractexp.text.wording import list_first
 
-NAMED_CHANNELS = 3  # that are told
+NAMED_CHANNELS = 3  # that are told, and parts of a recording
 
 
 def bridge_recording(recording: Recording) -> Recording:
-    """The recording with single missing samples of its channels bridged, and a note on them.
+    """The recording with short gaps of its channels bridged, and a note on them.
 
-    Longer gaps stay, and are refused where they are read.
+    A longer one of all channels parts it: what lies before and behind is looked at by itself.
+    Others stay, and are refused where they are read.
     """
-    channels = [_bridge_channel(channel, recording.segments) for channel in recording.channels]
+    recording = _part_recording(recording)
+    channels = [_bridge_channel(channel, recording) for channel in recording.channels]
     told = [(k, channel) for k, channel in enumerate(channels) if len(channel.bridged[0])]
     if not told:
         return recording
@@ -29,14 +37,45 @@ def bridge_recording(recording: Recording) -> Recording:
     return replace(recording, channels=channels, notes=(*recording.notes, note))
 
 
-def _bridge_channel(channel: Channel, segments: Sequence[Segment]) -> Channel:
-    """A channel with what is put in place of its single missing samples."""
+def _part_recording(recording: Recording) -> Recording:
+    """The recording without samples of which no channel has a value, more than are bridged."""
+    waves = [channel for channel in recording.channels if channel.form == "waveform"]
+    if not waves or not all(map(_may_lack, waves)):
+        return recording
+    empty = np.logical_and.reduce([np.isnan(channel.read_values()) for channel in waves])
+    parts = []
+    for segment in recording.segments:
+        lacking = empty[segment.first : segment.stop]
+        short = find_short_gaps(lacking, limit_wave_gap(segment.rate, recording.frequency))
+        lacking[short] = False
+        parts += [
+            replace(
+                segment,
+                first=segment.first + part.start,
+                stop=segment.first + part.stop,
+                start=segment.start + part.start / segment.rate,
+            )
+            for part in runs(~lacking)
+        ]
+    if parts == recording.segments or not parts:
+        return recording
+    count = sum(part.stop - part.first for part in parts)
+    told = ", ".join(f"{part.start:.6g} s" for part in parts[:NAMED_CHANNELS])
+    note = (
+        f"{sum(s.stop - s.first for s in recording.segments) - count} samples have no value in any"
+        f" channel: parts that begin at {told} are looked at by themselves"
+    )
+    return replace(recording, segments=parts, notes=(*recording.notes, note))
+
+
+def _bridge_channel(channel: Channel, recording: Recording) -> Channel:
+    """A channel with what is put in place of its missing samples."""
     if channel.form != "waveform" or not _may_lack(channel):
         return channel
     numbers, estimates = [], []
-    for segment in segments:
+    for segment in recording.segments:
         x = channel.read_values(segment.first, segment.stop)
-        at = find_single_gaps(np.isnan(x))
+        at = find_short_gaps(np.isnan(x), limit_wave_gap(segment.rate, recording.frequency))
         numbers.append(segment.first + at)
         estimates.append(estimate_wave_values(x, at))
     bridged = np.concatenate(numbers), np.concatenate(estimates)

@@ -72,7 +72,7 @@ class FeederWaves:
 
     @property
     def bridged_times(self) -> tuple[float, ...]:
-        """Times [s] of single samples that were missing in some channel."""
+        """Times [s] of samples that were missing in some channel."""
         at = find_bridged(self.recording, self.numbers, self.segment)
         return tuple((self.segment.start + at / self.segment.rate).tolist())
 

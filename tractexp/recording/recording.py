@@ -155,7 +155,7 @@ class Channel:
     # S: secondary values whose ratio the file does not give; ?: the file cannot say which they are
     side: str = ""
     form: str = "waveform"  # or magnitude (RMS), peak, angle, value: samples that are no waveform
-    # numbers (K,) of single missing samples, and what is put there, in `unit`
+    # numbers (K,) of missing samples, and what is put there, in `unit`
     bridged: tuple[np.ndarray, np.ndarray] = NOTHING_BRIDGED
 
     def values(self, first: int = 0, stop: int | None = None) -> np.ndarray:

@@ -1,5 +1,5 @@
-"""Workbooks whose cells reach further than memory does end their reader, not the process that
-asked.
+"""Workbooks and Parquet files that say they hold more than memory does end their reader, not the
+process that asked.
 """
 
 import re
@@ -10,7 +10,7 @@ import pytest
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.filetypes import workbook
+from tractexp.filetypes import reading_process
 
 resource = pytest.importorskip("resource")
 
@@ -19,17 +19,17 @@ resource = pytest.importorskip("resource")
 def test_a_cell_in_the_last_row_and_column_is_a_sentence(name, tmp_path):
     path = hostile.INPUTS[name](tmp_path / name)
     with pytest.raises(
-        UserError, match=r"xlsx: it takes more than 2 GB .* save the workbook without it"
+        UserError, match=r"xlsx: it takes more than 2 GB .* save the table without them"
     ):
         tractexp.look(str(path))
 
 
 def test_a_sound_table_is_read_and_its_reader_has_ended(tmp_path):
     path = hostile.workbook(tmp_path / "dip.xlsx", hostile.rows_of_cells(hostile.VALUES))
-    with workbook.Workbook(path.read_bytes()) as book:
-        rows = book.rows("a")
-        with pytest.raises(workbook.BadWorkbook):
-            book.rows("another")
+    with reading_process.ReadingProcess("workbook", path.read_bytes()) as book:
+        rows = book.read("a")
+        with pytest.raises(reading_process.BadFile):
+            book.read("another")
     assert book._reader.returncode is not None
     assert (rows[0], len(rows)) == (["t", "U", "P", "Q"], 1 + hostile.ROWS)
     (event,) = tractexp.read(str(path))
@@ -40,20 +40,28 @@ def test_the_memory_of_the_reader_is_limited_and_not_ours(tmp_path, monkeypatch)
     before = resource.getrlimit(resource.RLIMIT_AS)
     far = '<row r="2000"><c r="XFD2000"><v>1</v></c></row>'
     path = hostile.workbook(tmp_path / "dip.xlsx", hostile.rows_of_cells(hostile.VALUES) + far)
-    monkeypatch.setattr(workbook, "ROOM", 500 << 20)  # of 0.8 GB
-    monkeypatch.setattr(workbook, "PER_BYTE", 0)
+    monkeypatch.setattr(reading_process, "ROOM", 500 << 20)  # of 0.8 GB
+    monkeypatch.setattr(reading_process, "PER_BYTE", 0)
     with pytest.raises(UserError, match="of memory to read"):
         tractexp.read(str(path))
     assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+def test_a_parquet_file_whose_few_bytes_stand_for_gigabytes_is_a_sentence(tmp_path):
+    """Its numbers of rows and columns are small: one text is long, and stands in every row."""
+    path = hostile.INPUTS["endless_text.parquet"](tmp_path / "dip.parquet")
+    assert path.stat().st_size < 1 << 20
+    with pytest.raises(UserError, match=r"parquet: it takes more than 2 GB of memory to read"):
+        tractexp.read(str(path))
 
 
 @pytest.mark.skipif(not Path("/proc/self/limits").exists(), reason="asks the system for limits")
 def test_the_time_of_the_reader_is_limited_and_not_ours(tmp_path):
     before = resource.getrlimit(resource.RLIMIT_CPU)
     path = hostile.workbook(tmp_path / "dip.xlsx", hostile.rows_of_cells(hostile.VALUES))
-    with workbook.Workbook(path.read_bytes()) as book:
+    with reading_process.ReadingProcess("workbook", path.read_bytes()) as book:
         limits = Path(f"/proc/{book._reader.pid}/limits").read_text()
-    assert re.search(rf"Max cpu time +{workbook.PATIENCE} ", limits)
+    assert re.search(rf"Max cpu time +{reading_process.PATIENCE} ", limits)
     assert resource.getrlimit(resource.RLIMIT_CPU) == before
 
 
