@@ -598,7 +598,9 @@ class TestTimes:
         assert noted(record, "as a simulator chooses them", "resampled linearly")
         assert detect(record).depth == pytest.approx(0.4, abs=1e-3)
 
-    @pytest.mark.parametrize("lost", [[50, 51], [50, 51, 200], list(range(20, 400, 9))])
+    @pytest.mark.parametrize(
+        "lost", [[*range(50, 54)], [*range(50, 54), 200], list(range(20, 400, 9))]
+    )
     def test_missing_rows_are_told_as_such(self, lost):
         with pytest.raises(
             UserError,
