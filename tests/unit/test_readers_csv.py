@@ -138,7 +138,7 @@ class TestWhatIsRefused:
             ),
             (with_cell(5, 2, "abc"), "dip.csv: line 5, column P: 'abc' is not a number"),
             (
-                without_voltage(5, 6),
+                without_voltage(5, 6, 7, 8),
                 "dip.csv: line 5: U = nan is not a finite number; only P and Q",
             ),
             (without_voltage(2), "line 2: U = nan is not a finite number; only P and Q may have"),
@@ -149,8 +149,8 @@ class TestWhatIsRefused:
             (with_cell(9, 2, "inf"), "line 9: P = inf is not a finite number"),
             ("# remark\n\n" + with_cell(9, 1, "-0.4"), "line 11: U = -0.4"),
             (
-                text(np.delete(rows(), [50, 51], axis=0)),
-                "line 52: t advances by 0.003 s where 0.001 s is usual: rows are missing",
+                text(np.delete(rows(), [50, 51, 52, 53], axis=0)),
+                "line 52: t advances by 0.005 s where 0.001 s is usual: rows are missing",
             ),
             (
                 text().replace(".", ","),
