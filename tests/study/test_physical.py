@@ -1,6 +1,7 @@
 """Machines of records from the field are held to what machines are, and what that costs is told."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,13 @@ import pytest
 import tractexp
 from tractexp.api.compose import model_of
 from tractexp.configuration.plugin import get
+from tractexp.identification.physical import say_ranges
+from tractexp.identification.verdict import (
+    BOUND,
+    END_OF_RANGE,
+    ParameterVerdict,
+    rests_on_bound,
+)
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 
@@ -99,6 +107,14 @@ def test_one_line_tells_the_price(odd):
     assert len(lines) == 1
     assert "model.physical=false" in lines[0]
     assert not any("widen" in text for text in (*odd.advice, odd.parameters["M"].verdict))
+
+
+def test_the_end_of_a_range_is_a_word_of_its_own(odd):
+    judged = dict.fromkeys(("M", "T_prime"), ParameterVerdict(BOUND, "widen it"))
+    uncertainty = replace(odd.details.uncertainty, verdicts=judged)
+    told = say_ranges(uncertainty, {"M": (0.0005, 0.01)}).verdicts
+    assert [told[name].word for name in ("M", "T_prime")] == [END_OF_RANGE, BOUND]
+    assert [rests_on_bound(str(told[name])) for name in ("M", "T_prime")] == [False, True]
 
 
 def test_free_it_is_found():

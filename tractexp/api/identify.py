@@ -729,7 +729,6 @@ def _conclude_identification(
             adequacy,
             together.odd if together else (),
             data=data,
-            held=setup.model.held,
         ),
         *_with_priors(problem, result),
         *_with_frequency(uncertainty),

@@ -1,6 +1,6 @@
 """What to do next, computed from what an identification leaves open."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -29,11 +29,9 @@ def advise(
     adequacy: Adequacy,
     odd: Sequence[str] = (),
     data: str = "",
-    held: Collection[str] = (),
 ) -> list[str]:
     """Sentences, the most pressing first. `odd` events do not fit with the rest; `data` is the
-    choice of data that holds further events of the load, where one is known; `held` are parameters
-    whose bounds are what machines are, which nobody should widen.
+    choice of data that holds further events of the load, where one is known.
 
     Of a model that does not describe the load nothing is said that would only hold if it did. What
     is missing is looked for in the domain that tells more, where there is one.
@@ -53,7 +51,7 @@ def advise(
     sentences += [
         f"widen model.bounds.{name}, or ask whether the model is the right one"
         for name, verdict in uncertainty.verdicts.items()
-        if verdict.word == BOUND and name.partition("[")[0] not in held
+        if verdict.word == BOUND
     ]
     for direction in uncertainty.information.unseen:
         tied = [

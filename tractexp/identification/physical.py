@@ -102,7 +102,7 @@ def find_free_optimum(
 def say_ranges(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) -> Uncertainty:
     """The judgement that tells nobody to widen the range of what stands at its end."""
     told = {
-        name: ParameterVerdict(BOUND, f"{value:.4g}, {END_OF_RANGE}")
+        name: ParameterVerdict(END_OF_RANGE, f"{value:.4g}")
         for name, value in zip(uncertainty.names, uncertainty.values.tolist(), strict=True)
         if name in _names_at_range(uncertainty, held) and uncertainty.verdicts[name].word == BOUND
     }

@@ -21,6 +21,7 @@ from tractexp.identification.profile_lanes import End, Lanes, LikelihoodProfile,
 from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import (
     BOUND,
+    END_OF_RANGE,
     IDENTIFIED,
     IDENTIFIED_SHARE,
     UNIDENTIFIED,
@@ -113,8 +114,8 @@ def revise_verdict(
     opened = [end is not End.CLOSED for end in profile.ends]
     if all(opened):
         word = UNIDENTIFIED
-    elif verdict.word == BOUND:
-        word = BOUND
+    elif verdict.word in (BOUND, END_OF_RANGE):
+        word = verdict.word
     elif (
         any(opened)
         or profile.minima

@@ -9,14 +9,14 @@ import numpy as np
 
 from tractexp.inference.information import SHARE, Information
 
-IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
+IDENTIFIED, WEAK, UNIDENTIFIED, BOUND, END_OF_RANGE = (
     "identified",
     "weakly identified",
     "not identifiable from this record",
     "at its bound",
+    "at the end of what machines have",  # of a parameter that is held to a physical range
 )
 HELD = "a requirement of the model holds it there: beside it there is no steady state"
-END_OF_RANGE = "the end of what machines have"  # of a parameter that is held to a physical range
 # an interval of at most plus and minus this share of the value identifies a parameter
 IDENTIFIED_SHARE = 0.2
 # of the range: what may be zero is measured against this where its value is smaller
@@ -29,7 +29,7 @@ BOUND_DISTANCE = 1e-3  # of the range: closer than this is at the bound
 
 @dataclass(frozen=True)
 class ParameterVerdict:
-    """One of the four words, and what stands behind it."""
+    """One of the five words, and what stands behind it."""
 
     word: str
     detail: str
@@ -52,10 +52,8 @@ def brief(verdict: str) -> str:
 
 
 def rests_on_bound(verdict: str) -> bool:
-    """Whether a bound alone holds the parameter, by its verdict as written: the end of a physical
-    range is where machines end.
-    """
-    return verdict.startswith(BOUND) and END_OF_RANGE not in verdict
+    """Whether a bound alone holds the parameter, by its verdict as written."""
+    return verdict.startswith(BOUND)
 
 
 def size(value: float, low: float, high: float) -> float:
