@@ -213,6 +213,8 @@ def test_names_of_programs_and_languages_say_line_or_ground(name, line):
         ("P_total_MW", ("P_total", "MW")),
         ("I_L1_kA", ("I_L1", "kA")),
         ("Voltage, kV", ("Voltage", "kV")),
+        ("Q_MVAR", ("Q", "MVAR")),
+        ("Phase_S", ("Phase_S", "")),
     ],
 )
 def test_a_unit_is_the_last_of_several_words(name, parts):
@@ -230,3 +232,27 @@ def test_line_or_phase_said_in_a_word(tmp_path, name, share):
     t, U, P, Q = slow()
     got, _ = read(tmp_path / "a.csv", f"t,{name} (kV),P (MW),Q (Mvar)", [t, U / share, P, Q])
     assert got == pytest.approx(SIZE, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Tensão (kV),Potência ativa (MW),Potência reativa (Mvar)",
+        "Napięcie (kV),Moc czynna (MW),Moc bierna (Mvar)",
+        "Jännite kV,Pätöteho MW,Loisteho MVAR",
+        "Napětí [kV],Činný výkon [MW],Jalový výkon [Mvar]",
+        "전압(kV),유효전력(MW),무효전력(Mvar)",
+        "电压(千伏),功率(兆瓦),无效功率(兆乏)",
+    ],
+)
+def test_in_whatever_language_the_only_column_of_a_unit_is_what_it_measures(tmp_path, header):
+    t, U, P, Q = slow()
+    got, notes = read(tmp_path / "a.csv", f"t,{header}", [t, U, P, Q])
+    assert got == pytest.approx(SIZE, rel=0.01)
+    assert any(note.startswith("columns: t = 't'") or "U = " in note for note in notes)
+
+
+def test_of_two_columns_of_a_unit_none_is_taken_by_it(tmp_path):
+    t, U, P, Q = slow()
+    with pytest.raises(tractexp.UserError, match="column P is missing"):
+        read(tmp_path / "a.csv", "t,U (kV),Moc (MW),Straty (MW),Q (Mvar)", [t, U, P, P / 9, Q])

@@ -293,3 +293,14 @@ def test_a_last_value_of_unlike_digits_is_read_and_the_missing_line_end_said(tmp
     record = build("data", {"name": "csv", "path": str(tmp_path / "open.csv")}).table()[0]
     assert (record.samples, record.Q[-1]) == (200, 0.3)
     assert any("may be cut short" in note for note in record.notes)
+
+
+@pytest.mark.parametrize(("zone", "hours"), [("+08:00", 8), ("-0330", -3.5), ("Z", 0)])
+def test_a_zone_is_told_where_times_are_turned_into_utc(read, zone, hours):
+    cells = [
+        f"{START + dt.timedelta(seconds=float(x)):%Y-%m-%dT%H:%M:%S.%f}{zone}" for x in dip()[0]
+    ]
+    record = read(cells)
+    is_the_dip(record, START - dt.timedelta(hours=hours))
+    told = [note for note in record.notes if "told in UTC" in note]
+    assert [f"those of UTC{zone}" in note for note in told] == [True] * (hours != 0)

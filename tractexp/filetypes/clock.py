@@ -66,14 +66,14 @@ class ClockTimes:
 
 @dataclass(frozen=True)
 class _Moment:
-    """One cell: the text of its day, or the day; the second of it; whether AM or PM, and whether a
-    zone, is written.
+    """One cell: the text of its day, or the day; the second of it; whether AM or PM is written, and
+    the zone that is.
     """
 
     day: str | dt.date | None
     second: float
     half: bool = False
-    zone: bool = False
+    zone: str = ""
     leap: bool = False  # a second of which the minute has 61
 
 
@@ -122,6 +122,8 @@ def times(cells: Sequence[Any]) -> ClockTimes:
     seconds[1:] += np.cumsum(leap[:-1] & ~leap[1:])
     local = np.full(len(cells), np.inf) if any(one.zone for one in moments) else clock
     seconds, jumps = _run_on(seconds, local)
+    if _offset(zone := moments[0].zone):
+        remarks.append((0, f"times are told in UTC, and the file's are those of UTC{zone}"))
     return ClockTimes(seconds - seconds[0], start, (*remarks, *jumps), moments[0].second)
 
 
@@ -209,12 +211,12 @@ def _read_text(cell: str, row: int) -> _Moment | None:
     if day and not is_date(day):
         raise BadCell(row, f"{quote_cell(day)} is no date; write it as 2024-03-31")
     total = hours * 3600 + minutes * 60 + second - _offset(match["zone"])
-    return _Moment(day, total, bool(match["half"]), bool(match["zone"]), second >= 60)
+    return _Moment(day, total, bool(match["half"]), match["zone"] or "", second >= 60)
 
 
 def _offset(zone: str | None) -> float:
     """Seconds by which a zone is ahead of UTC."""
-    if zone is None or zone in ("Z", "UTC", "GMT"):
+    if not zone or zone in ("Z", "UTC", "GMT"):
         return 0.0
     digits = zone[1:].replace(":", "").ljust(4, "0")
     return (1 if zone[0] == "+" else -1) * (int(digits[:2]) * 3600 + int(digits[2:]) * 60)

@@ -37,6 +37,10 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "mva": ("reactive", 1.0),
     "kva": ("reactive", 1e-3),
     "va": ("reactive", 1e-6),
+    "兆瓦": ("power", 1.0),
+    "千瓦": ("power", 1e-3),
+    "兆乏": ("reactive", 1.0),
+    "千乏": ("reactive", 1e-3),
     "мвар": ("reactive", 1.0),
     "квар": ("reactive", 1e-3),
     "hz": ("frequency", 1.0),
@@ -75,16 +79,13 @@ BRACKETED = (
 LONGEST_NAME_END = 80  # letters at the end of a name among which its unit is
 UNMISTAKABLE = frozenset(
     (  # as units after a space or an underscore, where V and A may be phases
-        "kV",
-        "kA",
-        "MW",
-        "kW",
-        "Mvar",
-        "MVAr",
-        "MVar",
+        "kv",
+        "ka",
+        "mw",
+        "kw",
+        "mvar",
         "kvar",
-        "kVAr",
-        "Hz",
+        "hz",
         "s",
         "ms",
         "us",
@@ -337,8 +338,12 @@ def split_unit(name: str) -> tuple[str, str]:
         if (match := re.fullmatch(pattern, end)) and is_unit(match[2]):
             return before + match[1].strip(), match[2]
     match = re.fullmatch(r"(.+?)[\s,_]+([^\s,_]+)", end)
-    sure = match is not None and (
-        match[2] in UNMISTAKABLE or (not match[2].isascii() and is_unit(match[2]))
+    sure = (
+        match is not None
+        and match[2] != "S"
+        and (  # S: a phase
+            match[2].lower() in UNMISTAKABLE or (not match[2].isascii() and is_unit(match[2]))
+        )
     )
     return (before + match[1], match[2]) if match and sure else (name, "")
 

@@ -12,6 +12,7 @@ from tractexp.errors import DATA, UserError, among, nearest, setting
 from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.clock import first_day, is_time
 from tractexp.filetypes.columns import Role, fits, is_unit, order_of, role
+from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.table import TableFile
 from tractexp.recording.unit import amount
 
@@ -38,6 +39,8 @@ OF: Mapping[str, tuple[str, ...]] = {  # {quantity as data.units names it: units
     "angle": ("deg", "rad"),
 }
 QUANTITIES = tuple(OF)
+# {key: how the units end that only it has}
+BY_UNIT_ALONE = {"U": ("kv", "кв", "千伏"), "P": ("w", "вт", "瓦"), "Q": ("var", "вар", "乏")}
 
 
 @dataclass(frozen=True)
@@ -280,7 +283,22 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
         key = name if name in exact else renamed.get(one.key, one.key)
         if key not in numbers and (key not in exact or name == key):
             options.setdefault(key, []).append(_named_column(k, name, key, one))
-    return _find_time_columns(table, options)
+    unnamed = [k for k in find_other_columns(table, numbers.values()) if k not in roles]
+    return _find_time_columns(table, _add_by_unit(heading, unnamed, options))
+
+
+def _add_by_unit(
+    heading: TableHeading, unnamed: Sequence[int], options: dict[str, list[MappedColumn]]
+) -> dict[str, list[MappedColumn]]:
+    """The options with the columns whose names say nothing, in whatever language, and whose units
+    say voltage, P or Q: where no column is called so, and one alone has such a unit.
+    """
+    for key, units in BY_UNIT_ALONE.items():
+        fitting = [k for k in unnamed if heading.units[k].lower().endswith(units)]
+        if len(fitting) == 1 and not any(other[0] == key for other in options):
+            [k] = fitting
+            options[key] = [MappedColumn(k, heading.names[k], Role(key, heading.units[k]))]
+    return options
 
 
 def find_other_columns(table: TableFile, taken: Collection[int]) -> list[int]:
