@@ -33,7 +33,7 @@ SETTINGS = {
     "toImageButtonOptions": {"format": "svg"},
 }
 LICENSE = "// plotly.js, copyright Plotly, Inc., MIT license"
-PAPER = 680  # pixels, the width of a printed page
+PAPER = 700  # pixels, the width of a printed page: A4 without its margins of 12 mm
 # pixels: a legend on a phone, one of its entries without the name, a letter
 PHONE, ENTRY, LETTER = 240, 45, 7
 PANEL_GAP = 0.045  # of the height, between panels
