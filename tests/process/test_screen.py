@@ -16,6 +16,7 @@ from tractexp.api.identify import Identification
 from tractexp.blocks import Table
 from tractexp.blocks.block import Report
 from tractexp.blocks.terminal import fold, show
+from tractexp.report.screen import tabulate_parameters
 from tractexp.text.wording import shorten
 
 EXACT = ("optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false")
@@ -49,7 +50,7 @@ def test_the_answer_of_an_identification_is_one_screen(printed):
     assert rows[0].startswith("load: ")
     assert "tibet_50pct" in rows[0]
     assert any(row.startswith("doubtful: the model describes this load within") for row in rows)
-    assert next(row.split()[0] for row in rows if "identified" in row) == "T_prime"
+    assert next(row.split()[0] for row in rows if row.split()[-1:] == ["yes"]) == "T_prime"
     assert short.stdout.count("next: ") == 1
     assert "report.html" in short.stdout
     for part in (
@@ -125,6 +126,27 @@ def test_a_value_that_a_bound_holds_is_why_a_model_that_fits_is_unusable():
     assert "unusable: T_m is held by a bound alone; noise alone leaves as much." in told
 
 
+def test_names_that_are_long_leave_each_parameter_a_line():
+    names = ["branch_resistance", "T_prime_second", "M", "C"]
+    verdicts = [
+        "weakly identified: it trades",
+        "not identifiable from this record",
+        "identified",
+        "at its bound: 0.85",
+    ]
+    fit = fitted(
+        parameters=dict.fromkeys(names, 0.0123456),
+        standard_errors=dict.fromkeys(names, 0.000123),
+        intervals={name: [0.0012345, 0.0098765] for name in names},
+        verdicts=dict(zip(names, verdicts, strict=True)),
+        units=dict.fromkeys(names, "pu s²/rad"),
+    )
+    fit.__dict__["operating_point"] = None
+    rows = print_at(Report().add(tabulate_parameters(fit)), WIDTH)
+    assert [row.split()[-1] for row in rows[2:]] == ["weakly", "no", "yes", "bound"]
+    assert len(rows) == 2 + len(names)
+
+
 def test_at_sixty_columns_each_parameter_is_a_folded_sentence():
     narrow, out = 60, io.StringIO()
     console = Console(file=out, width=narrow, highlight=False, soft_wrap=True, color_system=None)
@@ -147,6 +169,14 @@ def test_a_narrow_console_gets_a_sentence_for_each_row():
 def test_a_sentence_is_folded_at_words_and_its_command_stays_whole():
     command = "tractexp task=discrepancy data.path='a b.cfg' data.train=[1]"
     assert fold(f"next: find it: {command}", 30) == ["next: find it:", f"  {command}"]
+    two = f"next: find it: {command}; or look: tractexp list model; or wait"
+    assert fold(two, 30) == [
+        "next: find it:",
+        f"  {command}",
+        "  or look:",
+        "  tractexp list model",
+        "  or wait",
+    ]
     assert fold("one two three", 7) == ["one two", "  three"]
     assert fold("one two three", None) == ["one two three"]
     # a character that takes the place of two

@@ -11,7 +11,7 @@ from tractexp.text.wording import one_line
 PLAIN_LINE_WIDTH = 200  # characters of a line of text that is no terminal's
 COLUMN_GAP = 2  # characters between two columns
 NARROWEST_WORDS = 12  # characters to which a column of words may be folded
-COMMAND = re.compile(r"(?<=: )tractexp [^;]*$")  # at the end of a line: it is copied whole
+COMMAND = re.compile(r"(?<=: )(tractexp [^;]*)")  # it is copied whole
 
 
 def show(report: Report, console: Any, width: int | None = None) -> None:
@@ -33,7 +33,7 @@ def _print_text(text: str, console: Any, width: int | None) -> None:
 
 
 def fold(text: str, width: int | None) -> list[str]:
-    """The lines of a sentence, all but the first indented; a command at its end is one line, which
+    """The lines of a sentence, all but the first indented; each command in it is one line, which
     the terminal breaks, so that it is copied whole.
     """
     from rich.cells import cell_len
@@ -41,16 +41,20 @@ def fold(text: str, width: int | None) -> list[str]:
     if width is None or cell_len(text) <= width:
         return [text]
     lead = text[: len(text) - len(text.lstrip())]
-    command = COMMAND.search(text)
-    first, *words = (text[: command.start()] if command else text).split()
-    lines, indent = [lead + first], f"{lead}  "
-    for word in words:
-        longer = f"{lines[-1]} {word}"
-        if cell_len(longer) <= width:
-            lines[-1] = longer
-        else:
-            lines.append(indent + word)
-    return [*lines, *([f"{indent}{command[0]}"] if command else [])]
+    indent = f"{lead}  "
+    lines = list[str]()
+    for k, part in enumerate(COMMAND.split(text)):
+        if k % 2:  # a command
+            lines.append(indent + part)
+            continue
+        begun = False
+        for word in part.removeprefix("; ").split():
+            if begun and cell_len(f"{lines[-1]} {word}") <= width:
+                lines[-1] += f" {word}"
+            else:
+                lines.append((indent if lines else lead) + word)
+            begun = True
+    return lines
 
 
 def _lines(block: Any) -> Sequence[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.blocks import Report, Table
 from tractexp.identification.result import Result
-from tractexp.identification.verdict import UNIDENTIFIED, brief
+from tractexp.identification.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, brief
 from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import UNKNOWN, Identity, label
 from tractexp.text.wording import count_noun, list_first, shorten, with_error
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 MOST_PARAMETERS = 10  # rows of the table of parameters
 MOST_EVENTS = 2  # events that a line names
+# verdicts in a word, so that rows fit a line beside long names
+SHORT = {IDENTIFIED: "yes", WEAK: "weakly", UNIDENTIFIED: "no", BOUND: "at bound"}
 
 
 def screen(fit: "Identification") -> Report:
@@ -61,18 +63,20 @@ def choose_units(result: Result) -> tuple[float, tuple[str, str]]:
 
 
 def tabulate_parameters(fit: "Identification") -> Table:
-    """Name, value with its standard error, unit, 95 % interval, and what that means, in a word."""
+    """Name, value with its standard error, unit, 95 % interval, and whether it is identified, in a
+    word.
+    """
     rows = [
         [
             e.name,
             with_error(e.value, e.standard_error or 0.0),
             e.unit,
             "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
-            brief(e.verdict).replace(UNIDENTIFIED, "not identifiable"),
+            SHORT.get(brief(e.verdict), brief(e.verdict)),
         ]
         for e in fit.own_parameters[:MOST_PARAMETERS]
     ]
-    return Table(["parameter", "value", "unit", "95 % interval", "verdict"], rows, words=(2, 4))
+    return Table(["parameter", "value", "unit", "95 % interval", "known"], rows, words=(2, 4))
 
 
 def describe_error(result: Result) -> str:
