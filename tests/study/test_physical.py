@@ -85,6 +85,16 @@ def test_what_is_given_goes_before_what_machines_are():
     assert {*given.held} == {"X_prime", "T_m"}
 
 
+def test_a_model_that_was_held_is_held_and_not_given_when_it_is_fitted_again():
+    """As the extended model of an investigation is."""
+    field = dips(0.006, **FIELD)
+    once = model_of("third_order_exponential").hold_to_machines(field)
+    assert once.hold_to_machines(field).held == once.held
+    given = once.with_(effects=["stator_resistance"], bounds={"C": [0.3, 0.7]})
+    assert {*given.hold_to_machines(field).held} == {*once.held} - {"C"}
+    assert given.hold_to_machines(field).bounds["C"] == [0.3, 0.7]
+
+
 def test_a_machine_within_the_ranges_costs_nothing_and_nothing_is_said():
     found = fit(dips(0.006, **FIELD))
     assert found.parameters["M"].value == pytest.approx(0.006, rel=0.03)

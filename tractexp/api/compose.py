@@ -100,6 +100,8 @@ class LoadModel(Portable, Plain, Tabulated):
         those there are.
         """
         settings = {key: value for key, value in changes.items() if value is not None}
+        given = {*settings.get("bounds", ()), *settings.get("fixed", ())}
+        settings["held"] = {n: each for n, each in self.held.items() if n not in given}
         for key in ("bounds", "fixed"):
             if key in settings:
                 settings[key] = {**getattr(self, key), **settings[key]}
@@ -161,7 +163,7 @@ class LoadModel(Portable, Plain, Tabulated):
         """The model within the physical ranges of its parameters where `physical` says so, or where
         it leaves that open and the events are from the field. Bounds that are given stay.
         """
-        wanted, given = self.physical, {*self.bounds, *self.fixed}
+        wanted, given = self.physical, {*self.bounds, *self.fixed} - {*self.held}
         if wanted is None:
             wanted = all(event.record.is_from_field for event in events)
         ranges = {p.name: p.physical for p in self.model.parameters if p.physical and wanted}

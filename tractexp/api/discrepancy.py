@@ -344,10 +344,12 @@ class Investigation(Written):
 
         model = self.question.model
         known = {
-            "bounds": model.bounds,
+            # what machines are it is held to again by whoever reads it
+            "bounds": {name: b for name, b in model.bounds.items() if name not in model.held},
             "fixed": model.fixed,
             "substeps": model.substeps,
             "priors": model.priors,
+            "physical": model.physical,
         }
         base = {**model.node, **known}
         paths = [

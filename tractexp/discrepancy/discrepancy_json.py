@@ -417,6 +417,8 @@ def write_model(
     }
     if window is not None:
         extended["window"] = window
+    if node.get("physical") is not None:
+        extended["physical"] = node["physical"]
     command = use_of(
         investigation.context.load.domain,
         (home or path).absolute(),
