@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # for editors and type checkers; a test holds it to PUBLIC
     from tractexp.api.profile import profile as profile
     from tractexp.api.read import read as read
     from tractexp.api.simulate import simulate as simulate
+    from tractexp.api.station import fit_station as fit_station
     from tractexp.api.survey import survey as survey
     from tractexp.errors import UserError as UserError
     from tractexp.model.site_table import sites as sites
@@ -45,6 +46,7 @@ PUBLIC = {
     "convert": "tractexp.api.convert",
     "examples": "tractexp.api.examples",
     "export": "tractexp.api.export",
+    "fit_station": "tractexp.api.station",
     "generalise": "tractexp.api.generalise",
     "identify": "tractexp.api.identify",
     "investigate": "tractexp.api.discrepancy",

@@ -124,7 +124,7 @@ def check_grades(steps: list[Step]) -> None:
 
 def leads_elsewhere(words: tuple[str, ...]) -> bool:
     """Whether a command changes the records, the domain or what is known of the parameters."""
-    return any(word.startswith(("data=", "data.", "domain=", "model.priors=")) for word in words)
+    return any(word.startswith(("data=", "data.", "domain=", "model.physical=")) for word in words)
 
 
 def test_commands_are_read_as_a_shell_reads_them():

@@ -47,9 +47,9 @@ def test_where_nothing_but_noise_is_left_no_digit_moves():
     assert held.result.standard_errors == free.result.standard_errors
 
 
-def test_a_load_as_loads_are_is_not_told_of_priors():
+def test_a_load_as_loads_are_is_not_told_of_machines():
     free = identified(tractexp.read("tibet_50pct"), False)
-    assert not any("model.priors" in sentence for sentence in free.advice)
+    assert not any("model.physical" in sentence for sentence in free.advice)
 
 
 @pytest.mark.skipif(not STATION.is_file(), reason="../shared/data is not here")
@@ -62,7 +62,7 @@ def test_no_motor_of_a_real_station_is_beyond_its_load(load):
     effects = ["zero_sequence_path"] * (load == "first")
     free = identified(dips[:1], False, model="fifth_order_branch", domain="waves", effects=effects)
     assert free.operating_point.share > 2
-    assert "model.priors=true" in free.advice[-1]
+    assert "model.physical=true" in free.advice[-1]
     for dip in dips:
         held = identified([dip], True, model="fifth_order_branch", domain="waves", effects=effects)
         assert 0.3 < held.operating_point.share < 1.2
@@ -70,7 +70,7 @@ def test_no_motor_of_a_real_station_is_beyond_its_load(load):
         assert 0.8 < held.result.parameters["C"] < 0.98
         (note,) = [n for n in held.result.uncertainty["notes"] if "model.priors" in n]
         assert "standard deviations off where it is farthest" in note
-        assert not any("model.priors=true" in sentence for sentence in held.advice)
+        assert not any("model.physical=true" in sentence for sentence in held.advice)
 
 
 def contactors(**known):

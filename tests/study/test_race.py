@@ -58,8 +58,17 @@ def test_the_structure_that_the_load_has_wins(motor, name, depths):
     won = raced(motor, *depths)
     assert won.race[0]["name"] == name
     assert won.motor["name"] == motor
-    best = min(entry["predicted"] for entry in won.race)
+    best = min(entry["predicted"] for entry in won.race if entry["predicted"] is not None)
     assert won.race[0]["predicted"] <= AS_GOOD * best
+
+
+def test_what_fits_worse_than_the_best_predicts_is_not_asked_to_predict():
+    for entry in raced("electromechanical", 0.35).race:
+        missed = entry["fitted"] > AS_GOOD * raced("electromechanical", 0.35).race[0]["predicted"]
+        assert (entry["predicted"] is None) == missed
+        assert ("leaves more than the best predicts" in entry["why"]) == missed
+    lost = [e["name"] for e in raced("electromechanical", 0.35).race if e["predicted"] is None]
+    assert "static_exponential" in lost
 
 
 def test_what_is_known_of_parameters_goes_with_the_winner():

@@ -421,3 +421,42 @@ class TestLoadsAndFuses:
             t, V, load(KV + 0 * t) * np.where(fault, np.array([[0.3], [0.9], [1.1]]), 1.0)
         )
         assert event.kind == "dip"
+
+
+def exponential(t, course, exponent):
+    """Volts and amps (3, N) of powers that go with a course (N,) of the voltage to an exponent."""
+    return phases(KV * course), load(KV * course ** (exponent - 1))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("exponent", [1.0, 1.6])
+def test_a_tap_tells_the_exponents_of_the_static_part(seed, exponent):
+    t = grid(4.0)
+    [event] = seen(t, *exponential(t, np.where(t < 2.0, 1.0, 0.96), exponent), seed=seed)
+    assert (event.kind, event.worth) == ("step", False)
+    assert [each.channel for each in event.exponents] == ["P", "Q"]
+    for each in event.exponents:
+        assert each.value == pytest.approx(exponent, abs=0.1)
+        assert each.low <= exponent + 0.05
+        assert each.high >= exponent - 0.05
+        assert each.high - each.low < 0.5
+        assert each.explained > 0.9
+    assert "worth fitting for the static part: P with U^" in event.why
+
+
+def test_a_ramp_tells_them_too():
+    t = grid(8.0)
+    course = 1 - 0.1 * np.clip((t - 2) / 4, 0, 1)
+    events = seen(t, *exponential(t, course, 1.4))
+    assert {event.kind for event in events} == {"ramp"}
+    assert events[0].exponents[0].value == pytest.approx(1.4, abs=0.1)
+
+
+def test_what_shows_no_change_of_the_voltage_or_no_load_tells_no_exponent():
+    t = grid(4.0)
+    course = np.where(t < 2.0, 1.0, 0.96)
+    [event] = seen(t, phases(KV * course), 0 * load(KV * course))
+    assert event.exponents == ()
+    assert "static part:" not in event.why
+    [dip] = seen(t, *exponential(t, np.where((t > 2) & (t < 2.2), 0.6, 1.0), 1.0))
+    assert dip.exponents == ()

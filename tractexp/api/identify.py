@@ -24,8 +24,6 @@ from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.result import Result, by_event, conclude, play, refuse_failed
 from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.inference.model_error import ModelError
-from tractexp.inference.prior import departures
-from tractexp.inference.problem import Problem
 from tractexp.outcome import Drawing, Written
 from tractexp.record import OwnBase
 from tractexp.text.progress import Progress, counter, tell
@@ -691,6 +689,7 @@ def _conclude_identification(
     from tractexp.identification.physical import find_free_optimum, say_ranges
     from tractexp.identification.profile import check_by_profiles
     from tractexp.identification.rivals import with_rivals
+    from tractexp.identification.share import find_share_bound
     from tractexp.identification.unrecorded import with_unrecorded
     from tractexp.identification.yardstick import yardstick
 
@@ -718,6 +717,7 @@ def _conclude_identification(
     fields = uncertainty.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
     fields["uncertainty"]["notes"] += together.notes if together else []
+    share = find_share_bound(uncertainty)
     free = find_free_optimum(uncertainty, setup.model.held, fits, setup.validate)
     fields["uncertainty"]["notes"] += [str(free)] if free else []
     starts = [s.to_dict(problem.space.names) for s in graded.estimation.starts]
@@ -730,7 +730,7 @@ def _conclude_identification(
             together.odd if together else (),
             data=data,
         ),
-        *_with_priors(problem, result),
+        *_hold_to_machines(setup, result),
         *_with_frequency(uncertainty),
     ]
     beside = yardstick(fits, result.model_error)
@@ -743,6 +743,7 @@ def _conclude_identification(
         starts=starts,
         rival_structures=structures,
         free_optimum=free.to_dict() if free else {},
+        share_bound=share.to_dict() if share else {},
         unrecorded=uncertainty.unrecorded.to_dict() if uncertainty.unrecorded else {},
         advice=advice,
     )
@@ -760,22 +761,21 @@ def _with_frequency(uncertainty: "Uncertainty") -> list[str]:
     ]
 
 
-def _with_priors(problem: Problem, result: Result) -> list[str]:
-    """The command that holds a motor that no load has to what machines usually are; [] where it is
-    one, or is held.
+def _hold_to_machines(setup: FitSpec, result: Result) -> list[str]:
+    """The command that holds a motor that no load has to what machines are, or races structures
+    where it is held; [] where the motor is one, or by priors.
     """
     from tractexp.exchange.operating_point import OperatingPoint
 
-    point = OperatingPoint.from_result(result)
-    if (
-        problem.priors
-        or not (point and point.doubt)
-        or not departures(problem, problem.defaults[None]).size
-    ):
+    point, model = OperatingPoint.from_result(result), setup.model
+    if model.priors or not (point and point.doubt):
         return []
-    return [
-        f"hold the motor to what machines usually are: {build_again_command('model.priors=true')}"
-    ]
+    if model.held:
+        race = f"race structures for one that is a load: {build_again_command('model=auto')}"
+        return [] if model.race else [race]
+    if not any(parameter.physical for parameter in model.model.parameters):
+        return []
+    return [f"hold the motor to what machines are: {build_again_command('model.physical=true')}"]
 
 
 @plugin

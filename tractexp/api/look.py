@@ -391,6 +391,7 @@ def event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]
         "worth": event.worth,
         "why": event.why,
         "phases": list(what.phases),
+        "exponents": [vars(each) for each in what.exponents],
     }
 
 
@@ -499,6 +500,7 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
         "units": units,
         **_sums(shown),
         "said": list(shown.said),
+        "type_test": shown.type_test and shown.type_test.to_dict(),
         "unexamined": shown.unexamined,
         "dead_phases": shown.dead_phases,
         "secondary": shown.secondary,

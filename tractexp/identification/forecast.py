@@ -17,6 +17,8 @@ from tractexp.inference.prediction_band import (
     find_scatter,
     measure_band,
 )
+from tractexp.model.model import Model
+from tractexp.record import Event
 
 if TYPE_CHECKING:
     from tractexp.identification.grade import GradedModel
@@ -82,7 +84,9 @@ def forecast_next_dip(graded: "GradedModel") -> dict[str, Any]:
     values = problem.full(graded.values)[0]
     root = problem.full(graded.values + _find_root(information.J) * information.width) - values
     duration = float(np.mean([fit.event.duration for fit in graded.fits]))
-    half, sentence = _tell_of_dip(graded, Forecast(values, root, band), duration)
+    half, sentence = tell_of_dip(
+        problem.model, problem.events[0], Forecast(values, root, band), duration
+    )
     return {
         "depth": TOLD_DEPTH,
         "duration": duration,
@@ -101,13 +105,12 @@ def forecast_next_dip(graded: "GradedModel") -> dict[str, Any]:
     }
 
 
-def _tell_of_dip(
-    graded: "GradedModel", forecast: Forecast, duration: float
+def tell_of_dip(
+    model: Model, first: Event, forecast: Forecast, duration: float
 ) -> tuple[list[float] | None, str]:
-    """Half the bands of a dip of 40 % as shares of S, and the sentence; None where there are
-    none.
+    """Half the bands of a dip of 40 % as shares of S, and the sentence, where the load draws what
+    it did before the event `first`; None where there are none.
     """
-    model, first = graded.problem.model, graded.problem.events[0]
     before = {"U0": first.U0, "P0": first.P0, "Q0": first.Q0, "frequency": first.f0}
     t, U, start = draw_dip(first.U0, duration, first.record.step)
     dip = f"the next dip of {100 * TOLD_DEPTH:.0f} %"

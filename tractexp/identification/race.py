@@ -25,6 +25,7 @@ from tractexp.text.progress import Counting, make_silent_counter
 
 STRETCHES = 5  # of a single dip
 AS_GOOD = 1.05  # times the least error: a simpler structure within it wins
+WORSE_FITTED = "fitted it already leaves more than the best predicts"
 
 
 @dataclass(frozen=True)
@@ -65,13 +66,21 @@ def race_structures(
     """The entries of the candidates, the winner first, the others by what they predict. Raises
     `UserError` where none can be fitted.
     """
-    entries = []
-    counting: Counting = parts(len(candidates))
+    counting: Counting = parts(2 * len(candidates))
+    entries, fitted = list[Entry](), list[_Fitted]()
     with counting as ended:
         for candidate in candidates:
-            entries.append(_enter(candidate, events, fixed or {}))
+            found = _fit(candidate, events, fixed or {})
+            (entries if isinstance(found, Entry) else fitted).append(found)  # type: ignore[arg-type]
             ended()
-    entries.sort(key=lambda entry: entry.predicted)
+        best = np.inf
+        for one in sorted(fitted, key=lambda one: one.error):
+            # what does not follow the records where it is fitted does not predict them
+            entry = one.tell(WORSE_FITTED) if one.error > AS_GOOD * best else one.predict()
+            best = min(best, entry.predicted)
+            entries.append(entry)
+            ended()
+    entries.sort(key=lambda entry: (entry.predicted, entry.fitted))
     if not entries or not np.isfinite(entries[0].predicted):
         raise UserError(
             f"none of the structures can be fitted: {entries[0].why if entries else ''}"
@@ -81,7 +90,36 @@ def race_structures(
     return [winner, *(entry for entry in entries if entry is not winner)]
 
 
-def _enter(candidate: Candidate, events: Sequence[Event], fixed: Mapping[str, float]) -> Entry:
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """A structure fitted to all dips: where its descents ended (n, D), what it leaves of the
+    response `size` [pu²] where it is `compared` (C, N), as a fraction.
+    """
+
+    name: str
+    likelihood: Likelihood
+    ends: np.ndarray
+    compared: np.ndarray
+    size: float
+    error: float
+
+    def tell(self, why: str = "", predicted: float = np.inf) -> Entry:
+        return Entry(self.name, self.likelihood.free, self.error, predicted, why)
+
+    def predict(self) -> Entry:
+        """The entry, with what it leaves of dips or stretches that it is not fitted to."""
+        likelihood, squares = self.likelihood, 0.0
+        for held in _folds(likelihood.problem, self.compared):
+            rest = replace(likelihood, valid=likelihood.valid & ~held)
+            left = likelihood.residuals(rest.descent(self.ends).best[None])[0]
+            squares += float(np.sum(np.where(held & self.compared, left, 0.0) ** 2))
+        return self.tell(predicted=_share(squares, self.size))
+
+
+def _fit(
+    candidate: Candidate, events: Sequence[Event], fixed: Mapping[str, float]
+) -> _Fitted | Entry:
+    """A structure fitted to all dips; its entry where it cannot be."""
     own = {name: value for name, value in fixed.items() if name in candidate.model.names}
     try:
         problem = Problem(candidate.model, events, candidate.bounds, own)
@@ -94,18 +132,16 @@ def _enter(candidate: Candidate, events: Sequence[Event], fixed: Mapping[str, fl
     if not np.isfinite(ends.deviance.min(initial=np.inf)):
         why = "nothing in its bounds can be simulated"
         return Entry(candidate.name, problem.space.dimension, np.inf, np.inf, why)
-    starts, counted = distinct(ends, likelihood.free), _mark_compared(problem)
-    size = _response(problem, counted)
-    fitted = likelihood.residuals(ends.best[None])[0]
-    predicted = 0.0
-    for held in _folds(problem, counted):
-        rest = replace(likelihood, valid=likelihood.valid & ~held)
-        best = rest.descent(starts).best
-        left = likelihood.residuals(best[None])[0]
-        predicted += float(np.sum(np.where(held & counted, left, 0.0) ** 2))
-    inside = float(np.sum(np.where(counted, fitted, 0.0) ** 2))
-    shares = [float(np.sqrt(np.nan_to_num(e / size, nan=np.inf))) for e in (inside, predicted)]
-    return Entry(candidate.name, problem.space.dimension, shares[0], shares[1])
+    compared = _mark_compared(problem)
+    size = _response(problem, compared)
+    left = likelihood.residuals(ends.best[None])[0]
+    error = _share(float(np.sum(np.where(compared, left, 0.0) ** 2)), size)
+    starts = distinct(ends, likelihood.free)
+    return _Fitted(candidate.name, likelihood, starts, compared, size, error)
+
+
+def _share(squares: float, size: float) -> float:
+    return float(np.sqrt(np.nan_to_num(squares / size, nan=np.inf)))
 
 
 def _mark_compared(problem: Problem) -> np.ndarray:

@@ -53,6 +53,7 @@ class Workers:
     backend: str = "loky"
     address: str | None = None
     apart: bool = False
+    where: str = "hydra.launcher"  # the setting that chose them, as sentences name it
 
     def run_items(
         self, function: Callable[[Item], Any], items: Iterable[Item], count: int
@@ -146,7 +147,9 @@ class Workers:
 
                 chosen = {
                     "backend": Dask(
-                        client=stack.enter_context(dask_client(self.n_jobs, self.address))
+                        client=stack.enter_context(
+                            dask_client(self.n_jobs, self.address, self.where)
+                        )
                     )
                 }
             elif self.backend == "loky":
@@ -242,8 +245,8 @@ def _register_ray() -> None:
 
 
 @contextlib.contextmanager
-def dask_client(n_jobs: int, address: str | None) -> Iterator[Any]:
-    """A client of the Dask cluster at `address`, or of one of our own.
+def dask_client(n_jobs: int, address: str | None, where: str = "hydra.launcher") -> Iterator[Any]:
+    """A client of the Dask cluster at `address`, or of one of our own; `where` names the setting.
 
     Raises `UserError` where Dask is not installed or no scheduler answers.
     """
@@ -252,8 +255,7 @@ def dask_client(n_jobs: int, address: str | None) -> Iterator[Any]:
         from distributed import Client, LocalCluster
     except ImportError:
         raise UserError(
-            "hydra.launcher.backend=dask needs Dask, which is not installed: pip install"
-            " 'tractexp[dask]'"
+            f"{where}.backend=dask needs Dask, which is not installed: pip install 'tractexp[dask]'"
         ) from None
     import logging
 
@@ -277,6 +279,6 @@ def dask_client(n_jobs: int, address: str | None) -> Iterator[Any]:
             client = stack.enter_context(Client(address, timeout="10s"))
         except (OSError, ValueError) as error:
             raise UserError(
-                f"hydra.launcher.address={address}: no Dask scheduler answers there ({error})"
+                f"{where}.address={address}: no Dask scheduler answers there ({error})"
             ) from error
         yield client

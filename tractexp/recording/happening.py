@@ -17,6 +17,7 @@ from tractexp.recording.excursion import (
     Excursion,
     excursions,
 )
+from tractexp.recording.static_exponent import StaticExponent, find_exponents
 from tractexp.recording.trace import Trace, of_record, of_waves
 
 # of the voltage: a larger change that stays is no tap or switching step
@@ -36,6 +37,7 @@ SECOND = 0.15
 INRUSH_CYCLES = 5.0  # so long at least: the offset of a fault current lasts less
 CLEAN = 0.5  # of a current's energy is in its fundamental and second harmonic, or it is noise
 OF_LOADS = ("load loss", "load step")  # kinds of which the voltage shows nothing
+OF_STATICS = ("step", "ramp", "pole slip")  # kinds that tell of the static part alone
 LEAST_LISTED_STEP = 0.2  # of the apparent power: a smaller step of a load is no event
 LARGEST_CURRENT_CHANGE = 0.1  # of a current: within it the current stays while a voltage is lost
 BLOWN = 0.1  # of a phase: less is left where a fuse has blown
@@ -64,6 +66,8 @@ class Happening:
     why: str  # what makes it (not) worth fitting, one sentence
     # voltage of each phase, farthest from that before, over that; () where phases are not recorded
     phases: tuple[float, ...] = ()
+    # of what determines the static part of the load alone
+    exponents: tuple[StaticExponent, ...] = ()
 
 
 def happenings(
@@ -421,6 +425,13 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     depth = -e.worst if e.new_level or e.dead else 1 - float(extreme(trace.U[inside])) / e.reference
     last = min(e.end, len(trace.t) - 1)
     worth, why = _worth(trace, kind, e, depth, first, (before, after))
+    exponents: tuple[StaticExponent, ...] = ()
+    if kind in OF_STATICS or (kind == "dip" and not e.sudden):
+        lasting = kind == "step"
+        exponents = find_exponents(trace, e.start, e.end, first, stop, lasting=lasting)
+    if exponents:
+        told = ", ".join(map(str, exponents))
+        why = f"{why}; worth fitting for the static part: {told}"
     return Happening(
         kind,
         float(trace.t[e.start]),
@@ -433,6 +444,7 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
         worth,
         why,
         _measure_phases(trace, e, begin, onset),
+        exponents,
     )
 
 

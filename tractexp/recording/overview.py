@@ -30,6 +30,7 @@ from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
 from tractexp.recording.snapshot import network_frequency
 from tractexp.recording.trace import join_traces, of_waves
+from tractexp.recording.type_test import Course, TypeTest, find_type_test
 from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
 
 TOO_SHORT = "fewer than four half cycles are measured: too few to tell what happened"
@@ -87,6 +88,7 @@ class Sight:
     dead_phases: str = ""  # of its voltages without any from first to last, in words
     secondary: bool = False  # its values are secondary, of an unknown ratio: no kV, no MW
     said: tuple[str, ...] = ()  # why parts of it could not be analysed, one sentence each
+    type_test: TypeTest | None = None  # what a motor's start or trip tells without a fit
     # by which a reader reads it, without the dips
     settings: Mapping[str, Any] = field(default_factory=dict)
 
@@ -372,8 +374,16 @@ def sight(
         unexamined=unexamined,
         secondary=secondary,
         dead_phases=" and ".join("abc"[k] for k in dead),
+        type_test=_find_type_test(phasors, recording.frequency) if feeder.currents else None,
     )
     return replace(shown, said=(*said, *_improbable(reader.path, shown)))
+
+
+def _find_type_test(phasors: Sequence[Phasors], nominal: float) -> TypeTest | None:
+    """The first type test that a stretch of a load shows."""
+    courses = (Course.from_phasors(each) for each in phasors if len(each.V) == 3)
+    found = (find_type_test(each, nominal) for each in courses)
+    return next((each for each in found if each is not None), None)
 
 
 def _describe_slow_segments(recording: Recording) -> str:
@@ -415,7 +425,9 @@ def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
     numbered = list(_number_events(changes, _own(record) if dips is None else dips, record.source))
     if dips is None:
         numbered = [replace(each, dip=None) for each in numbered]
-    return Sight(record.name, tuple(numbered), record=record)
+    course = Course.from_record(record)
+    tested = course and find_type_test(course, record.base.frequency)
+    return Sight(record.name, tuple(numbered), record=record, type_test=tested)
 
 
 def _own(record: Record) -> list[FileDip]:

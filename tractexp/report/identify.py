@@ -45,6 +45,10 @@ MODEL_ERROR = (
     " response, both in"
     " apparent power S. epsilon: Eq. (20)."
 )
+SHARES_HELD = (
+    "The motors' share held, all else fitted again: by how much more the fit then leaves than the"
+    " best does."
+)
 FIXED = "fixed"
 SAME_END_SHARE = 0.01  # of the deviance: starts closer than this ended in the same place
 
@@ -86,7 +90,9 @@ def summary(fit: "Identification") -> Report:
 
 def machine(fit: "Identification") -> list[str]:
     """How the load divides before the dip, in a sentence; [] where its model has no motor."""
-    return [*([str(fit.operating_point)] if fit.operating_point is not None else []), *network(fit)]
+    bound = fit.result.share_bound.get("sentence", "")
+    division = [] if fit.operating_point is None else [str(fit.operating_point)]
+    return [*division, *filter(None, [bound]), *network(fit)]
 
 
 def network(fit: "Identification") -> list[str]:
@@ -156,6 +162,8 @@ def report(fit: "Identification") -> Report:
     add_curves(page, details.fits, uncertainty, fit.spec.validate)
     add_next_dip(page, fit)
     page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
+    if result.share_bound:
+        page.chart(_draw_shares(result.share_bound["profile"]), SHARES_HELD)
     _parameters(page, fit, uncertainty)
     page.add(*tabulate_race(result.race))
     page.heading("Moved by hand")
@@ -178,6 +186,13 @@ def report(fit: "Identification") -> Report:
     _correlation(page, uncertainty)
     page.heading("How this page was made")
     return page.table(["", ""], list_origin(result, command()), words=(1,))
+
+
+def _draw_shares(profile: Sequence[dict[str, float]]) -> Chart:
+    """The error of a fit whose motors' share is held, over the least, by share."""
+    shares, errors = (np.array([row[key] for row in profile]) for key in ("share", "error"))
+    chart = Chart("motors, of P [%]", ["error, over the least"], pixels=260)
+    return chart.line("all else free", 100 * shares, errors, style.ACTIVE, width=2.0)
 
 
 def _of_currents(result: Any) -> str:

@@ -144,7 +144,11 @@ def _answer(files: Sequence[Entry]) -> str:
         own = (entry for entry in files if best in entry["feeders"])
         beside = "".join(f"; {entry['proposed']}" for entry in own if entry.get("proposed"))
         return f"{_event(first)} of {best['name']} {worth}{beside}{command}"
-    return "; ".join([_refuse(files), *filter(None, (entry.get("proposed") for entry in files))])
+    tested = next((f for f in feeders if f.get("type_test")), None)
+    told = f"{tested['name']} is {tested['type_test']['sentence']}" if tested else ""
+    refused = _refuse(files)
+    proposed = [entry["proposed"] for entry in files if entry.get("proposed")]
+    return "; ".join(filter(None, [told, refused, *proposed]))
 
 
 def _may_be_another(feeder: Entry) -> bool:

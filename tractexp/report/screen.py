@@ -34,6 +34,8 @@ def screen(fit: "Identification") -> Report:
     page.text("")
     if fit.operating_point is not None:
         page.text(f"motor: {fit.operating_point.machine}")
+    if bound := result.share_bound:
+        page.text(shorten(f"share: {bound['sentence']}."))
     page.text(describe_error(result))
     return page.text(*(f"next: {sentence}" for sentence in fit.next_steps[:1]))
 

@@ -36,6 +36,7 @@ KINDS = (
     "plan",
     "profile",
     "survey",
+    "station",
     "benchmark",
     "comparison",
     "paper",

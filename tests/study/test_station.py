@@ -1,0 +1,186 @@
+"""All loads of a recorder by all dips of its years: constants that all dips share, the share of the
+motors in each, and each dip predicted by those before it.
+"""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from command_line import run_command
+from made_station import MACHINES, SCATTER, make_station
+
+import tractexp
+from tractexp.api import station_load
+from tractexp.errors import UserError
+from tractexp.identification.station import Dip, LoadSpec, fit_dips, predict_in_turn
+from tractexp.record import OwnBase
+
+DIPS, FAULTY = 12, 5
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Two loads, twelve dips in five years, the sixth with currents that the recorder clips."""
+    folder = tmp_path_factory.mktemp("station")
+    shares, moments = make_station(folder / "records", 2, DIPS, faulty=(FAULTY,))
+    return folder, shares, moments
+
+
+@pytest.fixture(scope="module")
+def fitted(made):
+    folder, *_ = made
+    return tractexp.fit_station(folder / "records", cores=1, keep=folder / "kept", progress=False)
+
+
+def test_the_constants_of_each_load_are_found_within_three_percent(fitted):
+    assert [load["dips"] for load in fitted.loads] == [DIPS, DIPS]
+    for load, machine in zip(fitted.loads, MACHINES, strict=False):
+        found = {row["name"]: row for row in fitted.constants(load["load"])}
+        for name, truth in machine.items():
+            assert found[name]["value"] == pytest.approx(truth, rel=0.03), name
+        assert found["H"]["value"] == pytest.approx(machine["M"] * 50 * np.pi, rel=0.03)
+        assert not any(row["spread"] for row in found.values())
+
+
+def test_the_share_of_each_dip_is_found(fitted, made):
+    _, shares, moments = made
+    for k, load in enumerate(fitted.loads):
+        events = list(fitted.events(load["load"]))
+        assert [e["when"][:10] for e in events] == [f"{m:%Y-%m-%d}" for m in moments]
+        found = [e["share"] for e in events if not e["odd"]]
+        truth = [shares[k, n] for n, e in enumerate(events) if not e["odd"]]
+        assert found == pytest.approx(truth, abs=0.01)
+
+
+def test_a_fault_of_the_recorder_is_left_out_and_told(fitted):
+    for load in fitted.content["loads"]:
+        (odd,) = load["odd"]
+        assert odd["event"] == load["events"][FAULTY]["event"]
+        assert "of its response" in odd["why"]
+        assert "left out" in str(fitted.summary())
+
+
+def test_each_dip_is_predicted_by_those_before_it(fitted):
+    for load in fitted.content["loads"]:
+        events = load["events"]
+        assert events[0]["predicted"] is None
+        assert all(0 < e["known"] <= k for k, e in enumerate(events) if k and not e["odd"])
+        assert load["next_dip"]["events"] >= 4
+        assert 0 < load["next_dip"]["P"] < 0.2
+
+
+def test_no_later_dip_changes_what_was_predicted():
+    dips = [draw_dip(k) for k in range(6)]
+    spec = LoadSpec("load", tractexp.compose().model, {}, {})
+    shown = [(p.position, p.share, p.error) for p in predict_in_turn(spec, dips, {})]
+    early = [(p.position, p.share, p.error) for p in predict_in_turn(spec, dips[:4], {})]
+    assert early == shown[:3]
+
+
+def draw_dip(k):
+    """A dip of a load whose motors draw from 40 to 60 % of P."""
+    torque = 0.4 + 0.04 * k
+    values = {"T_prime": 0.12, "C": 0.9, "p_v": 1.4, "q_v": 3.0, "T_m": torque}
+    values |= {"X_prime": 0.15 / torque, "M": 0.011 * torque}
+    shape = {"depth": 0.2 + 0.06 * k, "duration": 0.15, "length": 1.5, "rate": 200}
+    response = tractexp.simulate(tractexp.compose(), values, P0=0.9, Q0=0.35, **shape).responses[0]
+    frame = response.to_frame()
+    frame[["P", "Q"]] += 1e-3 * np.random.default_rng(k).standard_normal((len(frame), 2))
+    (event,) = tractexp.read(frame)
+    return Dip(OwnBase.from_event(event).convert_event(event))
+
+
+def test_a_motor_of_another_size_has_the_same_constants():
+    dips = [draw_dip(k) for k in (0, 5)]
+    fit = fit_dips(LoadSpec("load", tractexp.compose().model, {}, {}), dips)
+    names = [fit.problem.space.names[k] for k in fit.problem.constants]
+    found = dict(zip(names, fit.problem.on_own_power(fit.constants), strict=True))
+    assert found["X_prime"] == pytest.approx(0.15, rel=0.05)
+    assert found["M"] == pytest.approx(0.011, rel=0.05)
+    assert fit.torques == pytest.approx([0.4, 0.6], abs=0.01)
+
+
+def test_what_was_read_and_fitted_is_not_done_again(fitted, made, monkeypatch):
+    folder, *_ = made
+
+    def refuse(*_):
+        raise AssertionError("it was kept")
+
+    monkeypatch.setattr(station_load, "read_dips", refuse)
+    monkeypatch.setattr(station_load, "_fit", refuse)
+    again = tractexp.fit_station(folder / "records", cores=1, keep=folder / "kept", progress=False)
+    assert again.content == fitted.content
+
+
+def test_a_load_that_is_seen_once_is_told(made, tmp_path):
+    folder, *_ = made
+    one = sorted((folder / "records").rglob("*.cfg"))[0]
+    for ending in (".cfg", ".dat"):
+        shutil.copy(one.with_suffix(ending), tmp_path)
+    found = tractexp.fit_station(tmp_path, cores=1, progress=False)
+    assert [row["why"] for row in found.not_fitted] == ["1 dip, where 2 are needed"] * 2
+    assert "1 dip, where 2 are needed" in str(found)
+
+
+def test_it_is_saved_and_written(fitted, tmp_path):
+    assert tractexp.load(fitted.save(tmp_path / "saved.json")).content == fitted.content
+    names = [path.name for path in fitted.write(tmp_path)]
+    assert names == ["station.json", "station.csv", "station.html"]
+    page = (tmp_path / "station.html").read_text(encoding="utf-8")
+    for load in fitted.loads:
+        assert load["load"] in page
+    assert len(fitted.to_frame()) == 2 * DIPS
+    with pytest.raises(UserError, match="there is no load 'T9'"):
+        fitted.load_named("T9")
+
+
+def test_the_command_goes_on_where_it_was(made, tmp_path):
+    folder, *_ = made
+    run = tmp_path / "outputs" / "stations" / "records"
+    shutil.copytree(folder / "kept", run)
+    done = run_command(
+        "task=station", f"data.path={folder / 'records'}", "tracking.enabled=false", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert "24 dips fitted" in done.stdout
+    (result,) = (tmp_path / "outputs" / "stations").glob("*/station.json")
+    assert len(json.loads(result.read_text())["loads"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ((), "data.path is missing: give the folder"),
+        (("data.path=absent",), "data.path=absent is no folder that is there"),
+        (("data=csv", "data.train=[a.csv]"), "data=csv is no folder"),
+        (("data.path=.", "task.backend=spark"), "task.backend=spark"),
+        (("data.path=.",), "data.path=. holds no file that can be read"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_in_a_sentence(tmp_path, arguments, sentence):
+    done = run_command("task=station", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"model": "static_exponential"}, "has no motor whose share of the load could differ"),
+        ({"fixed": {"T_m": 0.5}}, "model.fixed.T_m cannot be held over several dips"),
+    ],
+)
+def test_a_model_that_cannot_be_shared_is_told_of_each_load(made, settings, sentence):
+    folder, *_ = made
+    found = tractexp.fit_station(
+        folder / "records", cores=1, keep=folder / "kept", progress=False, **settings
+    )
+    assert len(found.not_fitted) == 2
+    assert all(sentence in row["why"] for row in found.not_fitted)
+
+
+def test_the_spread_of_single_dips_is_told(fitted):
+    for load in fitted.loads:
+        assert load["spread"] < 6 * SCATTER

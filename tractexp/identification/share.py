@@ -1,0 +1,81 @@
+"""The motors' part of the active power, over all its range: what a dip tells of it is often a lower
+bound.
+
+A motor that is loaded less draws less of P and answers the dip alike: reactances and inertia take
+the factor up. Where the profile stays flat to the upper end, the estimate is one of many, and what
+is told is where it begins to rise.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.identification.profile_lanes import others_free
+from tractexp.identification.uncertainty import Uncertainty
+from tractexp.identification.verdict import BOUND_DISTANCE
+from tractexp.inference.sized_problem import find_torque
+
+SHARES_HELD = 9  # over the range of the torque, all else fitted again at each
+
+
+@dataclass(frozen=True)
+class ShareBound:
+    """The least share that the records allow, the end of the range, and the `profile`: shares with
+    the fit's error over the least.
+    """
+
+    low: float
+    high: float
+    profile: tuple[tuple[float, float], ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `result.json` has it."""
+        rows = [{"share": share, "error": error} for share, error in self.profile]
+        return {"low": self.low, "high": self.high, "profile": rows, "sentence": str(self)}
+
+    def __str__(self) -> str:
+        return (
+            f"the motors draw at least {self.low:.0%} of P: from there to {self.high:.0%}, the end"
+            " of the range, these dips tell no difference"
+        )
+
+
+def find_share_bound(uncertainty: Uncertainty) -> ShareBound | None:
+    """The share of the motors where the records bound it from below alone; None where they bound it
+    on both sides or on none, or where no profile was drawn.
+    """
+    problem = uncertainty.likelihood.problem
+    try:
+        torque = find_torque(problem.model).name
+    except UserError:
+        return None
+    if torque not in uncertainty.profiled:
+        return None
+    c = uncertainty.names.index(torque)
+    lower, upper = uncertainty.lower[c], uncertainty.upper[c]
+    low, high = uncertainty.intervals[c]
+    near = BOUND_DISTANCE * (upper - lower)
+    if high < upper - near or low <= lower + near:
+        return None
+    drawn = float(np.mean([event.P0 for event in problem.events]))
+    if not drawn > 0:
+        return None
+    profile = _draw_profile(uncertainty, c, drawn)
+    return ShareBound(float(low) / drawn, float(upper) / drawn, profile)
+
+
+def _draw_profile(
+    uncertainty: Uncertainty, c: int, drawn: float
+) -> tuple[tuple[float, float], ...]:
+    """(share, error over the least) where coordinate c is held, of motors beside `drawn` [pu]."""
+    held = (np.arange(SHARES_HELD) + 0.5) / SHARES_HELD
+    starts = np.tile(uncertainty.unit, (SHARES_HELD, 1))
+    starts[:, c] = held
+    columns = np.full(SHARES_HELD, c)
+    ended = others_free(uncertainty, starts, columns, tolerance=0.05)
+    values = uncertainty.lower[c] + held * (uncertainty.upper[c] - uncertainty.lower[c])
+    errors = np.sqrt(np.maximum(ended.deviance / max(uncertainty.deviance, 1e-30), 1.0))
+    seen = np.isfinite(errors)
+    return tuple(zip((values / drawn)[seen].tolist(), errors[seen].tolist(), strict=True))

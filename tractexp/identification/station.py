@@ -1,0 +1,418 @@
+"""All dips of one load: the constants of its machines, which all share, and the share of the motors
+in each.
+
+The torques are taken out of the normal equations event by event (`SeparableColumns`), so that time
+grows with the number of dips and no faster. How far the constants scatter is told by leaving out
+one dip at a time. A dip that the others' model misses by far is left out, and told.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.identification.composition import Composition, estimate_composition
+from tractexp.identification.result import TRAIN, VALIDATE, Fit, explain_refusal, respond
+from tractexp.inference.blocks import blocks_of
+from tractexp.inference.differences import central_differences
+from tractexp.inference.information import Information
+from tractexp.inference.interval import interval_factor
+from tractexp.inference.least_squares import descend
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.model_error import model_error
+from tractexp.inference.multistart import explore_minima, screen_points
+from tractexp.inference.prediction_band import PredictionBand, measure_band
+from tractexp.inference.sandwich import SINGULAR_ROUNDING, moves_without_blocks, robust_root
+from tractexp.inference.sized_problem import SizedProblem
+from tractexp.model.model import Model
+from tractexp.noise.color import SMALLEST_DEVIATION
+from tractexp.record import Event
+
+MOST_BEGUN = 4  # dips that the first fit, from all over the box, is made to
+# dips that constants are fitted to, those of the greatest depth over noise
+MOST_FITTED_DIPS = 300
+LEAST_SHARE_OF_NOISE = 1e-4  # of P: what shows less noise is not told from what shows so much
+TRIED_TORQUES = 9  # in the range of the torque, at which each dip is tried first
+FEWEST_JUDGED_DIPS = 5  # of which one can be odd
+# an odd dip is missed by so much of its response, by so many times the median error, and lies so
+# many deviations above it
+LEAST_ODD, ODD_RATIO, ODD_DEVIATIONS = 0.03, 2.0, 6.0
+MOST_ROUNDS = 3  # of leaving odd dips out and fitting again
+GROWTH = 1.5  # by which dips become more until constants are fitted again, as the years go
+CONSTANT_CHANCE = 1e-3  # of a constant that looks as if it differed from dip to dip
+LEAST_VARIATION = 0.05  # of its value: what differs by less is a constant
+
+
+@dataclass(frozen=True, eq=False)
+class Dip:
+    """One dip of a load, per unit of what the load drew before it, and when it was."""
+
+    event: Event
+    when: datetime | None = None
+
+    @property
+    def promise(self) -> float:
+        """How much it may tell: its depth over its noise."""
+        return self.event.depth / max(self.event.noise_share or 0.0, LEAST_SHARE_OF_NOISE)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadSpec:
+    """The model of a load, what is known of its parameters, and the name of the load."""
+
+    name: str
+    model: Model
+    bounds: Mapping[str, Sequence[float]]
+    fixed: Mapping[str, float]
+    substeps: int | None = None
+
+    def pose(self, events: Sequence[Event]) -> SizedProblem:
+        """The problem of some of its dips."""
+        return SizedProblem(self.model, events, self.bounds, self.fixed, self.substeps)
+
+
+@dataclass(frozen=True, eq=False)
+class SharedFit:
+    """Constants fitted to dips. `torques` (E,) [pu] are those of the motors in all dips, with
+    standard errors; `odd` {position of a dip: why it was left out}.
+    """
+
+    problem: SizedProblem
+    values: np.ndarray
+    dips: Sequence[Dip]
+    torques: np.ndarray
+    errors: np.ndarray
+    fits: Sequence[Fit]
+    odd: Mapping[int, str] = field(default_factory=dict)
+
+    @property
+    def constants(self) -> np.ndarray:
+        """(k,), of motors that draw the problem's reference."""
+        return self.values[self.problem.constants]
+
+    @property
+    def shares(self) -> np.ndarray:
+        """The motors' parts (E,) of the active power before the dips."""
+        return self.torques / self.powers
+
+    @property
+    def share_errors(self) -> np.ndarray:
+        """Their standard errors (E,)."""
+        return self.errors / self.powers
+
+    @property
+    def powers(self) -> np.ndarray:
+        """P (E,) [pu] before the dips."""
+        return np.array([dip.event.P0 for dip in self.dips])
+
+    @property
+    def regular(self) -> list[int]:
+        """Positions of the dips that are not odd."""
+        return [k for k in range(len(self.dips)) if k not in self.odd]
+
+    def estimate_composition(self) -> Composition:
+        """How the share differs from dip to dip."""
+        kept = self.regular
+        times = [self.dips[k].when for k in kept]
+        return estimate_composition(self.shares[kept], self.share_errors[kept], times)
+
+    def spell_parameters(self, torque: float) -> np.ndarray:
+        """All parameters (d,) of the model where the motors draw so much [pu]."""
+        return spell_parameters(self.problem, self.constants, torque)
+
+
+def spell_parameters(problem: SizedProblem, constants: np.ndarray, torque: float) -> np.ndarray:
+    """All parameters (d,) of the model by its constants (k,), where motors draw so much [pu]."""
+    values = np.empty(problem.space.dimension)
+    values[problem.constants], values[problem.shares] = constants, torque
+    return problem.full(values)[0]
+
+
+def fit_dips(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None = None) -> SharedFit:
+    """The fit to all dips, odd ones left out; `start` are constants (k,) to begin at.
+
+    Raises `UserError` where nothing in the bounds can be simulated.
+    """
+    odd: dict[int, str] = {}
+    for _ in range(MOST_ROUNDS):
+        kept = [k for k in range(len(dips)) if k not in odd]
+        told = sorted(kept, key=lambda k: -dips[k].promise)[:MOST_FITTED_DIPS]
+        start = _fit_constants(spec, [dips[k] for k in told], start)
+        fit = _fit_torques(spec, dips, start)
+        found = _find_odd(fit, odd)
+        if found.keys() <= odd.keys():
+            break
+        odd |= found
+    return SharedFit(
+        fit.problem, fit.values, fit.dips, fit.torques, fit.errors, fit.fits, dict(odd)
+    )
+
+
+def _fit_constants(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None) -> np.ndarray:
+    """The constants (k,) that dips share; without a start those are searched that tell most."""
+    if start is None:
+        first = sorted(dips, key=lambda dip: -dip.promise)[:MOST_BEGUN]
+        start = _search_constants(spec.pose([dip.event for dip in first]))
+    problem = spec.pose([dip.event for dip in dips])
+    likelihood, unit = _place(problem, start)
+    ended = descend(likelihood.rows, unit[None], apart=problem.separable)
+    return likelihood.values(ended.unit[0])[problem.constants]
+
+
+def _search_constants(problem: SizedProblem) -> np.ndarray:
+    """The constants (k,) of the best fit to few dips, from all over the box."""
+    points, least = screen_points(problem)
+    ends = explore_minima(_weigh(problem, least), points)
+    if not np.isfinite(ends.deviance.min(initial=np.inf)):
+        raise UserError(
+            f"{problem.events[0].record.name}: nothing in the bounds of the model can be simulated;"
+            " widen model.bounds or choose another model"
+        )
+    return problem.space.from_unit(ends.best)[problem.constants]
+
+
+def _weigh(problem: SizedProblem, objective: float) -> Likelihood:
+    """Least squares in units of what an objective [pu²] leaves."""
+    return Likelihood.of_squares(problem, max(float(np.sqrt(objective)), SMALLEST_DEVIATION))
+
+
+def _place(problem: SizedProblem, constants: np.ndarray) -> tuple[Likelihood, np.ndarray]:
+    """Least squares of a problem and coordinates (D,) in it: constants (k,), and of each dip the
+    best of some torques.
+    """
+    tried = (np.arange(TRIED_TORQUES) + 0.5) / TRIED_TORQUES
+    units = np.empty((TRIED_TORQUES, problem.space.dimension))
+    at = problem.constants
+    units[:] = tried[:, None]
+    span = problem.upper[at] - problem.lower[at]
+    units[:, at] = np.clip((constants - problem.lower[at]) / span, 0.0, 1.0)
+    likelihood = _weigh(problem, 1.0)
+    rows = likelihood.rows(units)
+    squares = np.stack([np.sum(rows[:, mine] ** 2, axis=1) for mine in problem.separable.rows])
+    squares = np.where(np.isfinite(squares), squares, np.inf)
+    unit = units[0].copy()
+    unit[problem.shares] = tried[squares.argmin(axis=1)]
+    objective = float(np.sum(squares.min(axis=1)))
+    if not np.isfinite(objective):
+        objective = 1.0
+    return _weigh(problem, objective / problem.drive.samples), unit
+
+
+def _fit_torques(spec: LoadSpec, dips: Sequence[Dip], constants: np.ndarray) -> SharedFit:
+    """The torque of each of the dips with the constants (k,) held, as many at once as constants
+    are fitted to.
+    """
+    torques, errors, fits = [], [], []
+    for first in range(0, len(dips), MOST_FITTED_DIPS):
+        some = dips[first : first + MOST_FITTED_DIPS]
+        problem = spec.pose([dip.event for dip in some])
+        likelihood, unit = _place(problem, constants)
+        frozen = np.ones((1, len(unit)), dtype=bool)
+        frozen[:, problem.shares] = False
+        unit = descend(likelihood.rows, unit[None], frozen, apart=problem.separable).unit[0]
+        values = likelihood.values(unit)
+        torques.append(values[problem.shares])
+        errors.append(_scatter_torques(likelihood, problem, unit))
+        own = problem.by_event(values)[:, 0]
+        pairs = zip(own, problem.events, strict=True)
+        fits += [respond(problem.model, v, event, TRAIN) for v, event in pairs]
+    return SharedFit(problem, values, dips, np.concatenate(torques), np.concatenate(errors), fits)
+
+
+def _scatter_torques(likelihood: Likelihood, problem: SizedProblem, unit: np.ndarray) -> np.ndarray:
+    """Standard errors (E,) [pu] of the torques: by how much they move where blocks of their dip are
+    left out.
+    """
+    rows, J = central_differences(
+        likelihood.rows, unit[None], np.zeros(1, dtype=int), problem.separable
+    )
+    drive, torque = problem.drive, J[0, -1]
+    acting = np.sum((torque * rows[0]).reshape(drive.channels, -1), axis=0)
+    weight = np.sum((torque**2).reshape(drive.channels, -1), axis=0)
+    squares = np.zeros(drive.events)
+    counts = np.zeros(drive.events)
+    whole = np.add.reduceat(weight, drive.first[:-1])
+    for block in blocks_of(problem.events, problem.drive):
+        e = _find_event(problem, block)
+        left = max(whole[e] - weight[block].sum(), 1e-30)
+        squares[e] += (acting[block].sum() / left) ** 2
+        counts[e] += 1
+    squares *= (counts - 1) / np.maximum(counts, 1)
+    width = (problem.upper - problem.lower)[problem.shares]
+    return width * np.minimum(np.sqrt(squares), 1.0)
+
+
+def _find_event(problem: SizedProblem, block: slice) -> int:
+    """The event that a block of samples is of."""
+    return int(np.searchsorted(problem.drive.first, block.start, "right")) - 1
+
+
+def _find_odd(fit: SharedFit, known: Mapping[int, str]) -> dict[int, str]:
+    """Dips that the model of the others misses by far, and why they are left out."""
+    errors = np.array([model_error([one]).value for one in fit.fits])
+    kept = [k for k in range(len(errors)) if k not in known and np.isfinite(errors[k])]
+    if len(kept) < FEWEST_JUDGED_DIPS:
+        return {}
+    middle = float(np.median(errors[kept]))
+    deviation = 1.4826 * float(np.median(np.abs(errors[kept] - middle)))
+    limit = max(LEAST_ODD, ODD_RATIO * middle, middle + ODD_DEVIATIONS * deviation)
+    return {
+        k: f"the model of the other dips leaves {error:.0%} of its response, and {middle:.1%} of"
+        " theirs"
+        for k, error in enumerate(errors.tolist())
+        if not error <= limit
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Constants:
+    """What is known of the constants: their `information`, on the base of what the motors draw
+    themselves, `factor` of a 95 % interval, and `spreads` {name: how far it differs from dip to
+    dip, as a share of it}, of those that do.
+    """
+
+    information: Information
+    factor: float
+    spreads: Mapping[str, float]
+
+    @property
+    def intervals(self) -> np.ndarray:
+        """(k, 2), 95 %."""
+        half = self.factor * self.information.standard_errors
+        return self.information.values[:, None] + half[:, None] * [-1.0, 1.0]
+
+
+def judge_constants(spec: LoadSpec, fit: SharedFit) -> Constants:
+    """How far the constants of a fit scatter, and which are none."""
+    dips = [fit.dips[k] for k in fit.regular]
+    torques = fit.torques[fit.regular]
+    some = sorted(range(len(dips)), key=lambda k: -dips[k].promise)[:MOST_FITTED_DIPS]
+    problem = spec.pose([dips[k].event for k in some])
+    values = np.empty(problem.space.dimension)
+    values[problem.constants], values[problem.shares] = fit.constants, torques[some]
+    likelihood = _weigh(problem, float(problem.objective(values[None])[0]))
+    unit = likelihood.to_unit(values)[0]
+    rows, J = central_differences(
+        likelihood.rows, unit[None], np.zeros(1, dtype=int), problem.separable
+    )
+    own = _project_out(J[0], problem)
+    sequences = rows[0].reshape(problem.drive.channels, -1)
+    columns = own.T.reshape(*sequences.shape, -1)
+    parts = [problem.drive.part(e) for e in range(problem.drive.events)]
+    few = len(parts) <= len(problem.constants)
+    blocks = blocks_of(problem.events, problem.drive, len(problem.constants)) if few else parts
+    moved = moves_without_blocks(columns, sequences, blocks, own @ own.T)
+    root, _, _ = robust_root(own.T, moved)
+    scale = problem.scale_to_own_power
+    width = (problem.upper - problem.lower)[problem.constants] * scale
+    names = [problem.space.names[k] for k in problem.constants]
+    information = Information(tuple(names), fit.constants * scale, width, root, SINGULAR_ROUNDING)
+    spreads = _find_spreads(problem, columns, sequences, fit.constants)
+    return Constants(information, interval_factor(max(len(blocks) - 1, 1)), spreads)
+
+
+def _project_out(J: np.ndarray, problem: SizedProblem) -> np.ndarray:
+    """Derivatives (k, R) to the constants, of (k + 1, R), less what each dip's torque does."""
+    own = J[:-1].copy()
+    for mine in problem.separable.rows:
+        torque = J[-1, mine]
+        own[:, mine] -= np.outer(own[:, mine] @ torque, torque) / max(torque @ torque, 1e-30)
+    return own
+
+
+def _find_spreads(
+    problem: SizedProblem, columns: np.ndarray, rows: np.ndarray, constants: np.ndarray
+) -> dict[str, float]:
+    """By how much constants differ from dip to dip beyond chance, as shares of them: of one step of
+    each dip's own, the others held. Source: DerSimonian and Laird 1986.
+    """
+    from scipy.special import chdtri
+
+    blocks = blocks_of(problem.events, problem.drive)
+    events = [_find_event(problem, block) for block in blocks]
+    spreads = {}
+    width = (problem.upper - problem.lower)[problem.constants]
+    for k, value in enumerate(constants.tolist()):
+        acting = np.zeros(problem.drive.events)
+        weight = np.zeros_like(acting)
+        squares = np.zeros_like(acting)
+        for e, block in zip(events, blocks, strict=True):
+            own, left = columns[:, block, k], rows[:, block]
+            acting[e] -= np.sum(own * left)
+            weight[e] += np.sum(own**2)
+            squares[e] += np.sum(own * left) ** 2
+        seen = weight > 1e-12 * max(weight.max(), 1e-30)
+        step = acting[seen] / weight[seen]
+        precision = weight[seen] ** 2 / np.maximum(squares[seen], 1e-30)
+        mean = np.sum(precision * step) / np.sum(precision)
+        excess = float(np.sum(precision * (step - mean) ** 2))
+        freedom = int(seen.sum()) - 1
+        if freedom < 1 or excess <= chdtri(freedom, CONSTANT_CHANCE):
+            continue
+        total = np.sum(precision)
+        room = total - np.sum(precision**2) / total
+        step_spread = np.sqrt(max(excess - freedom, 0.0) / room)
+        spread = width[k] * step_spread / abs(value)
+        if spread > LEAST_VARIATION:
+            spreads[problem.space.names[problem.constants[k]]] = float(spread)
+    return spreads
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """A dip as those before it predict it: the share that was expected, the model's error, and on
+    how many dips that stands; `fit` None where it has no steady state so.
+    """
+
+    position: int
+    share: float
+    error: float
+    known: int
+    fit: Fit | None
+
+
+def predict_in_turn(spec: LoadSpec, dips: Sequence[Dip], odd: Mapping[int, str]) -> list[Predicted]:
+    """Each dip, in order of time, but for the first, by a model of dips before it.
+
+    Constants are fitted again whenever there are half as many dips more: so the whole costs some
+    times the fit to all. Nothing of a dip or of a later one is in what predicts it, but that odd
+    ones are left out.
+    """
+    order = [k for k in range(len(dips)) if k not in odd]
+    predicted, start, first = [], None, 1
+    while first < len(order):
+        fit = fit_dips(spec, [dips[k] for k in order[:first]], start)
+        start, composition = fit.constants, fit.estimate_composition()
+        following = max(first + 1, int(GROWTH * first))
+        predicted += [_predict(fit, composition, dips[k], k) for k in order[first:following]]
+        first = following
+    later = sorted(odd)
+    if order and later:
+        fit = fit_dips(spec, [dips[k] for k in order], start)
+        composition = fit.estimate_composition()
+        predicted += [_predict(fit, composition, dips[k], k) for k in later]
+    return sorted(predicted, key=lambda one: one.position)
+
+
+def _predict(fit: SharedFit, composition: Composition, dip: Dip, position: int) -> Predicted:
+    """A dip by the constants of a fit and the share that is expected at its time."""
+    (share,), _ = composition.predict([dip.when])
+    at = fit.problem.shares[0]
+    low, high = fit.problem.lower[at], fit.problem.upper[at]
+    torque = float(np.clip(share * dip.event.P0, low, high))
+    values = fit.spell_parameters(torque)
+    known = len(fit.regular)
+    if explain_refusal(fit.problem.model, values, dip.event):
+        return Predicted(position, float(share), float("inf"), known, None)
+    played = respond(fit.problem.model, values, dip.event, VALIDATE)
+    return Predicted(position, float(share), model_error([played]).value, known, played)
+
+
+def find_band(predicted: Sequence[Predicted], odd: Mapping[int, str]) -> PredictionBand | None:
+    """The band of the next dip, by what was missed of those that were predicted; None where none
+    was.
+    """
+    fits = [one.fit for one in predicted if one.fit is not None and one.position not in odd]
+    return measure_band(fits[len(fits) // 2 :]) if fits else None

@@ -1,0 +1,90 @@
+"""How a load's powers go with a voltage that changes slowly, or stays where it went: the exponents
+of its static part.
+
+    ln P = a + n ln U + c t
+
+over the half cycles about what happened; without the drift c of the load where the voltage itself
+drifts, for then nothing tells them apart. The interval is that of the delete-a-block jackknife.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.recording.trace import Trace
+
+AROUND_CHANGE = 1.0  # s before what happened and after it, over which exponents are fitted
+EDGE_CYCLES = 3.0  # about a step, which windows blur and motors answer
+JACKKNIFE_BLOCKS = 20
+FEWEST_LEVELS = 20  # half cycles that are fitted at least
+LEAST_VOLTAGE_CHANGE = 0.005  # of the voltage, from the least to the greatest
+WIDEST_EXPONENT = 0.5  # half of an interval: a wider one tells nothing
+TWO_SIDED = 1.96  # standard errors
+SMALLEST_VARIANCE = 1e-30
+
+
+@dataclass(frozen=True)
+class StaticExponent:
+    """P or Q goes with the voltage to the power of `value`; 95 % interval, and the share of the
+    channel's variance that this explains.
+    """
+
+    channel: str
+    value: float
+    low: float
+    high: float
+    explained: float
+
+    def __str__(self) -> str:
+        return f"{self.channel} with U^{self.value:.2f} ({self.low:.2f} to {self.high:.2f})"
+
+
+def find_exponents(
+    trace: Trace, start: int, end: int, first: int, stop: int, *, lasting: bool
+) -> tuple[StaticExponent, ...]:
+    """The exponents of P and Q about what happened from sample `start` up to `end`, nothing else
+    happening from `first` up to `stop`. Where the voltage stays where it went (`lasting`) the edge
+    is left out and the load may drift.
+    """
+    reach = round(AROUND_CHANGE / trace.step)
+    at = np.arange(max(first, start - reach), min(stop, end + reach))
+    if lasting:
+        edge = round(EDGE_CYCLES * trace.cycle / trace.step)
+        at = at[(at < start - edge) | (at > start + edge)]
+    found = (_fit_exponent(trace, channel, at, drift=lasting) for channel in "PQ")
+    return tuple(one for one in found if one is not None)
+
+
+def _fit_exponent(
+    trace: Trace, channel: str, at: np.ndarray, *, drift: bool
+) -> StaticExponent | None:
+    """The exponent of one channel over samples `at`; None where the voltage hardly changes, the
+    power changes its sign, or the interval is too wide.
+    """
+    U, power = trace.U[at], getattr(trace, channel)[at]
+    seen = np.isfinite(power) & np.isfinite(U) & (U > 0)
+    U, power, t = U[seen], power[seen], trace.t[at][seen]
+    if len(U) < FEWEST_LEVELS or np.ptp(U) < LEAST_VOLTAGE_CHANGE * U.max():
+        return None
+    if (power == 0).any() or np.ptp(np.sign(power)) > 0:
+        return None
+    y = np.log(np.abs(power))
+    columns = [np.log(U), np.ones(len(U))]
+    if drift:
+        columns.append(t - t.mean())
+    X = np.stack(columns, axis=1)
+    fit = np.linalg.lstsq(X, y, rcond=None)[0]
+    moves = []
+    blocks = np.array_split(np.arange(len(y)), min(JACKKNIFE_BLOCKS, len(y) // 2))
+    for block in blocks:
+        some = np.delete(X, block, axis=0)
+        without = np.linalg.lstsq(some, np.delete(y, block), rcond=None)[0]
+        moves.append(without[0] - fit[0])
+    share = (len(blocks) - 1) / len(blocks)
+    half = TWO_SIDED * float(np.sqrt(share * np.sum(np.square(moves))))
+    if not half < WIDEST_EXPONENT:
+        return None
+    left = float(np.var(y - X @ fit))
+    explained = 1 - left / max(float(np.var(y)), SMALLEST_VARIANCE)
+    value = float(fit[0])
+    return StaticExponent(channel, value, value - half, value + half, explained)

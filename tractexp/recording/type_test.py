@@ -1,0 +1,275 @@
+"""What a relay's report of a motor tells without a fit: a start, an unbalance, a trip and the
+coasting after it are a type test.
+
+    start, unbalance:   Z = |V1|/|I1| at standstill, |V2|/|I2| near it (slip 2 - s)
+    after the breaker:  |V1|/f ~ exp(-t/T0')
+    and at its opening: 2 H (df/dt)/f = -P/S of before, while nothing but the load brakes
+
+Impedances and H are per unit of the voltage before the trip (or the start) and of the apparent
+power that the motor drew running. Source: Kundur 1994, ch. 7; IEEE 112-2017, tests of locked rotor
+and retardation.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tractexp.record.change import runs
+from tractexp.record.phasor import SLOWEST, Phasors
+from tractexp.record.record import Record
+
+CLOSED_SHARE = 0.05  # of the greatest current: what is less flows through no closed breaker
+ALIVE_SHARE = 0.3  # of the greatest voltage: what is more is one
+SWITCHING_CYCLES = 2.0  # cycles about a switching that windows blur
+SHORTEST_PART = 3.0  # cycles that are measured at least
+LONGEST_STANDSTILL = 0.2  # s after closing in which a motor hardly turns
+LEAST_STARTING_CURRENT = 2.0  # times the current of running, that of a start
+LEAST_SECOND_CURRENT = 0.03  # of the positive sequence's current, that of the negative
+LEAST_DECAY = 0.9  # of the voltage at the opening, at the end of coasting
+LEAST_LEFT = 0.1  # of it: with less the frequency is not measured
+STEADY_CURRENT = 0.1  # of a current: by more it changes while a motor still runs up
+SAMPLING_BLOCKS = 12  # left out in turn
+LEAST_ERROR = 0.02  # of a value: of what transformers of measurement and windows leave
+TWO_ERRORS = 2.0
+FEWEST_PHASORS = 20
+
+
+@dataclass(frozen=True)
+class TypeValue:
+    """One figure of a type test, with a 95 % interval; `how` it was measured."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    how: str
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        span = f"{self.low:.3g} to {self.high:.3g}"
+        return f"{self.name} {self.value:.3g}{unit} ({span}) from {self.how}"
+
+
+@dataclass(frozen=True)
+class TypeTest:
+    """What a report tells of a motor: `values`, per unit of `voltage` [kV] and `power` [MVA], at a
+    nominal `frequency` [Hz].
+    """
+
+    values: tuple[TypeValue, ...]
+    voltage: float
+    power: float
+    frequency: float
+
+    def __str__(self) -> str:
+        told = ", ".join(map(str, self.values))
+        return f"a type test: {told}; per unit of {self.power:.3g} MVA and {self.voltage:.4g} kV"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `look.json` has it."""
+        return {
+            "values": [vars(each) for each in self.values],
+            "voltage": self.voltage,
+            "power": self.power,
+            "bounds": self.bounds,
+            "sentence": str(self),
+        }
+
+    @property
+    def bounds(self) -> dict[str, list[float]]:
+        """What `model.bounds` may hold a motor to that is fitted on this base: at standstill a
+        machine is its transient reactance.
+        """
+        by_name = {each.name: each for each in self.values}
+        reactance = by_name.get("X_locked", by_name.get("X_2"))
+        found = {} if reactance is None else {"X_prime": [reactance.low, reactance.high]}
+        if (H := by_name.get("H")) is not None:
+            per_speed = 1 / (np.pi * self.frequency)
+            found["M"] = [H.low * per_speed, H.high * per_speed]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A motor over time: t (N,) [s], voltage U and its negative sequence U2 [kV, line to line],
+    currents I and I2 [kA] of one phase, power S [MVA], complex, frequency f [Hz]; `U2` and `I2` are
+    None where a record has not both.
+    """
+
+    t: np.ndarray
+    U: np.ndarray
+    I: np.ndarray
+    S: np.ndarray
+    f: np.ndarray
+    U2: np.ndarray | None = None
+    I2: np.ndarray | None = None
+
+    @classmethod
+    def from_phasors(cls, phasors: Phasors) -> "Course":
+        """Of three phases."""
+        current, second = np.abs(phasors.I1), np.abs(phasors.I2)
+        return cls(phasors.t, phasors.U, current, phasors.S, phasors.f, phasors.U2, second)
+
+    @classmethod
+    def from_record(cls, record: Record) -> "Course | None":
+        """Of a record that says how many kV and MVA its per unit is; None of another, and where no
+        frequency was recorded or values are missing.
+        """
+        if record.f is None or not record.is_from_field:
+            return None
+        U, S = record.base.voltage * record.U, record.base.power * (record.P + 1j * record.Q)
+        if not (np.isfinite(S).all() and (U > 0).all()):
+            return None
+        return cls(record.t, U, np.abs(S) / (np.sqrt(3) * U), S, record.f)
+
+
+def find_type_test(course: Course, nominal: float) -> TypeTest | None:
+    """The type test that a motor's course shows; None where it shows none, or where it is not known
+    what it draws running.
+    """
+    if len(course.t) < FEWEST_PHASORS:
+        return None
+    report = _Report(course, nominal)
+    running = report.find_running()
+    if running is None:
+        return None
+    voltage = float(np.median(course.U[running]))
+    power = float(np.median(np.abs(course.S[running])))
+    ohm = voltage**2 / power
+    values = [
+        report.measure_start(running, ohm),
+        report.measure_unbalance(ohm),
+        *report.measure_coasting(running, power),
+    ]
+    found = tuple(each for each in values if each is not None)
+    return TypeTest(found, voltage, power, nominal) if found else None
+
+
+class _Report:
+    """The course of one motor, where its breaker is closed, and where that changes."""
+
+    def __init__(self, course: Course, nominal: float):
+        self.course, self.nominal = course, nominal
+        step = float(course.t[1] - course.t[0])
+        self.edge = max(round(SWITCHING_CYCLES / nominal / step), 1)
+        self.least = max(SHORTEST_PART / nominal / step, 4)
+        self.standstill = round(LONGEST_STANDSTILL / step)
+        self.current, self.voltage = course.I, course.U
+        closed = self.current > CLOSED_SHARE * self.current.max(initial=0.0)
+        spans = runs(closed, int(self.least) + 2 * self.edge)
+        self.closed = spans[0] if len(spans) == 1 else None
+
+    def find_running(self) -> slice | None:
+        """The last samples before the breaker opens, or of the record, where the current is
+        steady; None where it is not, and where it flows in several spans or throughout.
+        """
+        span = self.closed
+        if span is None:
+            return None
+        last = len(self.current) - self.edge
+        if span.start <= self.edge and span.stop >= last:
+            return None
+        stop = span.stop - self.edge
+        part = slice(max(span.start + self.edge, stop - self.standstill), stop)
+        current = self.current[part]
+        if len(current) < self.least or np.ptp(current) > STEADY_CURRENT * current.max():
+            return None
+        return part
+
+    def measure_start(self, running: slice, ohm: float) -> TypeValue | None:
+        """The impedance at standstill; None where no start is recorded."""
+        assert self.closed is not None
+        first = self.closed.start
+        if first < self.least or self.voltage[first] < ALIVE_SHARE * self.voltage.max():
+            return None
+        part = slice(first + self.edge, first + self.edge + self.standstill // 2)
+        current = self.current[part]
+        if not len(current) or current.min() < LEAST_STARTING_CURRENT * np.median(
+            self.current[running]
+        ):
+            return None
+        how = "U/I at the start"
+        return _measure("X_locked", self.voltage[part] / current / (np.sqrt(3) * ohm), "pu", how)
+
+    def measure_unbalance(self, ohm: float) -> TypeValue | None:
+        """The impedance of the negative sequence; None where there is hardly any."""
+        assert self.closed is not None
+        part = slice(self.closed.start + self.edge, self.closed.stop - self.edge)
+        if self.course.U2 is None or self.course.I2 is None:
+            return None
+        voltage, current = self.course.U2[part], self.course.I2[part]
+        seen = current > LEAST_SECOND_CURRENT * self.current[part]
+        seen &= voltage > LEAST_SECOND_CURRENT / 5 * self.voltage[part]
+        if np.count_nonzero(seen) < self.least:
+            return None
+        return _measure("X_2", voltage[seen] / current[seen] / (np.sqrt(3) * ohm), "pu", "U2/I2")
+
+    def measure_coasting(self, running: slice, power: float) -> list[TypeValue | None]:
+        """T0' and H of what follows the opening of the breaker; nothing where the voltage stays, or
+        is gone at once.
+        """
+        assert self.closed is not None
+        first = self.closed.stop + self.edge
+        V, f = self.voltage[first:], self.course.f[first:]
+        t = self.course.t[first:] - self.course.t[self.closed.stop]
+        if len(V) < self.least or V[0] < ALIVE_SHARE * self.voltage.max():
+            return []
+        # phasors follow a frequency so far
+        seen = (LEAST_LEFT * V[0] < V) & (f > SLOWEST * self.nominal)
+        left = len(V) if seen.all() else int(np.argmin(seen))
+        V, f, t = V[:left], f[:left], t[:left]
+        if len(V) < self.least or V[-1] > LEAST_DECAY * V[0] or f[-1] >= f[0]:
+            return []
+        decay = _fit_slopes(t, np.log(V / f), 1)
+        times = [-1 / slope for slope in decay if slope < 0]
+        constant = _tell("T0'", times, "s", "the decay of U/f after the trip")
+        drawn = float(np.median(self.course.S[running].real)) / power
+        before = float(np.median(self.course.f[running]))
+        # braked by the torque of before, and by one that falls with the speed
+        slopes = [*_fit_slopes(t, f, 2), *_fit_slopes(t, f, 1)]
+        inertias = [drawn * before / (2 * -slope) for slope in slopes if slope < 0]
+        inertia = _tell("H", inertias, "s", "df/dt at the trip")
+        return [constant, inertia]
+
+
+def _measure(name: str, samples: np.ndarray, unit: str, how: str) -> TypeValue:
+    """The median of samples (n,), and how far it moves where blocks of them are left out."""
+    value = float(np.median(samples))
+    blocks = np.array_split(np.arange(len(samples)), min(SAMPLING_BLOCKS, len(samples)))
+    moves = [float(np.median(np.delete(samples, block))) - value for block in blocks]
+    half = max(_find_half_width(moves), LEAST_ERROR * value)
+    return TypeValue(name, value, value - half, value + half, unit, how)
+
+
+def _tell(name: str, values: list[float], unit: str, how: str) -> TypeValue | None:
+    """The first of values, and an interval over all; None of none."""
+    if not values:
+        return None
+    first = float(values[0])
+    half = LEAST_ERROR * first
+    low = min(*map(float, values), first - half)
+    high = max(*map(float, values), first + half)
+    return TypeValue(name, first, low, high, unit, how)
+
+
+def _fit_slopes(t: np.ndarray, y: np.ndarray, degree: int) -> list[float]:
+    """The slope at t = 0 of a polynomial through y (n,), then both ends of its 95 % interval."""
+    X = np.vander(t, degree + 1, increasing=True)
+    slope = float(np.linalg.lstsq(X, y, rcond=None)[0][1])
+    moves = []
+    blocks = np.array_split(np.arange(len(y)), min(SAMPLING_BLOCKS, len(y) // 2))
+    for block in blocks:
+        some = np.delete(X, block, axis=0)
+        without = np.linalg.lstsq(some, np.delete(y, block), rcond=None)[0]
+        moves.append(without[1] - slope)
+    half = _find_half_width(moves)
+    return [slope, slope - half, slope + half]
+
+
+def _find_half_width(moves: Sequence[float]) -> float:
+    """Half the interval of a figure that moves so where each of some blocks is left out."""
+    share = (len(moves) - 1) / len(moves)
+    return TWO_ERRORS * float(np.sqrt(share * np.sum(np.square(moves))))

@@ -1,0 +1,290 @@
+"""A station's loads over the years: what they are, what differs from dip to dip, and how well dips
+were predicted.
+"""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+
+from tractexp.blocks import Report, Table, style
+from tractexp.blocks.chart import Chart
+from tractexp.identification.composition import DAYS_A_YEAR, HOUR
+from tractexp.inference.model_error import in_percent
+from tractexp.text.wording import count_noun, list_first
+
+MOST_SCREEN_LOADS = 8  # loads of the first screen
+MOST_TOLD_ODD = 3  # odd dips that a line names
+TOLD_CONSTANTS = ("T_prime", "X_prime", "H")  # of a load's row
+TERM_NAMES = {
+    "hour": "hour of the day",
+    "weekday": "weekday, Monday the first",
+    "season": "month",
+    "year": "year, from the first dip on",
+}
+ON_OWN = "per unit of what the motors draw"
+CONSTANTS_CAPTION = (
+    f"Impedances and inertia are {ON_OWN} before the dip, so that they are the same however many of"
+    " them run. Intervals: 95 %, by leaving out one dip at a time. Differs: by how much a constant"
+    " varies from dip to dip beyond chance, of those that do."
+)
+TIME_CAPTION = (
+    "Above: the model's error on each dip, of its response, as those before it predict it. Below:"
+    " the motors' share of P in each dip, and what was expected of it. Crosses: left out."
+)
+
+
+def tell_load(load: Mapping[str, Any]) -> dict[str, Any]:
+    """The row of a load."""
+    constants = {row["name"]: row for row in load["constants"]}
+    share, predicted = load["share"], load["predicted"]
+    return {
+        "station": load["station"],
+        "load": load["load"],
+        "dips": load["dips"],
+        "left_out": len(load["odd"]),
+        **{name: constants[name]["value"] for name in TOLD_CONSTANTS if name in constants},
+        "share": share["value"],
+        "spread": share["spread"],
+        "varies": load["composition"]["varies"],
+        "P_mean": load["power"]["mean"],
+        "unit": load["power"]["unit"],
+        "error": load["error"]["value"],
+        "predicted": predicted["last_half"],
+    }
+
+
+def tabulate_loads(content: Mapping[str, Any]) -> Table:
+    """A row for each load that was fitted."""
+    rows = [
+        [
+            load["load"] or load["station"],
+            load["dips"],
+            *(_tell_constant(load, name) for name in TOLD_CONSTANTS),
+            _tell_share(load["share"]),
+            _percent(load["error"]["value"]),
+            _percent(load["predicted"]["last_half"]),
+        ]
+        for load in content["loads"]
+        if "why" not in load
+    ]
+    columns = ["load", "dips", "T' [s]", "X' [pu]", "H [s]", "motors, of P", "error", "predicted"]
+    return Table(columns, rows, f"loads of {content['folder']}", words=(2, 3, 4, 5, 6, 7))
+
+
+def _tell_constant(load: Mapping[str, Any], name: str) -> str:
+    row = next((row for row in load["constants"] if row["name"] == name), None)
+    if row is None:
+        return ""
+    half = (row["high"] - row["low"]) / 2
+    return f"{row['value']:.3g} ± {half:.2g}" if np.isfinite(half) else f"{row['value']:.3g}"
+
+
+def _tell_share(share: Mapping[str, Any]) -> str:
+    return f"{share['value']:.0%} ± {share['spread']:.1%}"
+
+
+def _percent(value: float | None) -> str:
+    return "" if value is None else in_percent(value)
+
+
+def summary(content: Mapping[str, Any]) -> Report:
+    """The loads in a table, then of each what differs, in sentences."""
+    page = Report().text(_tell_extent(content)).add(tabulate_loads(content))
+    fitted = [load for load in content["loads"] if "why" not in load]
+    for load in fitted[:MOST_SCREEN_LOADS]:
+        page.text(f"{load['load'] or load['station']}: {describe_load(load)}")
+    if len(fitted) > MOST_SCREEN_LOADS:
+        page.text(f"{count_noun(len(fitted) - MOST_SCREEN_LOADS, 'load')} more, on the page")
+    return page.text(*_tell_unfitted(content))
+
+
+def _tell_extent(content: Mapping[str, Any]) -> str:
+    dips = sum(load["dips"] for load in content["loads"] if "why" not in load)
+    return f"{content['files']} files in {content['folder']}, {count_noun(dips, 'dip')} fitted"
+
+
+def _tell_unfitted(content: Mapping[str, Any]) -> list[str]:
+    """Loads that were not fitted and events that could not be read, a sentence each."""
+    told = [
+        f"not fitted: {load['load'] or load['station']}: {load['why']}"
+        for load in content["loads"]
+        if "why" in load
+    ]
+    if unread := content["unread"]:
+        first = unread[0]
+        told.append(f"not read: {count_noun(len(unread), 'dip')}, {first['event']}: {first['why']}")
+    return told
+
+
+def describe_load(load: Mapping[str, Any]) -> str:
+    """What differs from dip to dip, what is predicted, and what was left out, in a line."""
+    told = [_tell_variation(load)]
+    differs = {r["name"]: r["spread"] for r in load["constants"] if r["spread"]}
+    differs.pop("H", None)
+    if differs:
+        own = ", ".join(f"{name} by {spread:.0%}" for name, spread in differs.items())
+        told.append(f"no constants: {own} from dip to dip")
+    if load["next_dip"]:
+        told.append(load["next_dip"]["sentence"])
+    if odd := load["odd"]:
+        told.append(f"left out: {list_first([o['event'] for o in odd], MOST_TOLD_ODD)}")
+    return "; ".join(told)
+
+
+def _tell_variation(load: Mapping[str, Any]) -> str:
+    """By what the share differs."""
+    share, terms = load["share"], load["composition"]["terms"]
+    spread = f"{share['spread']:.1%} of P"
+    if not terms:
+        return f"motors {share['value']:.0%} of P, from dip to dip ± {spread}"
+    spans = [
+        f"by {term} {min(r['value'] for r in rows):.0%} to {max(r['value'] for r in rows):.0%}"
+        for term, rows in terms.items()
+    ]
+    return f"motors {share['value']:.0%} of P, {', '.join(spans)}, beside that ± {spread}"
+
+
+def report(content: Mapping[str, Any]) -> Report:
+    """The page: the loads in a table, then each by itself."""
+    page = Report(f"Station of {content['folder']}", _tell_extent(content))
+    page.add(tabulate_loads(content))
+    page.text(*_tell_unfitted(content))
+    for load in content["loads"]:
+        if "why" not in load:
+            _show_load(page, load)
+    return page
+
+
+def _show_load(page: Report, load: Mapping[str, Any]) -> None:
+    """A load's section."""
+    page.heading(", ".join(filter(None, (load["station"], load["load"]))))
+    page.verdict(describe_load(load) + ".")
+    page.add(_tabulate_constants(load))
+    page.chart(_draw_years(load), TIME_CAPTION)
+    for term, rows in load["composition"]["terms"].items():
+        page.chart(_draw_term(term, rows, "motors, of P [%]", 100.0))
+    for term, rows in load["power"]["terms"].items():
+        page.chart(_draw_term(term, rows, f"P before the dip [{load['power']['unit']}]", 1.0))
+    if load["odd"]:
+        page.heading("Left out", 3)
+        page.items([f"{one['event']}: {one['why']}" for one in load["odd"]])
+    if load["curves"]:
+        page.heading("The last dips, as those before them predict them", 3)
+        page.charts([_draw_dip(curve) for curve in load["curves"]])
+    with page.fold_blocks("every dip"):
+        page.add(_tabulate_events(load))
+
+
+def _tabulate_constants(load: Mapping[str, Any]) -> Table:
+    rows = [
+        [
+            row["name"],
+            row["value"],
+            row["unit"],
+            "{:.4g} .. {:.4g}".format(row["low"], row["high"]) if row["low"] is not None else "",
+            _percent(row["spread"]),
+        ]
+        for row in load["constants"]
+    ]
+    columns = ["constant", "value", "unit", "95 % interval", "differs"]
+    return Table(columns, rows, "what all dips share", CONSTANTS_CAPTION, words=(2, 3, 4))
+
+
+def _draw_term(term: str, rows: Sequence[Mapping[str, Any]], what: str, factor: float) -> Chart:
+    """A quantity by hour, weekday, month or year, with its interval."""
+    x = np.arange(len(rows)) + (0.5 if term == HOUR else 1.0)
+    value, low, high = (
+        factor * np.array([row[key] for row in rows]) for key in ("value", "low", "high")
+    )
+    hover = [f"{row['at']}: {v:.4g}" for row, v in zip(rows, value.tolist(), strict=True)]
+    chart = Chart(TERM_NAMES[term], [what], pixels=240, legend=False)
+    chart.band("95 %", x, low, high, style.FAINT)
+    return chart.points("expected", x, value, style.ACTIVE, hover=hover)
+
+
+def _tabulate_events(load: Mapping[str, Any]) -> Table:
+    unit = load["power"]["unit"]
+    rows = [
+        [
+            event["event"],
+            (event["when"] or "").replace("T", " ")[:16],
+            f"{event['depth']:.0%}",
+            event["P"],
+            f"{event['share']:.1%}",
+            f"{event['low']:.1%} .. {event['high']:.1%}",
+            _percent(event["error"]),
+            _percent(event["predicted"]),
+            "left out" if event["odd"] else "",
+        ]
+        for event in load["events"]
+    ]
+    columns = [
+        "dip",
+        "when",
+        "depth",
+        f"P [{unit}]",
+        "motors, of P",
+        "95 % interval",
+        "error",
+        "predicted",
+        "",
+    ]
+    return Table(columns, rows, "dips in order of time", words=(1, 2, 4, 5, 6, 7, 8))
+
+
+def _draw_years(load: Mapping[str, Any]) -> Chart:
+    """Errors of prediction and shares over the years, or by number where times are not known."""
+    events = load["events"]
+    dated = all(event["when"] for event in events)
+    x = np.array([_year(e["when"]) if dated else k for k, e in enumerate(events, 1)])
+    label = "year" if dated else "dip, by its number"
+    chart = Chart(label, ["error, as predicted [%]", "motors, of P [%]"], pixels=460)
+    odd = np.array([bool(event["odd"]) for event in events])
+    hover = [f"{e['event']}, {e['known']} dips before it" for e in events]
+    predicted = np.array(
+        [np.nan if e["predicted"] is None else 100 * e["predicted"] for e in events]
+    )
+    seen = np.isfinite(predicted)
+    for mask, name, symbol in ((~odd, "predicted", "circle"), (odd, "left out", "x")):
+        here = np.flatnonzero(mask & seen)
+        if len(here):
+            told = [f"{hover[k]}: {predicted[k]:.3g} %" for k in here]
+            chart.points(name, x[here], predicted[here], style.ACTIVE, 0, symbol=symbol, hover=told)
+    shares = 100 * np.array([event["share"] for event in events])
+    expected = np.array([np.nan if e["expected"] is None else 100 * e["expected"] for e in events])
+    some = np.flatnonzero(~odd)
+    told = [f"{hover[k]}: {shares[k]:.3g} %" for k in some]
+    chart.points("of each dip", x[some], shares[some], style.ACTIVE, 1, hover=told)
+    known = np.flatnonzero(~odd & np.isfinite(expected))
+    told = [f"{hover[k]}: expected {expected[k]:.3g} %" for k in known]
+    return chart.points(
+        "expected", x[known], expected[known], style.FAINT, 1, symbol="diamond-open", hover=told
+    )
+
+
+def _year(when: str) -> float:
+    """A moment as a year with its fraction."""
+    moment = datetime.fromisoformat(when)
+    return moment.year + (moment.timetuple().tm_yday - 1 + moment.hour / 24) / DAYS_A_YEAR
+
+
+def _draw_dip(curve: Mapping[str, Any]) -> Chart:
+    """U, P and Q of a dip, measured and predicted."""
+    chart = Chart(
+        "t from the dip's start [s]",
+        ["U [pu]", "P [pu]", "Q [pu]"],
+        heights=(0.6, 1.0, 1.0),
+        pixels=420,
+        title=f"{curve['event']}: {in_percent(curve['error'])} missed",
+        legend=False,
+    )
+    t, U = (np.array(curve[key], dtype=float) for key in ("t", "U"))
+    chart.line("U", t, U, style.VOLTAGE, 0)
+    for panel, channel in enumerate("PQ", 1):
+        measured = np.array(curve[channel], dtype=float)
+        calculated = np.array(curve[f"{channel}_predicted"], dtype=float)
+        chart.line("measured", t, measured, style.MEASURED, panel, width=3)
+        chart.line("predicted", t, calculated, style.ACTIVE, panel)
+    return chart
