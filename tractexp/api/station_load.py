@@ -107,14 +107,10 @@ def fit_load(job: LoadJob) -> dict[str, Any]:
 
 
 def _fit(job: LoadJob) -> dict[str, Any]:
-    dips, names = [], []
-    for name, when, content in job.dips:
-        event = detect(record_from_dict(content))
-        own = OwnBase.from_event(event).convert_event(event)
-        dips.append(Dip(own, datetime.fromisoformat(when) if when else None))
-        names.append(name)
-    order = sorted(range(len(dips)), key=lambda k: (dips[k].when or datetime.min, names[k]))
-    dips, names = [dips[k] for k in order], [names[k] for k in order]
+    read = [(name, _build_dip(when, content)) for name, when, content in job.dips]
+    read.sort(key=lambda one: (one[1].when or datetime.min, one[0]))
+    names = [name for name, _ in read]
+    dips = [dip for _, dip in read]
     telling = sorted(dips, key=lambda dip: -dip.promise)[:MOST_RACED]
     load = job.model.fit_for([dip.event for dip in telling])
     spec = LoadSpec(job.load, load.model, load.bounds, load.fixed, load.substeps)
@@ -137,6 +133,14 @@ def _fit(job: LoadJob) -> dict[str, Any]:
         "next_dip": _forecast(fit, composition, predicted),
         "curves": [*_draw(names, predicted, fit)],
     }
+
+
+def _build_dip(when: str | None, content: Mapping[str, Any]) -> Dip:
+    """A dip per unit of what its load drew before it."""
+    event = detect(record_from_dict(content))
+    own = OwnBase.from_event(event)
+    moment = datetime.fromisoformat(when) if when else None
+    return Dip(own.convert_event(event), moment)
 
 
 def _tell_constants(load: LoadModel, constants: Constants, fit: SharedFit) -> list[dict[str, Any]]:

@@ -196,11 +196,11 @@ class _Seen:
         """The logarithm of the likelihood of the values, coefficients integrated out."""
         variance = self.errors**2 + spread**2
         scaled = self.X * deviations
-        weighted = self.values / variance
-        inner = np.eye(len(deviations)) + (scaled / variance[:, None]).T @ scaled
-        side = scaled.T @ weighted
+        weights = (scaled / variance[:, None]).T
+        inner = np.eye(len(deviations)) + weights @ scaled
+        side = weights @ self.values
         told = side @ np.linalg.solve(inner, side)
-        square = float(self.values @ weighted - told)
+        square = float(np.sum(self.values**2 / variance) - told)
         logs = float(np.sum(np.log(variance)))
         logs += float(np.linalg.slogdet(inner)[1])
         return -0.5 * (square + logs)
@@ -209,9 +209,8 @@ class _Seen:
         """Coefficients (p,) and their covariance under that prior."""
         variance = self.errors**2 + spread**2
         scaled = self.X * deviations
-        weighted = self.values / variance
-        told = (scaled / variance[:, None]).T @ scaled
-        inner = np.linalg.inv(np.eye(len(deviations)) + told)
-        coefficients = deviations * (inner @ (scaled.T @ weighted))
+        weights = (scaled / variance[:, None]).T
+        inner = np.linalg.inv(np.eye(len(deviations)) + weights @ scaled)
+        side = inner @ (weights @ self.values)
         covariance = deviations[:, None] * inner * deviations
-        return coefficients, covariance
+        return deviations * side, covariance

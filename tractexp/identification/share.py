@@ -75,7 +75,10 @@ def _draw_profile(
     starts[:, c] = held
     columns = np.full(SHARES_HELD, c)
     ended = others_free(uncertainty, starts, columns, tolerance=0.05)
-    values = uncertainty.lower[c] + held * (uncertainty.upper[c] - uncertainty.lower[c])
-    errors = np.sqrt(np.maximum(ended.deviance / max(uncertainty.deviance, 1e-30), 1.0))
+    low, high = uncertainty.lower[c], uncertainty.upper[c]
+    shares = (low + held * (high - low)) / drawn
+    least = min(uncertainty.deviance, float(ended.deviance.min()))
+    errors = np.sqrt(ended.deviance / least)
     seen = np.isfinite(errors)
-    return tuple(zip((values / drawn)[seen].tolist(), errors[seen].tolist(), strict=True))
+    pairs = zip(shares[seen].tolist(), errors[seen].tolist(), strict=True)
+    return tuple(pairs)

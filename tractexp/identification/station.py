@@ -7,7 +7,7 @@ one dip at a time. A dip that the others' model misses by far is left out, and t
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 import numpy as np
@@ -42,6 +42,7 @@ LEAST_ODD, ODD_RATIO, ODD_DEVIATIONS = 0.03, 2.0, 6.0
 MOST_ROUNDS = 3  # of leaving odd dips out and fitting again
 GROWTH = 1.5  # by which dips become more until constants are fitted again, as the years go
 CONSTANT_CHANCE = 1e-3  # of a constant that looks as if it differed from dip to dip
+LEAST_WEIGHT, SMALLEST_SQUARE = 1e-12, 1e-30  # of what tells nothing
 LEAST_VARIATION = 0.05  # of its value: what differs by less is a constant
 
 
@@ -145,9 +146,7 @@ def fit_dips(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None = Non
         if found.keys() <= odd.keys():
             break
         odd |= found
-    return SharedFit(
-        fit.problem, fit.values, fit.dips, fit.torques, fit.errors, fit.fits, dict(odd)
-    )
+    return replace(fit, odd=dict(odd))
 
 
 def _fit_constants(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None) -> np.ndarray:
@@ -182,12 +181,12 @@ def _place(problem: SizedProblem, constants: np.ndarray) -> tuple[Likelihood, np
     """Least squares of a problem and coordinates (D,) in it: constants (k,), and of each dip the
     best of some torques.
     """
+    at = problem.constants
+    low, span = problem.lower[at], (problem.upper - problem.lower)[at]
     tried = (np.arange(TRIED_TORQUES) + 0.5) / TRIED_TORQUES
     units = np.empty((TRIED_TORQUES, problem.space.dimension))
-    at = problem.constants
     units[:] = tried[:, None]
-    span = problem.upper[at] - problem.lower[at]
-    units[:, at] = np.clip((constants - problem.lower[at]) / span, 0.0, 1.0)
+    units[:, at] = np.clip((constants - low) / span, 0.0, 1.0)
     likelihood = _weigh(problem, 1.0)
     rows = likelihood.rows(units)
     squares = np.stack([np.sum(rows[:, mine] ** 2, axis=1) for mine in problem.separable.rows])
@@ -215,28 +214,26 @@ def _fit_torques(spec: LoadSpec, dips: Sequence[Dip], constants: np.ndarray) -> 
         values = likelihood.values(unit)
         torques.append(values[problem.shares])
         errors.append(_scatter_torques(likelihood, problem, unit))
-        own = problem.by_event(values)[:, 0]
-        pairs = zip(own, problem.events, strict=True)
-        fits += [respond(problem.model, v, event, TRAIN) for v, event in pairs]
-    return SharedFit(problem, values, dips, np.concatenate(torques), np.concatenate(errors), fits)
+        for own, event in zip(problem.by_event(values)[:, 0], problem.events, strict=True):
+            fits.append(respond(problem.model, own, event, TRAIN))
+    every = np.concatenate(torques), np.concatenate(errors)
+    return SharedFit(problem, values, dips, *every, fits)
 
 
 def _scatter_torques(likelihood: Likelihood, problem: SizedProblem, unit: np.ndarray) -> np.ndarray:
     """Standard errors (E,) [pu] of the torques: by how much they move where blocks of their dip are
     left out.
     """
-    rows, J = central_differences(
-        likelihood.rows, unit[None], np.zeros(1, dtype=int), problem.separable
-    )
-    drive, torque = problem.drive, J[0, -1]
-    acting = np.sum((torque * rows[0]).reshape(drive.channels, -1), axis=0)
+    rows, J = _differentiate(likelihood, problem, unit)
+    drive, torque = problem.drive, J[-1]
+    acting = np.sum((torque * rows).reshape(drive.channels, -1), axis=0)
     weight = np.sum((torque**2).reshape(drive.channels, -1), axis=0)
     squares = np.zeros(drive.events)
     counts = np.zeros(drive.events)
     whole = np.add.reduceat(weight, drive.first[:-1])
     for block in blocks_of(problem.events, problem.drive):
         e = _find_event(problem, block)
-        left = max(whole[e] - weight[block].sum(), 1e-30)
+        left = max(whole[e] - weight[block].sum(), SMALLEST_SQUARE)
         squares[e] += (acting[block].sum() / left) ** 2
         counts[e] += 1
     squares *= (counts - 1) / np.maximum(counts, 1)
@@ -294,23 +291,40 @@ def judge_constants(spec: LoadSpec, fit: SharedFit) -> Constants:
     values[problem.constants], values[problem.shares] = fit.constants, torques[some]
     likelihood = _weigh(problem, float(problem.objective(values[None])[0]))
     unit = likelihood.to_unit(values)[0]
-    rows, J = central_differences(
-        likelihood.rows, unit[None], np.zeros(1, dtype=int), problem.separable
-    )
-    own = _project_out(J[0], problem)
-    sequences = rows[0].reshape(problem.drive.channels, -1)
-    columns = own.T.reshape(*sequences.shape, -1)
-    parts = [problem.drive.part(e) for e in range(problem.drive.events)]
-    few = len(parts) <= len(problem.constants)
-    blocks = blocks_of(problem.events, problem.drive, len(problem.constants)) if few else parts
-    moved = moves_without_blocks(columns, sequences, blocks, own @ own.T)
+    rows, J = _differentiate(likelihood, problem, unit)
+    own = _project_out(J, problem)
+    rows = rows.reshape(problem.drive.channels, -1)
+    columns = own.T.reshape(*rows.shape, -1)
+    blocks = _choose_blocks(problem)
+    moved = moves_without_blocks(columns, rows, blocks, own @ own.T)
     root, _, _ = robust_root(own.T, moved)
     scale = problem.scale_to_own_power
-    width = (problem.upper - problem.lower)[problem.constants] * scale
-    names = [problem.space.names[k] for k in problem.constants]
-    information = Information(tuple(names), fit.constants * scale, width, root, SINGULAR_ROUNDING)
-    spreads = _find_spreads(problem, columns, sequences, fit.constants)
-    return Constants(information, interval_factor(max(len(blocks) - 1, 1)), spreads)
+    values = fit.constants * scale
+    width = (problem.upper - problem.lower)[problem.constants]
+    names = tuple(problem.space.names[k] for k in problem.constants)
+    information = Information(names, values, width * scale, root, SINGULAR_ROUNDING)
+    spreads = _find_spreads(problem, columns, rows, fit.constants)
+    factor = interval_factor(max(len(blocks) - 1, 1))
+    return Constants(information, factor, spreads)
+
+
+def _choose_blocks(problem: SizedProblem) -> list[slice]:
+    """What is left out in turn: each dip, and stretches where there are few of them."""
+    free = len(problem.constants)
+    if problem.drive.events <= free:
+        return blocks_of(problem.events, problem.drive, free)
+    return [problem.drive.part(e) for e in range(problem.drive.events)]
+
+
+def _differentiate(
+    likelihood: Likelihood, problem: SizedProblem, unit: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (R,) at coordinates (D,), and derivatives (k + 1, R): to the constants, then to the
+    torque of each row's dip.
+    """
+    lane = np.zeros(1, dtype=int)
+    rows, J = central_differences(likelihood.rows, unit[None], lane, problem.separable)
+    return rows[0], J[0]
 
 
 def _project_out(J: np.ndarray, problem: SizedProblem) -> np.ndarray:
@@ -318,7 +332,9 @@ def _project_out(J: np.ndarray, problem: SizedProblem) -> np.ndarray:
     own = J[:-1].copy()
     for mine in problem.separable.rows:
         torque = J[-1, mine]
-        own[:, mine] -= np.outer(own[:, mine] @ torque, torque) / max(torque @ torque, 1e-30)
+        size = max(float(torque @ torque), SMALLEST_SQUARE)
+        part = own[:, mine] @ torque / size
+        own[:, mine] -= np.outer(part, torque)
     return own
 
 
@@ -339,14 +355,16 @@ def _find_spreads(
         weight = np.zeros_like(acting)
         squares = np.zeros_like(acting)
         for e, block in zip(events, blocks, strict=True):
-            own, left = columns[:, block, k], rows[:, block]
-            acting[e] -= np.sum(own * left)
+            own = columns[:, block, k]
+            told = float(np.sum(own * rows[:, block]))
+            acting[e] -= told
             weight[e] += np.sum(own**2)
-            squares[e] += np.sum(own * left) ** 2
-        seen = weight > 1e-12 * max(weight.max(), 1e-30)
-        step = acting[seen] / weight[seen]
-        precision = weight[seen] ** 2 / np.maximum(squares[seen], 1e-30)
-        mean = np.sum(precision * step) / np.sum(precision)
+            squares[e] += told**2
+        seen = weight > LEAST_WEIGHT * weight.max()
+        weight = weight[seen]
+        step = acting[seen] / weight
+        precision = weight**2 / np.maximum(squares[seen], SMALLEST_SQUARE)
+        mean = np.average(step, weights=precision)
         excess = float(np.sum(precision * (step - mean) ** 2))
         freedom = int(seen.sum()) - 1
         if freedom < 1 or excess <= chdtri(freedom, CONSTANT_CHANCE):
@@ -378,22 +396,22 @@ def predict_in_turn(spec: LoadSpec, dips: Sequence[Dip], odd: Mapping[int, str])
 
     Constants are fitted again whenever there are half as many dips more: so the whole costs some
     times the fit to all. Nothing of a dip or of a later one is in what predicts it, but that odd
-    ones are left out.
+    ones do not predict.
     """
-    order = [k for k in range(len(dips)) if k not in odd]
-    predicted, start, first = [], None, 1
-    while first < len(order):
-        fit = fit_dips(spec, [dips[k] for k in order[:first]], start)
-        start, composition = fit.constants, fit.estimate_composition()
-        following = max(first + 1, int(GROWTH * first))
-        predicted += [_predict(fit, composition, dips[k], k) for k in order[first:following]]
-        first = following
-    later = sorted(odd)
-    if order and later:
-        fit = fit_dips(spec, [dips[k] for k in order], start)
-        composition = fit.estimate_composition()
-        predicted += [_predict(fit, composition, dips[k], k) for k in later]
-    return sorted(predicted, key=lambda one: one.position)
+    regular = [k for k in range(len(dips)) if k not in odd]
+    predicted: list[Predicted] = []
+    start, known = None, 1
+    while known <= len(regular):
+        following = max(known + 1, int(GROWTH * known))
+        begin = regular[known - 1] + 1
+        end = len(dips) if following > len(regular) else regular[following - 1] + 1
+        if begin < end:
+            fit = fit_dips(spec, [dips[k] for k in regular[:known]], start)
+            start = fit.constants
+            composition = fit.estimate_composition()
+            predicted += [_predict(fit, composition, dips[k], k) for k in range(begin, end)]
+        known = following
+    return predicted
 
 
 def _predict(fit: SharedFit, composition: Composition, dip: Dip, position: int) -> Predicted:
@@ -407,12 +425,15 @@ def _predict(fit: SharedFit, composition: Composition, dip: Dip, position: int) 
     if explain_refusal(fit.problem.model, values, dip.event):
         return Predicted(position, float(share), float("inf"), known, None)
     played = respond(fit.problem.model, values, dip.event, VALIDATE)
-    return Predicted(position, float(share), model_error([played]).value, known, played)
+    error = model_error([played]).value
+    return Predicted(position, float(share), error, known, played)
 
 
 def find_band(predicted: Sequence[Predicted], odd: Mapping[int, str]) -> PredictionBand | None:
     """The band of the next dip, by what was missed of those that were predicted; None where none
     was.
     """
-    fits = [one.fit for one in predicted if one.fit is not None and one.position not in odd]
-    return measure_band(fits[len(fits) // 2 :]) if fits else None
+    regular = [one for one in predicted if one.position not in odd]
+    fits = [one.fit for one in regular if one.fit is not None]
+    half = len(fits) // 2
+    return measure_band(fits[half:]) if fits else None

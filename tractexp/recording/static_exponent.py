@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.record.regression import fit_line
 from tractexp.recording.trace import Trace
 
 AROUND_CHANGE = 1.0  # s before what happened and after it, over which exponents are fitted
 EDGE_CYCLES = 3.0  # about a step, which windows blur and motors answer
-JACKKNIFE_BLOCKS = 20
 FEWEST_LEVELS = 20  # half cycles that are fitted at least
 LEAST_VOLTAGE_CHANGE = 0.005  # of the voltage, from the least to the greatest
 WIDEST_EXPONENT = 0.5  # half of an interval: a wider one tells nothing
@@ -61,30 +61,28 @@ def _fit_exponent(
     """The exponent of one channel over samples `at`; None where the voltage hardly changes, the
     power changes its sign, or the interval is too wide.
     """
-    U, power = trace.U[at], getattr(trace, channel)[at]
+    U = trace.U[at]
+    power = getattr(trace, channel)[at]
     seen = np.isfinite(power) & np.isfinite(U) & (U > 0)
-    U, power, t = U[seen], power[seen], trace.t[at][seen]
+    U = U[seen]
+    power = power[seen]
     if len(U) < FEWEST_LEVELS or np.ptp(U) < LEAST_VOLTAGE_CHANGE * U.max():
         return None
     if (power == 0).any() or np.ptp(np.sign(power)) > 0:
         return None
-    y = np.log(np.abs(power))
     columns = [np.log(U), np.ones(len(U))]
     if drift:
+        t = trace.t[at][seen]
         columns.append(t - t.mean())
     X = np.stack(columns, axis=1)
-    fit = np.linalg.lstsq(X, y, rcond=None)[0]
-    moves = []
-    blocks = np.array_split(np.arange(len(y)), min(JACKKNIFE_BLOCKS, len(y) // 2))
-    for block in blocks:
-        some = np.delete(X, block, axis=0)
-        without = np.linalg.lstsq(some, np.delete(y, block), rcond=None)[0]
-        moves.append(without[0] - fit[0])
-    share = (len(blocks) - 1) / len(blocks)
-    half = TWO_SIDED * float(np.sqrt(share * np.sum(np.square(moves))))
+    y = np.log(np.abs(power))
+    fit, errors = fit_line(X, y)
+    half = TWO_SIDED * float(errors[0])
     if not half < WIDEST_EXPONENT:
         return None
     left = float(np.var(y - X @ fit))
-    explained = 1 - left / max(float(np.var(y)), SMALLEST_VARIANCE)
+    whole = float(np.var(y))
+    explained = 1 - left / max(whole, SMALLEST_VARIANCE)
     value = float(fit[0])
-    return StaticExponent(channel, value, value - half, value + half, explained)
+    low, high = value - half, value + half
+    return StaticExponent(channel, value, low, high, explained)

@@ -10,7 +10,6 @@ power that the motor drew running. Source: Kundur 1994, ch. 7; IEEE 112-2017, te
 and retardation.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +18,7 @@ import numpy as np
 from tractexp.record.change import runs
 from tractexp.record.phasor import SLOWEST, Phasors
 from tractexp.record.record import Record
+from tractexp.record.regression import fit_line
 
 CLOSED_SHARE = 0.05  # of the greatest current: what is less flows through no closed breaker
 ALIVE_SHARE = 0.3  # of the greatest voltage: what is more is one
@@ -26,11 +26,11 @@ SWITCHING_CYCLES = 2.0  # cycles about a switching that windows blur
 SHORTEST_PART = 3.0  # cycles that are measured at least
 LONGEST_STANDSTILL = 0.2  # s after closing in which a motor hardly turns
 LEAST_STARTING_CURRENT = 2.0  # times the current of running, that of a start
-LEAST_SECOND_CURRENT = 0.03  # of the positive sequence's current, that of the negative
+# of the positive sequence, what the negative one has of current and of voltage
+LEAST_SECOND_CURRENT, LEAST_SECOND_VOLTAGE = 0.03, 0.006
 LEAST_DECAY = 0.9  # of the voltage at the opening, at the end of coasting
 LEAST_LEFT = 0.1  # of it: with less the frequency is not measured
 STEADY_CURRENT = 0.1  # of a current: by more it changes while a motor still runs up
-SAMPLING_BLOCKS = 12  # left out in turn
 LEAST_ERROR = 0.02  # of a value: of what transformers of measurement and windows leave
 TWO_ERRORS = 2.0
 FEWEST_PHASORS = 20
@@ -120,10 +120,12 @@ class Course:
         """
         if record.f is None or not record.is_from_field:
             return None
-        U, S = record.base.voltage * record.U, record.base.power * (record.P + 1j * record.Q)
-        if not (np.isfinite(S).all() and (U > 0).all()):
+        U = record.base.voltage * record.U
+        S = record.base.power * (record.P + 1j * record.Q)
+        if not np.isfinite(S).all() or (U <= 0).any():
             return None
-        return cls(record.t, U, np.abs(S) / (np.sqrt(3) * U), S, record.f)
+        current = np.abs(S) / (np.sqrt(3) * U)
+        return cls(record.t, U, current, S, record.f)
 
 
 def find_type_test(course: Course, nominal: float) -> TypeTest | None:
@@ -152,12 +154,15 @@ class _Report:
     """The course of one motor, where its breaker is closed, and where that changes."""
 
     def __init__(self, course: Course, nominal: float):
-        self.course, self.nominal = course, nominal
+        self.course = course
+        self.nominal = nominal
         step = float(course.t[1] - course.t[0])
-        self.edge = max(round(SWITCHING_CYCLES / nominal / step), 1)
-        self.least = max(SHORTEST_PART / nominal / step, 4)
+        cycle = 1 / (nominal * step)  # samples
+        self.edge = max(round(SWITCHING_CYCLES * cycle), 1)
+        self.least = max(SHORTEST_PART * cycle, 4)
         self.standstill = round(LONGEST_STANDSTILL / step)
-        self.current, self.voltage = course.I, course.U
+        self.current = course.I
+        self.voltage = course.U
         closed = self.current > CLOSED_SHARE * self.current.max(initial=0.0)
         spans = runs(closed, int(self.least) + 2 * self.edge)
         self.closed = spans[0] if len(spans) == 1 else None
@@ -187,12 +192,11 @@ class _Report:
             return None
         part = slice(first + self.edge, first + self.edge + self.standstill // 2)
         current = self.current[part]
-        if not len(current) or current.min() < LEAST_STARTING_CURRENT * np.median(
-            self.current[running]
-        ):
+        usual = float(np.median(self.current[running]))
+        if not len(current) or current.min() < LEAST_STARTING_CURRENT * usual:
             return None
-        how = "U/I at the start"
-        return _measure("X_locked", self.voltage[part] / current / (np.sqrt(3) * ohm), "pu", how)
+        impedance = self.voltage[part] / (np.sqrt(3) * current)
+        return _measure("X_locked", impedance / ohm, "U/I at the start")
 
     def measure_unbalance(self, ohm: float) -> TypeValue | None:
         """The impedance of the negative sequence; None where there is hardly any."""
@@ -200,12 +204,14 @@ class _Report:
         part = slice(self.closed.start + self.edge, self.closed.stop - self.edge)
         if self.course.U2 is None or self.course.I2 is None:
             return None
-        voltage, current = self.course.U2[part], self.course.I2[part]
+        voltage = self.course.U2[part]
+        current = self.course.I2[part]
         seen = current > LEAST_SECOND_CURRENT * self.current[part]
-        seen &= voltage > LEAST_SECOND_CURRENT / 5 * self.voltage[part]
+        seen &= voltage > LEAST_SECOND_VOLTAGE * self.voltage[part]
         if np.count_nonzero(seen) < self.least:
             return None
-        return _measure("X_2", voltage[seen] / current[seen] / (np.sqrt(3) * ohm), "pu", "U2/I2")
+        impedance = voltage[seen] / (np.sqrt(3) * current[seen])
+        return _measure("X_2", impedance / ohm, "U2/I2")
 
     def measure_coasting(self, running: slice, power: float) -> list[TypeValue | None]:
         """T0' and H of what follows the opening of the breaker; nothing where the voltage stays, or
@@ -213,63 +219,56 @@ class _Report:
         """
         assert self.closed is not None
         first = self.closed.stop + self.edge
-        V, f = self.voltage[first:], self.course.f[first:]
-        t = self.course.t[first:] - self.course.t[self.closed.stop]
+        V = self.voltage[first:]
         if len(V) < self.least or V[0] < ALIVE_SHARE * self.voltage.max():
             return []
+        f = self.course.f[first:]
+        t = self.course.t[first:] - self.course.t[self.closed.stop]
         # phasors follow a frequency so far
         seen = (LEAST_LEFT * V[0] < V) & (f > SLOWEST * self.nominal)
         left = len(V) if seen.all() else int(np.argmin(seen))
         V, f, t = V[:left], f[:left], t[:left]
-        if len(V) < self.least or V[-1] > LEAST_DECAY * V[0] or f[-1] >= f[0]:
+        if len(V) < self.least:
             return []
-        decay = _fit_slopes(t, np.log(V / f), 1)
-        times = [-1 / slope for slope in decay if slope < 0]
-        constant = _tell("T0'", times, "s", "the decay of U/f after the trip")
+        if V[-1] > LEAST_DECAY * V[0] or f[-1] >= f[0]:
+            return []
         drawn = float(np.median(self.course.S[running].real)) / power
         before = float(np.median(self.course.f[running]))
+        decays = _fit_slopes(t, np.log(V / f), 1)
         # braked by the torque of before, and by one that falls with the speed
-        slopes = [*_fit_slopes(t, f, 2), *_fit_slopes(t, f, 1)]
-        inertias = [drawn * before / (2 * -slope) for slope in slopes if slope < 0]
-        inertia = _tell("H", inertias, "s", "df/dt at the trip")
+        falls = _fit_slopes(t, f, 2)
+        falls += _fit_slopes(t, f, 1)
+        times = [-1 / slope for slope in decays if slope < 0]
+        inertias = [-drawn * before / (2 * slope) for slope in falls if slope < 0]
+        constant = _tell("T0'", times, "the decay of U/f after the trip")
+        inertia = _tell("H", inertias, "df/dt at the trip")
         return [constant, inertia]
 
 
-def _measure(name: str, samples: np.ndarray, unit: str, how: str) -> TypeValue:
-    """The median of samples (n,), and how far it moves where blocks of them are left out."""
-    value = float(np.median(samples))
-    blocks = np.array_split(np.arange(len(samples)), min(SAMPLING_BLOCKS, len(samples)))
-    moves = [float(np.median(np.delete(samples, block))) - value for block in blocks]
-    half = max(_find_half_width(moves), LEAST_ERROR * value)
-    return TypeValue(name, value, value - half, value + half, unit, how)
+def _measure(name: str, samples: np.ndarray, how: str) -> TypeValue:
+    """The mean of samples (n,), per unit, and how far it moves where blocks are left out."""
+    level = np.ones((len(samples), 1))
+    (value,), (error,) = fit_line(level, samples)
+    half = max(TWO_ERRORS * float(error), LEAST_ERROR * float(value))
+    ends = float(value) - half, float(value) + half
+    return TypeValue(name, float(value), *ends, "pu", how)
 
 
-def _tell(name: str, values: list[float], unit: str, how: str) -> TypeValue | None:
-    """The first of values, and an interval over all; None of none."""
+def _tell(name: str, values: list[float], how: str) -> TypeValue | None:
+    """The first of times [s], and an interval over all; None of none."""
     if not values:
         return None
-    first = float(values[0])
+    first = values[0]
     half = LEAST_ERROR * first
-    low = min(*map(float, values), first - half)
-    high = max(*map(float, values), first + half)
-    return TypeValue(name, first, low, high, unit, how)
+    low = min(*values, first - half)
+    high = max(*values, first + half)
+    return TypeValue(name, first, low, high, "s", how)
 
 
 def _fit_slopes(t: np.ndarray, y: np.ndarray, degree: int) -> list[float]:
     """The slope at t = 0 of a polynomial through y (n,), then both ends of its 95 % interval."""
     X = np.vander(t, degree + 1, increasing=True)
-    slope = float(np.linalg.lstsq(X, y, rcond=None)[0][1])
-    moves = []
-    blocks = np.array_split(np.arange(len(y)), min(SAMPLING_BLOCKS, len(y) // 2))
-    for block in blocks:
-        some = np.delete(X, block, axis=0)
-        without = np.linalg.lstsq(some, np.delete(y, block), rcond=None)[0]
-        moves.append(without[1] - slope)
-    half = _find_half_width(moves)
+    fit, errors = fit_line(X, y)
+    slope = float(fit[1])
+    half = TWO_ERRORS * float(errors[1])
     return [slope, slope - half, slope + half]
-
-
-def _find_half_width(moves: Sequence[float]) -> float:
-    """Half the interval of a figure that moves so where each of some blocks is left out."""
-    share = (len(moves) - 1) / len(moves)
-    return TWO_ERRORS * float(np.sqrt(share * np.sum(np.square(moves))))

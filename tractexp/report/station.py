@@ -194,14 +194,16 @@ def _tabulate_constants(load: Mapping[str, Any]) -> Table:
 
 def _draw_term(term: str, rows: Sequence[Mapping[str, Any]], what: str, factor: float) -> Chart:
     """A quantity by hour, weekday, month or year, with its interval."""
-    x = np.arange(len(rows)) + (0.5 if term == HOUR else 1.0)
-    value, low, high = (
-        factor * np.array([row[key] for row in rows]) for key in ("value", "low", "high")
-    )
-    hover = [f"{row['at']}: {v:.4g}" for row, v in zip(rows, value.tolist(), strict=True)]
+    first = 0.5 if term == HOUR else 1.0
+    x = first + np.arange(len(rows))
+    value = factor * np.array([row["value"] for row in rows])
+    low = factor * np.array([row["low"] for row in rows])
+    high = factor * np.array([row["high"] for row in rows])
+    hover = [f"{row['at']}: {factor * row['value']:.4g}" for row in rows]
     chart = Chart(TERM_NAMES[term], [what], pixels=240, legend=False)
     chart.band("95 %", x, low, high, style.FAINT)
-    return chart.points("expected", x, value, style.ACTIVE, hover=hover)
+    chart.points("expected", x, value, style.ACTIVE, hover=hover)
+    return chart
 
 
 def _tabulate_events(load: Mapping[str, Any]) -> Table:
@@ -238,30 +240,35 @@ def _draw_years(load: Mapping[str, Any]) -> Chart:
     """Errors of prediction and shares over the years, or by number where times are not known."""
     events = load["events"]
     dated = all(event["when"] for event in events)
-    x = np.array([_year(e["when"]) if dated else k for k, e in enumerate(events, 1)])
+    numbered = enumerate(events, 1)
+    x = np.array([_year(each["when"]) if dated else k for k, each in numbered])
     label = "year" if dated else "dip, by its number"
     chart = Chart(label, ["error, as predicted [%]", "motors, of P [%]"], pixels=460)
     odd = np.array([bool(event["odd"]) for event in events])
-    hover = [f"{e['event']}, {e['known']} dips before it" for e in events]
-    predicted = np.array(
-        [np.nan if e["predicted"] is None else 100 * e["predicted"] for e in events]
-    )
-    seen = np.isfinite(predicted)
-    for mask, name, symbol in ((~odd, "predicted", "circle"), (odd, "left out", "x")):
-        here = np.flatnonzero(mask & seen)
-        if len(here):
-            told = [f"{hover[k]}: {predicted[k]:.3g} %" for k in here]
-            chart.points(name, x[here], predicted[here], style.ACTIVE, 0, symbol=symbol, hover=told)
-    shares = 100 * np.array([event["share"] for event in events])
-    expected = np.array([np.nan if e["expected"] is None else 100 * e["expected"] for e in events])
-    some = np.flatnonzero(~odd)
-    told = [f"{hover[k]}: {shares[k]:.3g} %" for k in some]
-    chart.points("of each dip", x[some], shares[some], style.ACTIVE, 1, hover=told)
-    known = np.flatnonzero(~odd & np.isfinite(expected))
-    told = [f"{hover[k]}: expected {expected[k]:.3g} %" for k in known]
-    return chart.points(
-        "expected", x[known], expected[known], style.FAINT, 1, symbol="diamond-open", hover=told
-    )
+    told = [f"{event['event']}, {event['known']} dips before it" for event in events]
+
+    def add(name: str, key: str, some: np.ndarray, panel: int, symbol: str) -> None:
+        values = np.array([event[key] for event in events], dtype=float)
+        values = 100 * values
+        here = np.flatnonzero(some & np.isfinite(values))
+        hover = [f"{told[k]}: {values[k]:.3g} %" for k in here]
+        color = style.FAINT if key == "expected" else style.ACTIVE
+        chart.points(
+            name,
+            x[here],
+            values[here],
+            color,
+            panel,
+            symbol=symbol,
+            hover=hover,
+        )
+
+    add("predicted", "predicted", ~odd, 0, "circle")
+    if odd.any():
+        add("left out", "predicted", odd, 0, "x")
+    add("of each dip", "share", ~odd, 1, "circle")
+    add("expected", "expected", ~odd, 1, "diamond-open")
+    return chart
 
 
 def _year(when: str) -> float:
