@@ -126,13 +126,29 @@ def test_a_load_that_is_seen_once_is_told(made, tmp_path):
 def test_it_is_saved_and_written(fitted, tmp_path):
     assert tractexp.load(fitted.save(tmp_path / "saved.json")).content == fitted.content
     names = [path.name for path in fitted.write(tmp_path)]
-    assert names == ["station.json", "station.csv", "station.html"]
+    assert names == ["station.json", "station.csv", "load_1.json", "load_2.json", "station.html"]
     page = (tmp_path / "station.html").read_text(encoding="utf-8")
     for load in fitted.loads:
         assert load["load"] in page
     assert len(fitted.to_frame()) == 2 * DIPS
     with pytest.raises(UserError, match="there is no load 'T9'"):
         fitted.load_named("T9")
+
+
+def test_a_load_is_an_identified_model_that_predicts(fitted, tmp_path):
+    paths = fitted.write_results(tmp_path)
+    for number, load in enumerate(fitted.content["loads"], 1):
+        model = tractexp.load(tmp_path / f"load_{number}.json")
+        assert model.result.parameters == load["result"]["parameters"]
+        share = model.result.parameters["T_m"] / model.result.before["P0"]
+        assert share == pytest.approx(load["share"]["value"], abs=1e-6)
+        low, high = model.result.intervals["X_prime"]
+        assert low < model.result.parameters["X_prime"] < high
+        t = np.arange(400) * 5e-3
+        response = model.predict(t=t, U=np.where((t > 0.5) & (t < 0.7), 0.7, 1.0))
+        assert response.P[0] == pytest.approx(model.result.before["P0"], rel=1e-6)
+        assert response.band[0] > 0
+    assert paths[2].name == "load_1.json"
 
 
 def test_the_command_goes_on_where_it_was(made, tmp_path):

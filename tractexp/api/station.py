@@ -11,6 +11,7 @@ from typing import Any
 
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
+from tractexp.api.identify import Identification
 from tractexp.api.look import Listed
 from tractexp.api.station_load import FEWEST_DIPS, LoadJob, fit_load, read_files, store_dips
 from tractexp.api.survey import survey
@@ -20,6 +21,7 @@ from tractexp.blocks import Report, Table
 from tractexp.cache.store import Store, environment, key
 from tractexp.configuration.plugin import get, plugin
 from tractexp.errors import DATA, UserError, among, check_choice, check_range
+from tractexp.identification.result import Result
 from tractexp.outcome import Written
 from tractexp.process.workers import Workers, backends
 from tractexp.report import station as shown
@@ -82,6 +84,10 @@ class Station(Written):
         """The dips of a load in order of time: shares, and how well each was predicted."""
         return Listed(self.load_named(name)["events"], f"dips of {name}")
 
+    def identification(self, name: str) -> Identification:
+        """A load as it usually is, as one identified model: it predicts, simulates and exports."""
+        return Identification(Result.from_content(self.load_named(name)["result"], name))
+
     def to_frame(self) -> Any:
         """The dips of all loads as a pandas frame."""
         rows = [
@@ -104,11 +110,18 @@ class Station(Written):
         return shown.report(self.content)
 
     def write_results(self, folder: Path) -> list[Path]:
-        """Write `station.json`, and the dips of all loads as `station.csv`."""
+        """Write `station.json`, the dips of all loads as `station.csv`, and each load as a result
+        that predicts and exports, `load_1.json`, ...
+        """
         frame = self.to_frame()
+        loads = [
+            files.write_json(folder / f"load_{number}.json", load["result"])
+            for number, load in enumerate(self._fitted_loads, 1)
+        ]
         return [
             files.write_json(folder / "station.json", self.content),
             files.write(folder / "station.csv", frame.to_csv(index=False)),
+            *loads,
         ]
 
 

@@ -22,7 +22,7 @@ from tractexp.identification.composition import (
     find_terms,
     shrink,
 )
-from tractexp.identification.forecast import Forecast, tell_of_dip
+from tractexp.identification.forecast import TOLD_DEPTH, Forecast, tell_of_dip
 from tractexp.identification.station import (
     Constants,
     Dip,
@@ -34,6 +34,7 @@ from tractexp.identification.station import (
     judge_constants,
     predict_in_turn,
 )
+from tractexp.identification.station_result import build_result
 from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
 from tractexp.inference.model_error import model_error
 from tractexp.process.workers import Workers
@@ -118,19 +119,22 @@ def _fit(job: LoadJob) -> dict[str, Any]:
     constants = judge_constants(spec, fit)
     composition = fit.estimate_composition()
     predicted = predict_in_turn(spec, dips, fit.odd)
+    share = _tell_share(fit, composition)
+    next_dip = _forecast(fit, composition, predicted)
     return {
         "dips": len(dips),
         "model": load.node,
         "race": [*load.race],
         "constants": _tell_constants(load, constants, fit),
-        "share": _tell_share(fit, composition),
+        "share": share,
         "composition": _tell_terms(fit, composition),
         "power": _tell_power(dips, fit),
         "events": [*_tell_events(names, fit, composition, predicted)],
         "odd": [{"event": names[k], "why": why} for k, why in sorted(fit.odd.items())],
         "error": model_error([fit.fits[k] for k in fit.regular]).to_dict(),
         "predicted": _tell_predicted(predicted, fit),
-        "next_dip": _forecast(fit, composition, predicted),
+        "next_dip": next_dip,
+        "result": build_result(spec, fit, constants, share["value"], next_dip, load.node).to_dict(),
         "curves": [*_draw(names, predicted, fit)],
     }
 
@@ -278,11 +282,15 @@ def _forecast(
     duration = float(np.mean([dip.event.duration for dip in fit.dips]))
     half, sentence = tell_of_dip(fit.problem.model, last.event, forecast, duration)
     return {
+        "depth": TOLD_DEPTH,
         "duration": duration,
         "P": half and half[0],
         "Q": half and half[1],
         "level": INTERVAL_LEVEL,
         "events": band.events,
+        "noise": [*band.noise],
+        "share": [*band.share],
+        "scatter": {},
         "sentence": sentence,
     }
 
