@@ -222,7 +222,7 @@ def _read_dips(
                 store_dips(store, own[file], read)
             count()
     return {
-        name: one
+        name: {**one, "key": own[file]}
         for file, names in wanted.items()
         for name, one in zip(names, by_file[file], strict=True)
     }
@@ -233,13 +233,15 @@ def _group(
 ) -> tuple[list[LoadJob], list[dict[str, Any]]]:
     """What there is to fit, a job for each load; and the loads of which too few dips are there."""
     groups = defaultdict[tuple[str, str], list[tuple[str, str | None, Mapping[str, Any]]]](list)
+    stamps = defaultdict[tuple[str, str], list[str]](list)
     for row in rows:
         one = read[row["event"]]
         dips = groups[row["station"] or "", row["load"] or ""]
         if "record" in one:
             dips.append((row["event"], row["when"], one["record"]))
+            stamps[row["station"] or "", row["load"] or ""].append(row["event"] + one["key"])
     jobs = [
-        LoadJob(load, station, dips, model)
+        LoadJob(load, station, dips, model, stamps[station, load])
         for (station, load), dips in groups.items()
         if len(dips) >= FEWEST_DIPS
     ]
@@ -261,7 +263,7 @@ def _fit_loads(
     """What was found of each load; of one that was fitted to the same dips before, what is kept."""
     store = Store(LOADS, folder=keep or Path())
     names = [
-        key(environment(), job.load, job.station, job.dips, job.model) if keep else ""
+        key(environment(), job.load, job.station, job.keys, job.model) if keep else ""
         for job in jobs
     ]
     entries = [store.read(name) for name in names]

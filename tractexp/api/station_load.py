@@ -52,12 +52,15 @@ Read = dict[str, Any]  # {"record": plain data} or {"why": sentence}
 
 @dataclass(frozen=True, eq=False)
 class LoadJob(Portable):
-    """What a worker fits: the dips of one load as (event, time or None, record as plain data)."""
+    """What a worker fits: the dips of one load as (event, time or None, record as plain data);
+    `keys` tell these dips from others.
+    """
 
     load: str
     station: str
     dips: Sequence[tuple[str, str | None, Mapping[str, Any]]]
     model: LoadModel
+    keys: Sequence[str]
 
 
 def read_dips(folder: str, wanted: tuple[str, Sequence[str]]) -> list[Read]:

@@ -431,7 +431,7 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
         exponents = find_exponents(trace, e.start, e.end, first, stop, lasting=lasting)
     if exponents:
         told = ", ".join(map(str, exponents))
-        why = f"{why}; worth fitting for the static part: {told}"
+        why = f"{why}; worth fitting for the static part: {told}, motors included"
     return Happening(
         kind,
         float(trace.t[e.start]),
