@@ -120,7 +120,12 @@ def estimate_composition(
     seen = _Seen.from_values(values, errors, times)
     _, deviations, spread = seen.find_most_likely(seen.terms)
     coefficients, covariance = seen.solve(deviations, spread)
-    return Composition(coefficients, covariance, spread, seen.start)
+    return Composition(
+        coefficients,
+        covariance,
+        spread,
+        seen.start,
+    )
 
 
 def find_terms(
@@ -142,7 +147,8 @@ def shrink(
     than the spread; and their standard errors.
     """
     own = spread**2 / np.maximum(spread**2 + errors**2, 1e-30)
-    return expected + own * (values - expected), np.sqrt(own) * errors
+    drawn = expected + own * (values - expected)
+    return drawn, np.sqrt(own) * errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +170,13 @@ class _Seen:
         X = describe_times(times, start)
         scatter = float(np.std(values, ddof=1)) if len(values) > 1 else UNKNOWN_SPREAD
         X = X[:, :1] if start is None else X
-        return cls(values, errors, X, max(scatter, LEAST_SCATTER), start)
+        return cls(
+            values,
+            errors,
+            X,
+            max(scatter, LEAST_SCATTER),
+            start,
+        )
 
     @property
     def terms(self) -> Sequence[str]:

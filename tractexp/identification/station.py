@@ -127,7 +127,8 @@ class SharedFit:
 def spell_parameters(problem: SizedProblem, constants: np.ndarray, torque: float) -> np.ndarray:
     """All parameters (d,) of the model by its constants (k,), where motors draw so much [pu]."""
     values = np.empty(problem.space.dimension)
-    values[problem.constants], values[problem.shares] = constants, torque
+    values[problem.constants] = constants
+    values[problem.shares] = torque
     return problem.full(values)[0]
 
 
@@ -156,7 +157,11 @@ def _fit_constants(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None
         start = _search_constants(spec.pose([dip.event for dip in first]))
     problem = spec.pose([dip.event for dip in dips])
     likelihood, unit = _place(problem, start)
-    ended = descend(likelihood.rows, unit[None], apart=problem.separable)
+    ended = descend(
+        likelihood.rows,
+        unit[None],
+        apart=problem.separable,
+    )
     return likelihood.values(ended.unit[0])[problem.constants]
 
 
@@ -210,14 +215,26 @@ def _fit_torques(spec: LoadSpec, dips: Sequence[Dip], constants: np.ndarray) -> 
         likelihood, unit = _place(problem, constants)
         frozen = np.ones((1, len(unit)), dtype=bool)
         frozen[:, problem.shares] = False
-        unit = descend(likelihood.rows, unit[None], frozen, apart=problem.separable).unit[0]
+        ended = descend(
+            likelihood.rows,
+            unit[None],
+            frozen,
+            apart=problem.separable,
+        )
+        unit = ended.unit[0]
         values = likelihood.values(unit)
         torques.append(values[problem.shares])
         errors.append(_scatter_torques(likelihood, problem, unit))
         for own, event in zip(problem.by_event(values)[:, 0], problem.events, strict=True):
             fits.append(respond(problem.model, own, event, TRAIN))
     every = np.concatenate(torques), np.concatenate(errors)
-    return SharedFit(problem, values, dips, *every, fits)
+    return SharedFit(
+        problem,
+        values,
+        dips,
+        *every,
+        fits,
+    )
 
 
 def _scatter_torques(likelihood: Likelihood, problem: SizedProblem, unit: np.ndarray) -> np.ndarray:
@@ -237,8 +254,9 @@ def _scatter_torques(likelihood: Likelihood, problem: SizedProblem, unit: np.nda
         squares[e] += (acting[block].sum() / left) ** 2
         counts[e] += 1
     squares *= (counts - 1) / np.maximum(counts, 1)
-    width = (problem.upper - problem.lower)[problem.shares]
-    return width * np.minimum(np.sqrt(squares), 1.0)
+    width = problem.upper - problem.lower
+    errors = np.minimum(np.sqrt(squares), 1.0)
+    return width[problem.shares] * errors
 
 
 def _find_event(problem: SizedProblem, block: slice) -> int:
@@ -254,7 +272,11 @@ def _find_odd(fit: SharedFit, known: Mapping[int, str]) -> dict[int, str]:
         return {}
     middle = float(np.median(errors[kept]))
     deviation = 1.4826 * float(np.median(np.abs(errors[kept] - middle)))
-    limit = max(LEAST_ODD, ODD_RATIO * middle, middle + ODD_DEVIATIONS * deviation)
+    limit = max(
+        LEAST_ODD,
+        ODD_RATIO * middle,
+        middle + ODD_DEVIATIONS * deviation,
+    )
     return {
         k: f"the model of the other dips leaves {error:.0%} of its response, and {middle:.1%} of"
         " theirs"
@@ -288,7 +310,8 @@ def judge_constants(spec: LoadSpec, fit: SharedFit) -> Constants:
     some = sorted(range(len(dips)), key=lambda k: -dips[k].promise)[:MOST_FITTED_DIPS]
     problem = spec.pose([dips[k].event for k in some])
     values = np.empty(problem.space.dimension)
-    values[problem.constants], values[problem.shares] = fit.constants, torques[some]
+    values[problem.constants] = fit.constants
+    values[problem.shares] = torques[some]
     likelihood = _weigh(problem, float(problem.objective(values[None])[0]))
     unit = likelihood.to_unit(values)[0]
     rows, J = _differentiate(likelihood, problem, unit)
@@ -296,13 +319,24 @@ def judge_constants(spec: LoadSpec, fit: SharedFit) -> Constants:
     rows = rows.reshape(problem.drive.channels, -1)
     columns = own.T.reshape(*rows.shape, -1)
     blocks = _choose_blocks(problem)
-    moved = moves_without_blocks(columns, rows, blocks, own @ own.T)
+    moved = moves_without_blocks(
+        columns,
+        rows,
+        blocks,
+        own @ own.T,
+    )
     root, _, _ = robust_root(own.T, moved)
     scale = problem.scale_to_own_power
     values = fit.constants * scale
     width = (problem.upper - problem.lower)[problem.constants]
     names = tuple(problem.space.names[k] for k in problem.constants)
-    information = Information(names, values, width * scale, root, SINGULAR_ROUNDING)
+    information = Information(
+        names,
+        values,
+        width * scale,
+        root,
+        SINGULAR_ROUNDING,
+    )
     spreads = _find_spreads(problem, columns, rows, fit.constants)
     factor = interval_factor(max(len(blocks) - 1, 1))
     return Constants(information, factor, spreads)
@@ -323,7 +357,12 @@ def _differentiate(
     torque of each row's dip.
     """
     lane = np.zeros(1, dtype=int)
-    rows, J = central_differences(likelihood.rows, unit[None], lane, problem.separable)
+    rows, J = central_differences(
+        likelihood.rows,
+        unit[None],
+        lane,
+        problem.separable,
+    )
     return rows[0], J[0]
 
 
@@ -423,10 +462,22 @@ def _predict(fit: SharedFit, composition: Composition, dip: Dip, position: int) 
     values = fit.spell_parameters(torque)
     known = len(fit.regular)
     if explain_refusal(fit.problem.model, values, dip.event):
-        return Predicted(position, float(share), float("inf"), known, None)
+        return Predicted(
+            position,
+            float(share),
+            float("inf"),
+            known,
+            None,
+        )
     played = respond(fit.problem.model, values, dip.event, VALIDATE)
     error = model_error([played]).value
-    return Predicted(position, float(share), error, known, played)
+    return Predicted(
+        position,
+        float(share),
+        error,
+        known,
+        played,
+    )
 
 
 def find_band(predicted: Sequence[Predicted], odd: Mapping[int, str]) -> PredictionBand | None:

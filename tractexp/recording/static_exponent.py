@@ -85,4 +85,10 @@ def _fit_exponent(
     explained = 1 - left / max(whole, SMALLEST_VARIANCE)
     value = float(fit[0])
     low, high = value - half, value + half
-    return StaticExponent(channel, value, low, high, explained)
+    return StaticExponent(
+        channel,
+        value,
+        low,
+        high,
+        explained,
+    )

@@ -110,8 +110,17 @@ class Course:
     @classmethod
     def from_phasors(cls, phasors: Phasors) -> "Course":
         """Of three phases."""
-        current, second = np.abs(phasors.I1), np.abs(phasors.I2)
-        return cls(phasors.t, phasors.U, current, phasors.S, phasors.f, phasors.U2, second)
+        current = np.abs(phasors.I1)
+        second = np.abs(phasors.I2)
+        return cls(
+            phasors.t,
+            phasors.U,
+            current,
+            phasors.S,
+            phasors.f,
+            phasors.U2,
+            second,
+        )
 
     @classmethod
     def from_record(cls, record: Record) -> "Course | None":
@@ -125,7 +134,13 @@ class Course:
         if not np.isfinite(S).all() or (U <= 0).any():
             return None
         current = np.abs(S) / (np.sqrt(3) * U)
-        return cls(record.t, U, current, S, record.f)
+        return cls(
+            record.t,
+            U,
+            current,
+            S,
+            record.f,
+        )
 
 
 def find_type_test(course: Course, nominal: float) -> TypeTest | None:
@@ -250,8 +265,15 @@ def _measure(name: str, samples: np.ndarray, how: str) -> TypeValue:
     level = np.ones((len(samples), 1))
     (value,), (error,) = fit_line(level, samples)
     half = max(TWO_ERRORS * float(error), LEAST_ERROR * float(value))
-    ends = float(value) - half, float(value) + half
-    return TypeValue(name, float(value), *ends, "pu", how)
+    middle = float(value)
+    return TypeValue(
+        name,
+        middle,
+        middle - half,
+        middle + half,
+        "pu",
+        how,
+    )
 
 
 def _tell(name: str, values: list[float], how: str) -> TypeValue | None:
@@ -262,7 +284,14 @@ def _tell(name: str, values: list[float], how: str) -> TypeValue | None:
     half = LEAST_ERROR * first
     low = min(*values, first - half)
     high = max(*values, first + half)
-    return TypeValue(name, first, low, high, "s", how)
+    return TypeValue(
+        name,
+        first,
+        low,
+        high,
+        "s",
+        how,
+    )
 
 
 def _fit_slopes(t: np.ndarray, y: np.ndarray, degree: int) -> list[float]:
