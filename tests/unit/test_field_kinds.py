@@ -123,6 +123,24 @@ def test_little_before_a_dip_makes_no_swell_of_it(tmp_path, before, seconds, dep
         assert dip.depth == pytest.approx(depth, abs=0.01)
 
 
+@pytest.mark.parametrize("slope", [-0.06, -0.02, 0.05])
+def test_a_dip_out_of_a_sliding_voltage_begins_where_it_falls(tmp_path, slope):
+    """By so much a second, up to the dip at 1.5 s."""
+    t = np.arange(0, 3, 1 / RATE)
+    slide = 1 + slope * np.minimum(t, 1.5)
+    rows = [(name, unit, x * slide) for name, unit, x in station(t, [(1.5, 0.25, 0.3)])]
+    path = written(tmp_path, t, rows)
+    seen, first = look(path)
+    assert "is worth fitting" in first
+    assert [event["kind"] for event in seen.events][:2] == ["ramp", "dip"]
+    event = seen.events.rows[1]
+    assert event["start"] == pytest.approx(1.5, abs=0.02)
+    assert event["depth"] == pytest.approx(0.3, abs=0.015)
+    assert event["end"] == pytest.approx(1.75, abs=0.03)
+    [dip] = tractexp.read(path)
+    assert dip.t_start == pytest.approx(1.5, abs=0.02)
+
+
 def test_the_voltage_before_the_trigger_is_the_reference(tmp_path):
     t = np.arange(0, 3, 1 / RATE)
     path = written(tmp_path, t, station(t, [(0, 0.2, 0.1), (1.0, 0.25, 0.3)]), trigger=1.0)

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tractexp.record.change import voltage_changes
 from tractexp.record.record import DEAD_VOLTAGE_SHARE
 
 SHALLOWEST = 0.03  # of the voltage before: anything less is no dip
@@ -14,6 +13,8 @@ MERGED = 0.02  # s: dips closer than one cycle are one
 STEADY = 1.0  # s: the steady state is the mean over at most so long before the dip
 REFERENCE = 0.1  # s at the start, or after a change, whose median is the reference
 NO_STEP = 0.13  # of the voltage: no tap changer and no switched line raises it by more
+SUDDEN = 0.06  # s: three cycles, within which a dip begins; a voltage that slid before is its level
+BEGUN = 0.9  # of a sudden change: as long as so much of it is to come it has not begun
 # s: what lasts so long at the start was before the event, and not a window that holds a part of it
 CERTAIN = 0.02
 NEAR_TRIGGER = 60.0  # s: a trigger that comes later says nothing of the record's first voltage
@@ -64,7 +65,8 @@ def find_dips(t: np.ndarray, U: np.ndarray, trigger: float | None = None) -> lis
 
     A dip falls by more than 3 % (or six standard deviations of the sample noise) below a reference
     that starts at the level of the first samples, follows slow changes, and starts anew after each
-    dip. Rises are not dips, and a swell leaves the reference where it was.
+    dip, and where a voltage that slid begins to fall. Rises are not dips, and a swell leaves the
+    reference where it was.
     """
     return falls(t, U, trigger)[0]
 
@@ -76,9 +78,10 @@ def falls(
     margin = margin_of(U)
     block = max(FEWEST_BEFORE, round(0.1 * (len(t) - 1) / float(t[-1] - t[0])))
     reference = float(starting_level(t, U[None], np.array([margin]), FEWEST_BEFORE, trigger)[0])
+    within = max(1, round(SUDDEN * (len(t) - 1) / float(t[-1] - t[0])))
     dips: list[tuple[int, int]] = []
     swells: list[tuple[int, int]] = []
-    k = 0
+    k = slid = 0
     while k < len(U):
         part = U[k : k + block]
         below = part < (1 - margin) * reference
@@ -93,9 +96,13 @@ def falls(
             continue
         crossing = k + int(np.argmax(below))
         start = _onset(U, dips[-1][1] if dips else 0, crossing, reference, margin)
-        if crossing - start > block:
-            start = _after_a_step(t, U, start, crossing, margin)
         end = _recovery(U, crossing, reference, margin)
+        if crossing - start > block:
+            sudden = find_sudden_change(U[start:end], within, margin * reference)
+            if sudden is not None and start + sudden > slid:
+                slid = k = start + sudden
+                reference = measure_median(U[max(slid - within, start) : slid + 1])
+                continue
         if dips and t[start] - t[dips[-1][1]] < MERGED:
             start = dips.pop()[0]
         dips.append((start, end))
@@ -104,6 +111,21 @@ def falls(
             reference = max(measure_median(U[end : end + n]) for n in (FEWEST_BEFORE, block))
         k = end
     return dips, swells
+
+
+def find_sudden_change(x: np.ndarray, within: int, least: float) -> int | None:
+    """The sample of x (N,) right before it first changes by more than `least` within so many
+    samples; None where it only slides.
+    """
+    changes = x[within:] - x[:-within]
+    sudden = np.abs(changes) > least
+    if not sudden.any():
+        return None
+    first = int(np.argmax(sudden))
+    same = np.sign(changes[first]) * changes[first:]
+    over = same <= least
+    same = same[: int(np.argmax(over))] if over.any() else same
+    return first + int(np.flatnonzero(same >= BEGUN * same.max())[-1])
 
 
 def measure_median(x: np.ndarray) -> float:
@@ -160,16 +182,6 @@ def _onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: f
     """
     high = np.flatnonzero(U[first:crossing] >= (1 - margin / 10) * reference)
     return first + int(high[-1]) + 1 if len(high) else crossing
-
-
-def _after_a_step(t: np.ndarray, U: np.ndarray, start: int, crossing: int, margin: float) -> int:
-    """The onset of a dip that comes long after a small step of the voltage, which is none of it."""
-    begin = max(0, 2 * start - crossing)
-    steps = voltage_changes(U[begin:crossing], MERGED * (len(t) - 1) / float(t[-1] - t[0]))
-    if not steps:
-        return start
-    stop = begin + steps[-1].stop
-    return _onset(U, stop, crossing, float(np.median(U[stop:crossing])), margin)
 
 
 def _recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> int:

@@ -7,11 +7,18 @@ standard's rapid voltage changes). Hysteresis 2 % of the reference as in the sta
 gives the reference's time constant, a minute.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.record.fall import NOISE_FACTOR, RECOVERED, REFERENCE, sample_noise, starting_level
+from tractexp.record.fall import (
+    NOISE_FACTOR,
+    RECOVERED,
+    REFERENCE,
+    find_sudden_change,
+    sample_noise,
+    starting_level,
+)
 from tractexp.record.record import DEAD_VOLTAGE_SHARE
 from tractexp.recording.trace import Trace
 
@@ -25,6 +32,7 @@ SLIDING = 60.0  # s, time constant of the reference (IEC 61000-4-30, 5.4.4)
 HALF_CYCLES_AT_ONCE = 1024  # half cycles that are compared with their reference at once
 FLAT = 1.0  # s that a new level must last to be one (IEC 61000-4-30, 5.11: 100 half cycles)
 LONGEST_EXCURSION = 60.0  # s: what lasts longer is a new level
+SLID = 3  # half cycles at the end of a slide: the level from which the voltage falls then
 LONGEST_ABRUPT_CYCLES = 3.0  # cycles within which a fault or a switch changes the voltage
 
 
@@ -73,13 +81,35 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
             k += inside
             continue
         event = _one(trace, levels, limits, reference, k, events[-1].end if events else 0)
-        events.append(event)
+        slide = _find_slide(trace, event, k, count)
+        events.append(slide or event)
+        if slide is not None:
+            k = slide.end
+            reference = _reference(levels, max(k - SLID, slide.start), SLID)
+            continue
         if not event.returned and event.end < len(trace.t):
             reference = _reference(levels, event.end, count)
         k = event.end
         if event.returned:
             k, reference = _find_next_reference(trace, levels, limits, reference, k, count)
     return events
+
+
+def _find_slide(trace: Trace, event: Excursion, k: int, count: int) -> Excursion | None:
+    """The part of an excursion in which the voltage slides, before it changes suddenly; None where
+    sample k crosses the limit soon after its start.
+    """
+    if k - event.start <= count:
+        return None
+    within = max(1, round(LONGEST_ABRUPT_CYCLES * trace.cycle / trace.step))
+    least = LARGEST_USUAL_DEPARTURE * event.reference
+    U = trace.U[event.start : event.end + within]
+    sudden = find_sudden_change(U, within, least)
+    if not sudden:
+        return None
+    worst = float(U[sudden]) / event.reference - 1
+    end = event.start + sudden
+    return replace(event, end=end, worst=worst, returned=False, new_level=True, sudden=False)
 
 
 def _inside(

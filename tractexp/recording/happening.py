@@ -14,6 +14,7 @@ from tractexp.record.record import Record
 from tractexp.recording.excursion import (
     DEAD_VOLTAGE_SHARE,
     LEAVES_PHASE,
+    SLID,
     Excursion,
     excursions,
 )
@@ -130,8 +131,17 @@ def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]
         for c in listed
     ]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
-    bounds = [*((e.start, e.end) for _, e in spans), *((c.first + 1, c.stop) for c in changes)]
+    bounds = [(e.start, _find_steady_end(kind, e, spans)) for kind, e in spans]
+    bounds += [(c.first + 1, c.stop) for c in changes]
     return [_describe(trace, kind, e, bounds) for kind, e in _merge_ramps(spans)]
+
+
+def _find_steady_end(kind: str, e: Excursion, spans: list[tuple[str, Excursion]]) -> int:
+    """The sample from which on a state is steady enough to be that before the next event: the end
+    of an event, but the start of a slide out of which that event comes.
+    """
+    goes_over = kind == "ramp" and any(0 <= other.start - e.end <= SLID for _, other in spans)
+    return e.start if goes_over else e.end
 
 
 def _extend_lasting_falls(trace: Trace, outside: Sequence[Excursion]) -> list[Excursion]:
