@@ -206,6 +206,18 @@ class TestRailways:
             tractexp.read(path)
 
 
+def test_a_direct_voltage_beside_alternating_ones_is_told(tmp_path):
+    t = np.arange(0, 2, 1 / RATE)
+    direct = 1500 * np.where((t >= 1) & (t < 1.2), 0.7, 1.0) + 30 * np.sin(2 * np.pi * 300 * t)
+    rows = [*station(t, [(1.0, 0.2, 0.3)]), ("U third rail", "V", direct), ("I rail", "A", direct)]
+    seen, first = look(written(tmp_path, t, rows))
+    assert "is worth fitting" in first
+    assert [x["P"] for x in seen.feeders if x["loaded"]] == pytest.approx([20], rel=0.01)
+    notes = " ".join(seen.files.rows[0]["notes"])
+    assert "'U third rail' is direct: 1500 V in the mean with a ripple of 1.4% RMS" in notes
+    assert "no load is shown of it" in notes
+
+
 def test_secondary_values_show_no_megawatts_until_the_ratio_is_given(tmp_path):
     t = np.arange(0, 2, 1 / RATE)
     rows = [

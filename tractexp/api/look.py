@@ -23,7 +23,7 @@ from tractexp.record.wave_event import COARSEST, describe_smearing
 from tractexp.recording.event_views import join_event, propose_joining
 from tractexp.recording.feeder import can_be_named, explain_unrecognized
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
-from tractexp.recording.railway import direct_voltage
+from tractexp.recording.railway import DIRECT, describe_direct_beside, direct_voltage
 from tractexp.recording.recording import unit_of
 from tractexp.storage import files
 from tractexp.text.progress import Progress, tell_stages
@@ -440,7 +440,7 @@ def _content(view: View) -> dict[str, Any]:
             "notes": [
                 *filter(None, [view.proposed]),
                 *recording.notes,
-                *([f"no load was recognised: {lacks}{remedy}"] if lacks else []),
+                *([f"no load was recognised: {lacks}{remedy}"] if lacks else _tell_direct(view)),
             ],
             "channels": [_channel(view, number) for number in range(len(recording.channels))],
         }
@@ -448,6 +448,17 @@ def _content(view: View) -> dict[str, Any]:
         content |= {"lacks": lacks, "can_be_named": named, "direct": direct}
     content["measured_frequency"] = view.frequency
     return content | {"feeders": [_feeder(view, shown) for shown in view.sights]}
+
+
+def _tell_direct(view: View) -> list[str]:
+    """What is said of direct voltages beside a load's."""
+    assert view.recording is not None
+    steady = [
+        number
+        for number, channel in enumerate(view.quality)
+        if not abs(channel.offset) <= DIRECT * channel.level
+    ]
+    return describe_direct_beside(view.recording, steady)
 
 
 def _channel(view: View, number: int) -> dict[str, Any]:

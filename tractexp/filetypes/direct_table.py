@@ -14,7 +14,7 @@ from tractexp.filetypes.columns import Role, factor, role
 from tractexp.filetypes.mapping import PHASES, map_times
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableFile
-from tractexp.recording.railway import DirectVoltage
+from tractexp.recording.railway import ALTERNATING, DirectVoltage
 
 NOMINAL = (0.6, 0.75, 1.5, 3.0)  # kV of direct-current railways (EN 50163)
 FROM_NOMINAL = 0.2  # of it, by which the mean may differ
@@ -47,7 +47,7 @@ def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
     direct = _find_direct(t, x)
     if direct is None:
         return ""
-    said = direct.describe(names[number], float(t[0]))
+    said = f"{direct.describe(names[number], float(t[0]))}; {ALTERNATING}"
     if any(map(NAMED.search, names)):
         return said
     told = not keys.isdisjoint("IP") or _is_told(direct.mean, t, x)
@@ -145,8 +145,8 @@ def check_alternating(
     }
     if reasons := [reason for reason, holds in telling.items() if holds]:
         raise UserError(
-            f"{source}: {direct.describe(name, float(t[0]))}; told by {' and '.join(reasons)};"
-            f" if it is an RMS value, say its nominal voltage, {DATA.base_voltage}={level:.3g}"
+            f"{source}: {direct.describe(name, float(t[0]))}; {ALTERNATING}; told by"
+            f" {' and '.join(reasons)}; if it is an RMS value, say its nominal voltage, {DATA.base_voltage}={level:.3g}"
         )
     return [
         f"{level:.4g} kV may be a direct voltage of railways: taken as RMS of an alternating one,"

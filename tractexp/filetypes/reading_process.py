@@ -35,7 +35,7 @@ class ReadingProcess:
     """
 
     def __init__(self, kind: str, data: bytes) -> None:
-        """`kind` is one of those in `OPEN`. Raises `BadFile` for what is none of it."""
+        """`kind` is one of those in `OPENERS`. Raises `BadFile` for what is none of it."""
         memory, seconds = ROOM + PER_BYTE * len(data), PATIENCE + len(data) // BYTES_PER_SECOND
         command = [sys.executable, "-P", __file__, kind, str(memory), str(seconds)]
         pipe = subprocess.PIPE
@@ -154,7 +154,7 @@ def _list_cells(column: Any) -> Any:
 
 
 # each gives what a file says it holds, and what reads a part of it; they raise ValueError, OSError
-OPEN: dict[str, Callable[[bytes], tuple[Any, Callable[[str], Any]]]] = {
+OPENERS: dict[str, Callable[[bytes], tuple[Any, Callable[[str], Any]]]] = {
     "workbook": _open_workbook,
     "parquet": _open_parquet,
 }
@@ -172,7 +172,7 @@ def _serve(kind: str, memory: int, seconds: int) -> None:
             own = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
             resource.setrlimit(limited, (own, hard))
 
-    content, read = _call(OPEN[kind], _take_question()) or (None, None)
+    content, read = _call(OPENERS[kind], _take_question()) or (None, None)
     _give(content)
     with contextlib.suppress(EOFError):
         while True:

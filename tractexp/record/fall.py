@@ -14,7 +14,7 @@ STEADY = 1.0  # s: the steady state is the mean over at most so long before the 
 REFERENCE = 0.1  # s at the start, or after a change, whose median is the reference
 NO_STEP = 0.13  # of the voltage: no tap changer and no switched line raises it by more
 SUDDEN = 0.06  # s: three cycles, within which a dip begins; a voltage that slid before is its level
-BEGUN = 0.9  # of a sudden change: as long as so much of it is to come it has not begun
+NOT_YET_BEGUN = 0.9  # of a sudden change: as long as so much of it is to come it has not begun
 # s: what lasts so long at the start was before the event, and not a window that holds a part of it
 CERTAIN = 0.02
 NEAR_TRIGGER = 60.0  # s: a trigger that comes later says nothing of the record's first voltage
@@ -125,7 +125,7 @@ def find_sudden_change(x: np.ndarray, within: int, least: float) -> int | None:
     same = np.sign(changes[first]) * changes[first:]
     over = same <= least
     same = same[: int(np.argmax(over))] if over.any() else same
-    return first + int(np.flatnonzero(same >= BEGUN * same.max())[-1])
+    return first + int(np.flatnonzero(same >= NOT_YET_BEGUN * same.max())[-1])
 
 
 def measure_median(x: np.ndarray) -> float:

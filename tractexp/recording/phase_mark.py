@@ -20,11 +20,14 @@ LATIN = {latin: other for other, latin in CYRILLIC.items()}
 MOST_KNOWN_NAMES = 8192  # whose reading is kept: each load of a file asks for it again
 QUANTITY = "uvie"  # letters before a phase's: U, V, E of a voltage, I of a current
 GROUND = r"n|g|e|pe|gnd|neutral|ground|earth|neutro|tierra|terre|erde"
-MARKS = "(?:[abcrstuvwy]{1,2}|l?[123]{1,2})"
+ONE_OR_TWO_MARKS = "(?:[abcrstuvwy]{1,2}|l?[123]{1,2})"
 SAID = (  # what is said in words, and the word that stands for it
     (r"^(?:phase[- ]?voltage|voltage[- ]phase|[uv][ _]?(?:phase|ф))$", "voltage ln"),
     (r"^[uv][ _]?(?:line|лин|л)$", "voltage ll"),
-    (rf"(?<![a-z])([uv])[ _]?(ll|ln|lg)[ _]?(?={MARKS}(?![a-z\d]))", r" \2 \1"),  # VLLab, V_LN_A
+    (
+        rf"(?<![a-z])([uv])[ _]?(ll|ln|lg)[ _]?(?={ONE_OR_TWO_MARKS}(?![a-z\d]))",
+        r" \2 \1",
+    ),  # VLLab, V_LN_A
     # PhV.phsA, PPV.phsAB of IEC 61850, V_PH_A
     (r"(?<![a-z])phv(?![a-z])", "voltage ln"),
     (r"(?<![a-z])ppv(?![a-z])", "voltage ll"),

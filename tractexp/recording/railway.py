@@ -158,20 +158,34 @@ def direct_voltage(recording: Recording) -> str:
     """What is said of a recording whose voltages are direct: mean, ripple and dip, one clause; else
     "".
     """
-    volts = [
-        c
-        for c in recording.channels
-        if c.form == "waveform" and kind(c) == "voltage" and not in_doubt(c)
-    ]
-    segment, said = max(recording.segments, key=lambda s: s.stop - s.first), ""
-    for channel in volts:
-        x = channel.values(segment.first, min(segment.stop, segment.first + LONGEST))
-        seen = DirectVoltage.from_values(x, segment.rate)
+    said = ""
+    for number, channel in enumerate(recording.channels):
+        if channel.form != "waveform" or kind(channel) != "voltage" or in_doubt(channel):
+            continue
+        seen, start = _measure_direct(recording, number)
         if seen is not None and seen.alternates:
             return ""
         if seen is not None and seen.is_direct:
-            said = said or seen.describe(channel.name.strip(), segment.start)
+            said = said or f"{seen.describe(channel.name.strip(), start)}; {ALTERNATING}"
     return said
+
+
+def describe_direct_beside(recording: Recording, numbers: Sequence[int]) -> list[str]:
+    """One clause for each of these channels that is a direct voltage, beside alternating ones."""
+    seen = [(i, *_measure_direct(recording, i)) for i in numbers]
+    return [
+        f"{voltage.describe(recording.channels[i].name.strip(), start)}; no load is shown of it"
+        for i, voltage, start in seen
+        if voltage is not None and voltage.is_direct and kind(recording.channels[i]) == "voltage"
+    ]
+
+
+def _measure_direct(recording: Recording, number: int) -> "tuple[DirectVoltage | None, float]":
+    """A channel as a direct voltage, and the time of its first sample [s]."""
+    segment = max(recording.segments, key=lambda s: s.stop - s.first)
+    stop = min(segment.stop, segment.first + LONGEST)
+    values = recording.channels[number].values(segment.first, stop)
+    return DirectVoltage.from_values(values, segment.rate), segment.start
 
 
 @dataclass(frozen=True)
@@ -224,5 +238,5 @@ class DirectVoltage:
         )
         return (
             f"the voltage '{name}' is direct: {1000 * self.mean:.4g} V in the mean with a ripple of"
-            f" {self.alternating / abs(self.mean):.1%} RMS{dip}; {ALTERNATING}"
+            f" {self.alternating / abs(self.mean):.1%} RMS{dip}"
         )
