@@ -146,7 +146,8 @@ def check_alternating(
     if reasons := [reason for reason, holds in telling.items() if holds]:
         raise UserError(
             f"{source}: {direct.describe(name, float(t[0]))}; {ALTERNATING}; told by"
-            f" {' and '.join(reasons)}; if it is an RMS value, say its nominal voltage, {DATA.base_voltage}={level:.3g}"
+            f" {' and '.join(reasons)}; if it is an RMS value, say its nominal voltage,"
+            f" {DATA.base_voltage}={level:.3g}"
         )
     return [
         f"{level:.4g} kV may be a direct voltage of railways: taken as RMS of an alternating one,"
