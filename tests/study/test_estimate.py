@@ -167,7 +167,7 @@ def test_nothing_missing_is_graded_adequate_and_a_step_of_the_load_is_not():
     assert missing.result.adequacy["p"] < 1e-6
     assert "an effect is missing" in missing.headline
     assert "95 % interval" in missing.table().columns
-    assert missing.advice[0] == "find the missing effect: tractexp task=discrepancy"
+    assert missing.advice[0] == "find the missing effect: tractexp.investigate(dips)"
     assert "interval" in repr(missing.parameters["M"])
 
 

@@ -41,7 +41,7 @@ def test_a_shape_has_its_reading(left, words, event):
     assert words in reading.means
     assert reading.source
     assert reading.decides
-    assert reading.command.startswith("tractexp ")
+    assert reading.command.startswith("tractexp")
 
 
 def test_a_ring_that_two_events_share_is_no_function_of_the_voltage(event):

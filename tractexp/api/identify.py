@@ -18,7 +18,7 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.choices import set_holding
 from tractexp.configuration.plugin import plugin
-from tractexp.configuration.run_command import build_again_command, build_folder_command
+from tractexp.configuration.run_command import build_folder_command, suggest_run
 from tractexp.errors import TASK, Stopped, UserError, among
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.result import Result, by_event, conclude, play, refuse_failed
@@ -771,11 +771,11 @@ def _hold_to_machines(setup: FitSpec, result: Result) -> list[str]:
     if model.priors or not (point and point.doubt):
         return []
     if model.held:
-        race = f"race structures for one that is a load: {build_again_command('model=auto')}"
+        race = f"race structures for one that is a load: {suggest_run('model=auto')}"
         return [] if model.race else [race]
     if not any(parameter.physical for parameter in model.model.parameters):
         return []
-    return [f"hold the motor to what machines are: {build_again_command('model.physical=true')}"]
+    return [f"hold the motor to what machines are: {suggest_run('model.physical=true')}"]
 
 
 @plugin

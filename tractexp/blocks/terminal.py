@@ -11,7 +11,7 @@ from tractexp.text.wording import one_line
 PLAIN_LINE_WIDTH = 200  # characters of a line of text that is no terminal's
 COLUMN_GAP = 2  # characters between two columns
 NARROWEST_WORDS = 12  # characters to which a column of words may be folded
-COMMAND = re.compile(r"(?<=: )(tractexp [^;]*)")  # it is copied whole
+COMMAND = re.compile(r"(?<=: )(tractexp[ .][^;]*)")  # it is copied whole
 
 
 def show(report: Report, console: Any, width: int | None = None) -> None:

@@ -9,6 +9,7 @@ from tractexp.configuration import repeatable
 from tractexp.text import quoting
 
 OF_LOAD = ("data", "model", "domain")  # groups
+CALLS = {"discrepancy": "investigate"}  # tasks whose public call has another name
 _started: list[str] = []
 _placed: list[Path] = []
 _roles: dict[str, list[Any]] = {}
@@ -59,6 +60,26 @@ def build_again_command(*settings: str, of: Collection[str] = OF_LOAD) -> str:
         quoting.shell("tractexp", "again", str(folder), *settings) for folder in _placed if possible
     ]
     return min(whole, *by_folder, key=len) if by_folder else whole
+
+
+def suggest_run(*settings: str, of: Collection[str] = OF_LOAD) -> str:
+    """What does something else with the records and the load of this run: as
+    `build_again_command` where a command started it, elsewhere a call in Python, in which its
+    events are called `dips`.
+    """
+    if _started:
+        return build_again_command(*settings, of=of)
+    given = dict(setting.split("=", 1) for setting in settings)
+    task = given.pop("task", "identify")
+    records = given.pop("data", None)
+    values = (f"{key.rpartition('.')[2]}={_write_value(text)}" for key, text in given.items())
+    arguments = ["dips" if records is None else repr(records), *values]
+    return f"tractexp.{CALLS.get(task, task)}({', '.join(arguments)})"
+
+
+def _write_value(text: str) -> str:
+    """A setting's value as Python writes it."""
+    return {"true": "True", "false": "False", "null": "None"}.get(text, repr(text))
 
 
 def build_folder_command(*settings: str) -> str:

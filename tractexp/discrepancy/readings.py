@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from tractexp.configuration.run_command import build_again_command
+from tractexp.configuration.run_command import suggest_run
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.record import Event
 from tractexp.record.identity import Identity
@@ -197,4 +197,4 @@ def _command(which: str, path: str) -> str:
     """The command by which one gets to what decides; waveforms where nobody knows the file."""
     if which == LOOK and path:
         return quoting.shell("tractexp", "look", path, "--all")
-    return build_again_command("task=discrepancy", "domain=waves", of=("data", "task"))
+    return suggest_run("task=discrepancy", "domain=waves", of=("data", "task"))

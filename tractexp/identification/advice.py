@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.configuration.run_command import build_again_command
+from tractexp.configuration.run_command import suggest_run
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.plan import DipShape, Forecast, over_depth
@@ -37,12 +37,12 @@ def advise(
     is missing is looked for in the domain that tells more, where there is one.
     """
     better = [
-        f"{why}: {build_again_command('domain=waves')}"
+        f"{why}: {suggest_run('domain=waves')}"
         for why in better_domain(uncertainty.likelihood.problem)
     ]
     sentences = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
     settings = ["task=discrepancy", f"data={data}"] if data else ["task=discrepancy"]
-    search = build_again_command(*settings)
+    search = suggest_run(*settings)
     if adequacy.grade is Grade.WRONG_MODEL:
         missing = f"find what is missing: {search}; or choose another model: tractexp list model"
         return [*(better or [missing]), *sentences]
