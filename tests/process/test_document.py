@@ -1,8 +1,11 @@
 """Pages as documents for a word processor, and charts as pictures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import tractexp
 from tractexp.blocks import Report
 from tractexp.blocks.block import Markup
 from tractexp.blocks.chart import Chart
@@ -11,6 +14,12 @@ from tractexp.blocks.drawing import draw_chart
 from tractexp.errors import UserError
 
 BLUE = "#0072B2"
+
+
+@pytest.fixture(scope="module")
+def fit():
+    search = {"name": "multistart_least_squares", "starts": 2}
+    return tractexp.identify("tibet_50pct", optimizer=search, check_intervals=False, progress=False)
 
 
 def chart():
@@ -60,3 +69,15 @@ def test_a_chart_is_drawn_in_the_units_of_its_page_without_what_a_click_draws(tm
     waves = Chart("t [s]", ["i [pu]"]).samples("a", 0.0, 1e-3, np.sin(np.arange(300)), BLUE)
     waves.phasors("a", 0.0, 1e-3, np.ones(300) * (1 + 1j), BLUE, 0)
     assert "i [pu]" in draw_chart(waves, tmp_path / "waves.svg").read_text(encoding="utf-8")
+
+
+def test_a_notebook_shows_the_answer_and_one_figure_beside_it(fit):
+    shown = fit._repr_html_()
+    assert shown.count("<svg") == 1
+    assert shown.count("<table") == 1
+    assert "height=" in shown
+    for word in ("T_prime", "doubtful", "measured", "calculated"):
+        assert word in shown
+    alone = replace(fit, behind=None)._repr_html_()
+    assert "<svg" not in alone
+    assert "T_prime" in alone

@@ -429,6 +429,14 @@ class Identification(Written):
 
         return screen.screen(self)
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the answer, and the first event beside it; the answer alone of one
+        that was loaded, whose curves would have to be computed first.
+        """
+        from tractexp.report import glance
+
+        return glance.show_beside(self.screen(), self.behind and self.behind.fits[0])
+
     def report(self) -> Report:
         """The page: measured and calculated power, the residual, parameters, how far to trust
         them.
