@@ -160,7 +160,7 @@ class Chart:
         x, y = style.thin(np.asarray(x, dtype=float), np.asarray(y, dtype=float), MOST_LINE_POINTS)
         shape = {"shape": "hv"} if step else {}
         line = {"color": color, "width": width, "dash": dash, **shape}
-        packed: dict[str, Any] = {"x": _pack_numbers(x, "f8"), "y": _pack_numbers(y, "f4")}
+        packed: dict[str, Any] = {"x": pack_numbers(x, "f8"), "y": pack_numbers(y, "f4")}
         if hidden:
             packed["visible"] = "legendonly"
         return self._add(name, panel, mode="lines", line=line, silent=not legend, **packed)
@@ -348,12 +348,12 @@ class Chart:
         """What lies between two curves, lightly filled."""
         line = {"width": 0, "color": color, **({"shape": "hv"} if step else {})}
         quiet: dict[str, Any] = {"mode": "lines", "line": line, "hoverinfo": "skip"}
-        quiet["x"] = _pack_numbers(np.asarray(x, dtype=float), "f8")
-        self._add(name, panel, y=_pack_numbers(lower, "f4"), silent=True, **quiet)
+        quiet["x"] = pack_numbers(np.asarray(x, dtype=float), "f8")
+        self._add(name, panel, y=pack_numbers(lower, "f4"), silent=True, **quiet)
         return self._add(
             name,
             panel,
-            y=_pack_numbers(upper, "f4"),
+            y=pack_numbers(upper, "f4"),
             fill="tonexty",
             fillcolor=_faint(color),
             **quiet,
@@ -648,7 +648,7 @@ def _encode_values(y: np.ndarray) -> dict[str, Any]:
     return {"bdata": packed, "offset": offset, "scale": scale}
 
 
-def _pack_numbers(values: np.ndarray, kind: str) -> dict[str, str]:
+def pack_numbers(values: np.ndarray, kind: str) -> dict[str, str]:
     """Numbers as Plotly's typed arrays: exact, and a third of the length of their digits."""
     return {
         "dtype": kind,

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tractexp.blocks import style
-from tractexp.blocks.chart import MOST_LINE_POINTS, Chart
+from tractexp.blocks.chart import Chart
 from tractexp.record import Base, Event, Record
 
 EXCESS = "#E69F00"  # shades what stands out
@@ -16,7 +16,8 @@ BAND_DEVIATIONS = 2.0  # standard deviations of the noise band
 PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
 HEIGHTS = (0.9, 1.5, 1.0, 1.5, 1.0)
 PIXELS = 580
-MOST_HIDDEN_POINTS = 1000  # samples of a curve that is drawn on demand only
+# samples of a curve that is drawn on demand only, and of the noise's band
+MOST_HIDDEN_POINTS, MOST_BAND_POINTS = 600, 1000
 CAPTION = (
     "ΔP and ΔQ are measured less calculated. Dotted: the dip begins and ends. Drag to zoom,"
     " double-click to go back."
@@ -100,6 +101,6 @@ def _noise_band(
     chart: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int
 ) -> None:
     """Where noise alone would let a sample lie; every so many samples of a long record."""
-    some = slice(None, None, -(-len(t) // MOST_LINE_POINTS))
+    some = slice(None, None, -(-len(t) // MOST_BAND_POINTS))
     name = f"± {BAND_DEVIATIONS:g} σ of the noise"
     chart.band(name, t[some], (middle - half)[some], (middle + half)[some], style.FAINT, panel)

@@ -1,9 +1,12 @@
 const box = document.currentScript.previousElementSibling;
 const canvas = box.querySelector("canvas"), told = box.querySelector("p"), rows = box.querySelector("div");
 const step = content.event[STEP], {samples} = content;
+const decode = ({bdata}) =>
+  Array.from(new Float32Array(Uint8Array.from(atob(bdata), letter => letter.charCodeAt(0)).buffer));
 Object.entries(content.inputs).forEach(([name, row]) => {
-  if (!Array.isArray(row)) content.inputs[name] = new Array(samples).fill(row);
+  content.inputs[name] = row.bdata ? decode(row) : new Array(samples).fill(row);
 });
+content.measured = content.measured.map(row => decode(row).map(value => Number.isNaN(value) ? null : value));
 content.inputs.t = content.inputs.U.map((_, i) => i * step);
 const fitted = content.places.map(place => content.given[place]), moved = [...fitted];
 const COLORS = ["#D55E00", "#0072B2"], MEASURED = "#9A9A9A", HEIGHT = 360, LEFT = 56, GAP = 26;

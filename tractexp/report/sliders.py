@@ -8,6 +8,7 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.block import Markup
+from tractexp.blocks.chart import pack_numbers
 from tractexp.cache import store
 from tractexp.errors import UserError
 from tractexp.kernel.layout import PHASOR_INPUTS
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from tractexp.api.identify import Identification
 
 MOST_PAGE_STEPS = 20_000  # Runge-Kutta steps of the event: a browser takes some ten milliseconds
-DIGITS = 7  # after the point, of what the page carries
 
 
 def add_sliders(page: Report, fit: "Identification") -> None:
@@ -84,18 +84,12 @@ def _collect(fit: "Identification") -> dict[str, Any]:
         "samples": len(record.t),
         "inputs": {name: _pack(row) for name, row in rows.items() if name != "t"},
         "first": float(record.t[0]),
-        "measured": [
-            [x if np.isfinite(x) else None for x in _round(getattr(record, c))] for c in "PQ"
-        ],
+        "measured": [pack_numbers(getattr(record, c), "f4") for c in "PQ"],
         "substeps": substeps,
         "scale": own.power if own.in_mva else None,
     }
 
 
-def _pack(row: np.ndarray) -> list[float] | float:
+def _pack(row: np.ndarray) -> dict[str, str] | float:
     """A row of the inputs; one number where it stands still."""
-    return float(row[0]) if np.all(row == row[0]) else _round(row)
-
-
-def _round(values: np.ndarray) -> list[float]:
-    return np.round(values, DIGITS).tolist()
+    return float(row[0]) if np.all(row == row[0]) else pack_numbers(row, "f4")
