@@ -82,7 +82,8 @@ def off(*names, error, deviance):
 
 
 @pytest.mark.parametrize(
-    ("share", "told"), [(0.9, "named"), (0.49, "candidate"), (np.nan, "candidate")]
+    ("share", "told"),
+    [(0.9, "named"), (0.49, "candidate"), (np.nan, "candidate"), (None, "candidate")],
 )
 def test_what_held_out_events_chose_is_named_if_each_event_left_out_in_turn_shows_it(share, told):
     """Whatever the fitted events alone put first."""

@@ -5,6 +5,7 @@ hide.
 import numpy as np
 import pytest
 
+from tractexp.discrepancy.explain import explain_replication
 from tractexp.discrepancy.replication import Replication
 
 
@@ -25,3 +26,16 @@ def test_the_least_share_counts(expected, gained, share):
 def test_events_that_noise_hides_confirm_nothing():
     told = Replication((0.05, 0.05, 0.05), (0.05, 0.05, 0.05), (0.1, 0.1, 0.1))
     assert np.isnan(told.least_share)
+
+
+@pytest.mark.parametrize(
+    ("replicated", "told"),
+    [
+        (None, "none is left to confirm it"),
+        (np.nan, "no event by itself, left out, shows more of it than noise hides"),
+        (0.3, "of what an event shows of it 30% is left where that is not fitted"),
+        (-2.0, "of what an event shows of it 0% is left where that is not fitted"),
+    ],
+)
+def test_why_events_left_out_do_not_confirm_is_told_by_what_they_showed(replicated, told):
+    assert explain_replication(replicated).startswith(told)

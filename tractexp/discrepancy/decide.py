@@ -125,7 +125,8 @@ def is_confirmed(row: SetEvidence, evidence: Evidence) -> bool:
     left out, that shows them.
     """
     if chose_by_all(row, evidence):
-        return row.replicated_share >= CONFIRMED_SHARE
+        share = row.replicated_share
+        return share is not None and share >= CONFIRMED_SHARE
     return all(gap.is_shown for gap in row.gaps)
 
 

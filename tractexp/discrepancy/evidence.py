@@ -140,8 +140,8 @@ class SetEvidence:
     # of its sizes: on a bound, or not known within their bounds, in words
     open_sizes: tuple[str, ...] = ()
     # the share of what it takes away of events with all fitted that it takes away with each left
-    # out in turn, the least; where that was asked
-    replicated_share: float = np.nan
+    # out in turn, the least; nan where noise hides it in each of them, None where none is left out
+    replicated_share: float | None = None
     tests: Disagreement | None = None  # at its fit
     final: Refit | None = None  # without the faults of the measurement that do not help
 

@@ -207,13 +207,19 @@ def _explain_doubt(row: SetEvidence, evidence: Evidence, *, all_fitted: bool) ->
         why = "only all events together show it, so all were fitted"
     else:
         why = "no event was held out to confirm it"
-        if np.isnan(row.replicated_share):
+        if row.replicated_share is None:
             return why
-    if np.isnan(row.replicated_share):
-        return f"{why}, and none is left to confirm it"
-    share = max(row.replicated_share, 0.0)
+    return f"{why}, and {explain_replication(row.replicated_share)}"
+
+
+def explain_replication(replicated: float | None) -> str:
+    """Why events that are left out in turn do not confirm a set."""
+    if replicated is None:
+        return "none is left to confirm it"
+    if np.isnan(replicated):
+        return "no event by itself, left out, shows more of it than noise hides"
     return (
-        f"{why}, and of what an event shows of it {share:.0%} is left where that is not fitted:"
+        f"of what an event shows of it {max(replicated, 0.0):.0%} is left where that is not fitted:"
         f" {CONFIRMED_SHARE:.0%} of each confirms it"
     )
 
