@@ -58,6 +58,7 @@ HEAD = [
     "right by class",
     "wrong",
     "wrong by class",
+    "candidates",
     "silent",
 ]
 Row = dict[str, Any]
@@ -115,9 +116,10 @@ def make_table(rows: list[Row], newest: str) -> str:
         cells = [evidence.share(count, len(own)) for count in counts]
         if not any(row["truth"] or row["group"].startswith(study.LEFT_OUT) for row in own):
             cells[:2] = "", ""
+        candidates = sum(row["verdict"] == "candidate" for row in own)
         silent = sum(row["verdict"] in SILENT for row in own)
         version = newest[:8] if is_newest else "before"
-        lines.append([what, version, len(own), *cells, silent])
+        lines.append([what, version, len(own), *cells, candidates, silent])
     return marked.table(HEAD, lines)
 
 

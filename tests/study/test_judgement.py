@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import false_alarms
 import hidden_effects_evidence as evidence
 import hidden_effects_study as study
+import judgement_pooled
 import marked
 import numpy as np
 import pytest
@@ -225,3 +226,40 @@ def test_rows_are_json_lines(tmp_path):
     path = tmp_path / "rows.jsonl"
     path.write_text("".join(json.dumps(row(seed=k)) + "\n" for k in range(3)), encoding="utf-8")
     assert [r["seed"] for r in evidence.read(path)] == [0, 1, 2]
+
+
+def test_the_docs_hold_what_all_sets_together_hold():
+    rows = evidence.read(judgement_pooled.STORED)
+    page = (study.ROOT / "docs" / evidence.PAGE).read_text(encoding="utf-8")
+    _, made, _ = marked.parted(page, judgement_pooled.MARK)
+    assert made.strip() == judgement_pooled.make_table(rows, rows[-1]["frozen"])
+    keys = [(row["frozen"], row["group"], row["label"], row["seed"]) for row in rows]
+    assert len({*keys}) == len(keys) > 1_100
+
+
+@pytest.mark.parametrize(
+    ("sets", "right", "by_class", "wrong", "wrong_by_class"),
+    [
+        ([["stator_resistance"]], True, True, False, False),
+        ([["feeder_impedance"]], False, True, True, False),
+        ([["feeder_impedance"], ["stator_resistance"]], False, True, False, False),
+        ([["dc_link_lag"]], False, False, True, True),
+        ([["dc_link_lag", "stator_resistance"]], False, False, True, True),
+        ([["dc_link_lag"], ["feeder_impedance"]], False, True, True, False),
+        ([], False, False, False, False),
+    ],
+)
+def test_a_name_counts_by_label_and_by_class(sets, right, by_class, wrong, wrong_by_class):
+    row = {
+        "group": "4 x",
+        "label": "stator_resistance",
+        "truth": ["stator_resistance"],
+        "verdict": "named" if sets else "none",
+        "sets": sets,
+    }
+    left_out = row | {"group": "left out 8 x", "truth": []}
+    for one in (row, left_out):
+        assert judgement_pooled.is_right(one) == right
+        assert judgement_pooled.is_right(one, by_class=True) == by_class
+        assert judgement_pooled.is_wrong(one) == wrong
+        assert judgement_pooled.is_wrong(one, by_class=True) == wrong_by_class
