@@ -256,3 +256,14 @@ def test_of_two_columns_of_a_unit_none_is_taken_by_it(tmp_path):
     t, U, P, Q = slow()
     with pytest.raises(tractexp.UserError, match="column P is missing"):
         read(tmp_path / "a.csv", "t,U (kV),Moc (MW),Straty (MW),Q (Mvar)", [t, U, P, P / 9, Q])
+
+
+def test_three_voltages_and_currents_of_any_name_are_those_of_the_phases(tmp_path):
+    t = np.arange(0, 2, 1 / 1600)
+    u = np.where((t >= 1) & (t < 1.2), 0.7, 1.0) * np.sqrt(2)
+    turn = np.exp(2j * np.pi * (50 * t - np.arange(3)[:, None] / 3))
+    V = np.real(u * SIZE[0] / np.sqrt(3) * turn)
+    I = np.real(u * np.conj(SIZE[1] + 1j * SIZE[2]) / np.sqrt(3) / SIZE[0] * turn)
+    names = [f"CH{k} ({unit})" for k, unit in enumerate(["kV"] * 3 + ["kA"] * 3)]
+    got, _ = read(tmp_path / "a.csv", ",".join(["t", *names]), [t, *V, *I])
+    assert got == pytest.approx(SIZE, rel=0.01)

@@ -11,7 +11,7 @@ from typing import Any
 from tractexp.errors import DATA, UserError, among, nearest, setting
 from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.clock import first_day, is_time
-from tractexp.filetypes.columns import Role, fits, is_unit, order_of, role
+from tractexp.filetypes.columns import Role, fits, is_unit, meaning, order_of, role
 from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.table import TableFile
 from tractexp.recording.unit import amount
@@ -39,8 +39,7 @@ OF: Mapping[str, tuple[str, ...]] = {  # {quantity as data.units names it: units
     "angle": ("deg", "rad"),
 }
 QUANTITIES = tuple(OF)
-# {key: how the units end that only it has}
-BY_UNIT_ALONE = {"U": ("kv", "кв", "千伏"), "P": ("w", "вт", "瓦"), "Q": ("var", "вар", "乏")}
+BY_UNIT_ALONE = {"U": "voltage", "I": "current", "P": "power", "Q": "reactive"}
 
 
 @dataclass(frozen=True)
@@ -291,14 +290,26 @@ def _add_by_unit(
     heading: TableHeading, unnamed: Sequence[int], options: dict[str, list[MappedColumn]]
 ) -> dict[str, list[MappedColumn]]:
     """The options with the columns whose names say nothing, in whatever language, and whose units
-    say voltage, P or Q: where no column is called so, and one alone has such a unit.
+    say voltage, P or Q: where no column is called so, and one alone has such a unit. Three voltages
+    and three currents are those of the phases.
     """
-    for key, units in BY_UNIT_ALONE.items():
-        fitting = [k for k in unnamed if heading.units[k].lower().endswith(units)]
-        if len(fitting) == 1 and not any(other[0] == key for other in options):
-            [k] = fitting
-            options[key] = [MappedColumn(k, heading.names[k], Role(key, heading.units[k]))]
+    fitting = {
+        key: [k for k in unnamed if _is_measured_in(heading.units[k], quantity)]
+        for key, quantity in BY_UNIT_ALONE.items()
+        if not any(other[0] == key for other in options)
+    }
+    phases = [len(fitting.get(key, ())) for key in "UI"] == [3, 3]
+    for key, numbers in fitting.items():
+        keys = [key + p for p in PHASES] if phases and key in "UI" else [key]
+        if len(keys) == len(numbers):
+            for one, k in zip(keys, numbers, strict=True):
+                options[one] = [MappedColumn(k, heading.names[k], Role(one, heading.units[k]))]
     return options
+
+
+def _is_measured_in(unit: str, quantity: str) -> bool:
+    """Whether a unit is one of a quantity; those of apparent power are none."""
+    return (meaning(unit) or ("",))[0] == quantity and not unit.lower().endswith("va")
 
 
 def find_other_columns(table: TableFile, taken: Collection[int]) -> list[int]:
