@@ -84,8 +84,6 @@ def report_search(
     """Yield the search loop's progress callback: a live line, or a line now and then in a log file;
     None for False.
     """
-    from rich.progress import BarColumn, TextColumn
-
     if progress is False:
         yield None
         return
@@ -104,6 +102,8 @@ def report_search(
 
         yield line
         return
+    from rich.progress import BarColumn, TextColumn
+
     columns = [
         TextColumn("  searching"),
         BarColumn(bar_width=24),
@@ -130,8 +130,6 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
 
     A callable gets a line for each.
     """
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-
     if progress is False:
         yield lambda: None
         return
@@ -140,6 +138,8 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
         yield lambda: progress(f"{next(ended)} of {total} {what}")
         return
     if _lively():
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
         columns = [
             TextColumn(f"  {what}"),
             BarColumn(bar_width=30),
