@@ -218,6 +218,20 @@ def test_a_direct_voltage_beside_alternating_ones_is_told(tmp_path):
     assert "no load is shown of it" in notes
 
 
+@pytest.mark.parametrize(
+    ("kilovolts", "part"),
+    [(110 / 3**0.5, True), (33 / 3**0.5, True), (27.5, False), (15.9, False), (25.8, False)],
+)
+def test_one_phase_of_three_is_told_by_its_voltage(tmp_path, kilovolts, part):
+    t = np.arange(0, 2, 1 / RATE)
+    V = kilovolts * np.where((t >= 1) & (t < 1.2), 0.7, 1.0)
+    rows = [("UA", "kV", waves(V, t)[0]), ("IA", "kA", waves(0.1 * V / kilovolts, t)[0])]
+    seen, first = look(written(tmp_path, t, rows))
+    [load] = seen.feeders
+    assert ("one phase of a three-phase load" in load["name"]) == part
+    assert ("one phase of a three-phase load" in first) == part
+
+
 def test_secondary_values_show_no_megawatts_until_the_ratio_is_given(tmp_path):
     t = np.arange(0, 2, 1 / RATE)
     rows = [

@@ -24,6 +24,7 @@ from tractexp.recording.label import (
     shared_name,
     words,
 )
+from tractexp.recording.nominal_voltage import is_to_ground
 from tractexp.recording.railway import (
     conductor_pairs,
     contact_first,
@@ -37,7 +38,7 @@ from tractexp.recording.railway import (
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots, frequency, nearest_nominal, snapshots
 from tractexp.recording.transformer import mark_other_sides
-from tractexp.recording.unit import in_doubt
+from tractexp.recording.unit import in_doubt, secondary_of
 
 # three magnitudes this close, as a share of their mean, may be three phases
 LARGEST_PHASE_DIFFERENCE = 0.1
@@ -647,7 +648,9 @@ def _part_of_railway(
 def _part_of_phases(
     recording: Recording, phasors: Snapshots, volts: Sequence[int], voltage: int
 ) -> tuple[str, ...]:
-    """What is said of a single voltage that is one of several phases, by its name and angle."""
+    """What is said of a single voltage that is one of several phases: by its name and angle, or by
+    its size.
+    """
     x, channels = phasors.select_channels([voltage])[0], recording.channels
     for other in volts:
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -656,6 +659,10 @@ def _part_of_phases(
         alike = abs(abs(ratio) - 1) < LARGEST_PHASE_DIFFERENCE and abs(apart - 120) < SYMMETRIC
         if other != voltage and alike and order([channels[voltage], channels[other]]):
             return (f"{ONE_PHASE}: its voltage is 120 degrees from {_names(recording, [other])}",)
+    kilovolts = phasors.size([voltage])
+    if is_to_ground(kilovolts) and not secondary_of(recording, {"U": [voltage]}):
+        line = np.sqrt(3) * kilovolts
+        return (f"{ONE_PHASE}: {line:.4g} kV, sqrt(3) times its voltage, is a nominal one",)
     return ()
 
 

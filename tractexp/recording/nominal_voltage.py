@@ -43,6 +43,7 @@ NOMINAL_VOLTAGES = (
     500.0,
     765.0,
 )
+SINGLE_PHASE = (15.0, 25.0, 27.5)  # kV of railways: no voltage between phases
 LARGEST_NOMINAL_DISTANCE = 0.03  # of a nominal voltage: what is nearer has it
 FAR = 0.08  # of every nominal voltage: what is farther has none
 
@@ -61,3 +62,13 @@ def is_between_phases(voltage: float) -> bool:
     return (
         off_nominal(voltage) < LARGEST_NOMINAL_DISTANCE and off_nominal(np.sqrt(3) * voltage) > FAR
     )
+
+
+def is_to_ground(voltage: float) -> bool:
+    """Whether a voltage [kV] is near no nominal one as it stands, and times sqrt 3 near one of
+    three phases.
+    """
+    line = float(np.sqrt(3)) * voltage
+    nearest = min(NOMINAL_VOLTAGES, key=lambda each: abs(np.log(max(line, 1e-12) / each)))
+    near = [off_nominal(each) < LARGEST_NOMINAL_DISTANCE for each in (voltage, line)]
+    return near == [False, True] and nearest not in SINGLE_PHASE
