@@ -24,16 +24,15 @@ from tractexp.identification.composition import (
 )
 from tractexp.identification.forecast import TOLD_DEPTH, Forecast, tell_of_dip
 from tractexp.identification.station import (
-    Constants,
     Dip,
     LoadSpec,
     Predicted,
     SharedFit,
     find_band,
     fit_dips,
-    judge_constants,
     predict_in_turn,
 )
+from tractexp.identification.station_constants import Constants, judge_constants
 from tractexp.identification.station_result import build_result
 from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
 from tractexp.inference.model_error import model_error
@@ -44,6 +43,7 @@ from tractexp.storage import files
 
 FEWEST_DIPS = 2  # of a load that is fitted
 KEPT_BEFORE, KEPT_AFTER = 0.6, 1.5  # s of a record before its dip and after it
+KEPT_RATE = 400.0  # Hz: phasors are means over a cycle, and years of dips are kept in memory
 MOST_RACED = 4  # dips on which structures are raced
 MOST_CURVES = 6  # dips that are drawn: the last ones that were predicted
 
@@ -77,12 +77,13 @@ def read_dips(folder: str, wanted: tuple[str, Sequence[str]]) -> list[Read]:
 
 
 def _cut_out(record: Record) -> Record:
-    """The record about its dip: years of dips are kept in memory."""
+    """The record about its dip, as few samples as show it."""
     event = detect(record)
-    record, n = event.record, event.record.rate
-    first = max(0, event.start - round(KEPT_BEFORE * n))
-    stop = min(record.samples, event.end + round(KEPT_AFTER * n))
-    return replace(record.part(slice(first, stop)), waves=None)
+    record, rate = event.record, event.record.rate
+    first = max(0, event.start - round(KEPT_BEFORE * rate))
+    stop = min(record.samples, event.end + round(KEPT_AFTER * rate))
+    every = max(1, round(rate / KEPT_RATE))
+    return replace(record.part(slice(first, stop, every)), waves=None)
 
 
 def read_files(

@@ -97,6 +97,7 @@ COLUMNS = {HOUR: slice(1, 5), WEEKDAY: slice(5, 12), SEASON: slice(12, 14), YEAR
 
 def _describe_grid(term: str) -> tuple[list[str], np.ndarray]:
     """Labels and columns (n, 15) at which a term is told."""
+    labels: list[str]
     if term == HOUR:
         labels = [f"{hour:02d}:30" for hour in range(24)]
         points = [_harmonics((hour + 0.5) / 24, 2) for hour in range(24)]

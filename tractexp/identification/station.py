@@ -6,7 +6,7 @@ grows with the number of dips and no faster. How far the constants scatter is to
 one dip at a time. A dip that the others' model misses by far is left out, and told.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
@@ -17,14 +17,11 @@ from tractexp.identification.composition import Composition, estimate_compositio
 from tractexp.identification.result import TRAIN, VALIDATE, Fit, explain_refusal, respond
 from tractexp.inference.blocks import blocks_of
 from tractexp.inference.differences import central_differences
-from tractexp.inference.information import Information
-from tractexp.inference.interval import interval_factor
 from tractexp.inference.least_squares import descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import model_error
 from tractexp.inference.multistart import explore_minima, screen_points
 from tractexp.inference.prediction_band import PredictionBand, measure_band
-from tractexp.inference.sandwich import SINGULAR_ROUNDING, moves_without_blocks, robust_root
 from tractexp.inference.sized_problem import SizedProblem
 from tractexp.model.model import Model
 from tractexp.noise.color import SMALLEST_DEVIATION
@@ -41,9 +38,7 @@ FEWEST_JUDGED_DIPS = 5  # of which one can be odd
 LEAST_ODD, ODD_RATIO, ODD_DEVIATIONS = 0.03, 2.0, 6.0
 MOST_ROUNDS = 3  # of leaving odd dips out and fitting again
 GROWTH = 1.5  # by which dips become more until constants are fitted again, as the years go
-CONSTANT_CHANCE = 1e-3  # of a constant that looks as if it differed from dip to dip
-LEAST_WEIGHT, SMALLEST_SQUARE = 1e-12, 1e-30  # of what tells nothing
-LEAST_VARIATION = 0.05  # of its value: what differs by less is a constant
+SMALLEST_SQUARE = 1e-30  # of what tells nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,16 +133,23 @@ def fit_dips(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None = Non
     Raises `UserError` where nothing in the bounds can be simulated.
     """
     odd: dict[int, str] = {}
+    fit = _fit_regular(spec, dips, odd, start)
     for _ in range(MOST_ROUNDS):
-        kept = [k for k in range(len(dips)) if k not in odd]
-        told = sorted(kept, key=lambda k: -dips[k].promise)[:MOST_FITTED_DIPS]
-        start = _fit_constants(spec, [dips[k] for k in told], start)
-        fit = _fit_torques(spec, dips, start)
         found = _find_odd(fit, odd)
         if found.keys() <= odd.keys():
             break
         odd |= found
-    return replace(fit, odd=dict(odd))
+        fit = _fit_regular(spec, dips, odd, fit.constants)
+    return replace(fit, odd=odd)
+
+
+def _fit_regular(
+    spec: LoadSpec, dips: Sequence[Dip], odd: Collection[int], start: np.ndarray | None
+) -> SharedFit:
+    """Constants fitted to the dips that are not odd, and the torques of all."""
+    regular = [dip for k, dip in enumerate(dips) if k not in odd]
+    told = sorted(regular, key=lambda dip: -dip.promise)[:MOST_FITTED_DIPS]
+    return _fit_torques(spec, dips, _fit_constants(spec, told, start))
 
 
 def _fit_constants(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None) -> np.ndarray:
@@ -168,7 +170,7 @@ def _fit_constants(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None
 def _search_constants(problem: SizedProblem) -> np.ndarray:
     """The constants (k,) of the best fit to few dips, from all over the box."""
     points, least = screen_points(problem)
-    ends = explore_minima(_weigh(problem, least), points)
+    ends = explore_minima(weigh_squares(problem, least), points)
     if not np.isfinite(ends.deviance.min(initial=np.inf)):
         raise UserError(
             f"{problem.events[0].record.name}: nothing in the bounds of the model can be simulated;"
@@ -177,7 +179,7 @@ def _search_constants(problem: SizedProblem) -> np.ndarray:
     return problem.space.from_unit(ends.best)[problem.constants]
 
 
-def _weigh(problem: SizedProblem, objective: float) -> Likelihood:
+def weigh_squares(problem: SizedProblem, objective: float) -> Likelihood:
     """Least squares in units of what an objective [pu²] leaves."""
     return Likelihood.of_squares(problem, max(float(np.sqrt(objective)), SMALLEST_DEVIATION))
 
@@ -192,7 +194,7 @@ def _place(problem: SizedProblem, constants: np.ndarray) -> tuple[Likelihood, np
     units = np.empty((TRIED_TORQUES, problem.space.dimension))
     units[:] = tried[:, None]
     units[:, at] = np.clip((constants - low) / span, 0.0, 1.0)
-    likelihood = _weigh(problem, 1.0)
+    likelihood = weigh_squares(problem, 1.0)
     rows = likelihood.rows(units)
     squares = np.stack([np.sum(rows[:, mine] ** 2, axis=1) for mine in problem.separable.rows])
     squares = np.where(np.isfinite(squares), squares, np.inf)
@@ -201,38 +203,50 @@ def _place(problem: SizedProblem, constants: np.ndarray) -> tuple[Likelihood, np
     objective = float(np.sum(squares.min(axis=1)))
     if not np.isfinite(objective):
         objective = 1.0
-    return _weigh(problem, objective / problem.drive.samples), unit
+    return weigh_squares(problem, objective / problem.drive.samples), unit
 
 
 def _fit_torques(spec: LoadSpec, dips: Sequence[Dip], constants: np.ndarray) -> SharedFit:
     """The torque of each of the dips with the constants (k,) held, as many at once as constants
     are fitted to.
     """
-    torques, errors, fits = [], [], []
-    for first in range(0, len(dips), MOST_FITTED_DIPS):
-        some = dips[first : first + MOST_FITTED_DIPS]
-        problem = spec.pose([dip.event for dip in some])
-        likelihood, unit = _place(problem, constants)
-        frozen = np.ones((1, len(unit)), dtype=bool)
-        frozen[:, problem.shares] = False
-        ended = descend(
-            likelihood.rows,
-            unit[None],
-            frozen,
-            apart=problem.separable,
-        )
-        unit = ended.unit[0]
-        values = likelihood.values(unit)
-        torques.append(values[problem.shares])
-        errors.append(_scatter_torques(likelihood, problem, unit))
-        for own, event in zip(problem.by_event(values)[:, 0], problem.events, strict=True):
-            fits.append(respond(problem.model, own, event, TRAIN))
-    every = np.concatenate(torques), np.concatenate(errors)
+    starts = range(0, len(dips), MOST_FITTED_DIPS)
+    parts = [
+        _fit_some_torques(spec, dips[first : first + MOST_FITTED_DIPS], constants)
+        for first in starts
+    ]
+    return replace(
+        parts[-1],
+        dips=dips,
+        torques=np.concatenate([part.torques for part in parts]),
+        errors=np.concatenate([part.errors for part in parts]),
+        fits=[fit for part in parts for fit in part.fits],
+    )
+
+
+def _fit_some_torques(spec: LoadSpec, dips: Sequence[Dip], constants: np.ndarray) -> SharedFit:
+    """The same of dips that are fitted at once."""
+    problem = spec.pose([dip.event for dip in dips])
+    likelihood, unit = _place(problem, constants)
+    frozen = np.ones((1, len(unit)), dtype=bool)
+    frozen[:, problem.shares] = False
+    ended = descend(
+        likelihood.rows,
+        unit[None],
+        frozen,
+        apart=problem.separable,
+    )
+    values = likelihood.values(ended.unit[0])
+    fits = []
+    for own, event in zip(problem.by_event(values)[:, 0], problem.events, strict=True):
+        fits.append(respond(problem.model, own, event, TRAIN))
+    errors = _scatter_torques(likelihood, problem, ended.unit[0])
     return SharedFit(
         problem,
         values,
         dips,
-        *every,
+        values[problem.shares],
+        errors,
         fits,
     )
 
@@ -241,7 +255,7 @@ def _scatter_torques(likelihood: Likelihood, problem: SizedProblem, unit: np.nda
     """Standard errors (E,) [pu] of the torques: by how much they move where blocks of their dip are
     left out.
     """
-    rows, J = _differentiate(likelihood, problem, unit)
+    rows, J = differentiate(likelihood, problem, unit)
     drive, torque = problem.drive, J[-1]
     acting = np.sum((torque * rows).reshape(drive.channels, -1), axis=0)
     weight = np.sum((torque**2).reshape(drive.channels, -1), axis=0)
@@ -249,7 +263,7 @@ def _scatter_torques(likelihood: Likelihood, problem: SizedProblem, unit: np.nda
     counts = np.zeros(drive.events)
     whole = np.add.reduceat(weight, drive.first[:-1])
     for block in blocks_of(problem.events, problem.drive):
-        e = _find_event(problem, block)
+        e = find_event(problem, block)
         left = max(whole[e] - weight[block].sum(), SMALLEST_SQUARE)
         squares[e] += (acting[block].sum() / left) ** 2
         counts[e] += 1
@@ -259,7 +273,7 @@ def _scatter_torques(likelihood: Likelihood, problem: SizedProblem, unit: np.nda
     return width[problem.shares] * errors
 
 
-def _find_event(problem: SizedProblem, block: slice) -> int:
+def find_event(problem: SizedProblem, block: slice) -> int:
     """The event that a block of samples is of."""
     return int(np.searchsorted(problem.drive.first, block.start, "right")) - 1
 
@@ -285,72 +299,7 @@ def _find_odd(fit: SharedFit, known: Mapping[int, str]) -> dict[int, str]:
     }
 
 
-@dataclass(frozen=True, eq=False)
-class Constants:
-    """What is known of the constants: their `information`, on the base of what the motors draw
-    themselves, `factor` of a 95 % interval, and `spreads` {name: how far it differs from dip to
-    dip, as a share of it}, of those that do.
-    """
-
-    information: Information
-    factor: float
-    spreads: Mapping[str, float]
-
-    @property
-    def intervals(self) -> np.ndarray:
-        """(k, 2), 95 %."""
-        half = self.factor * self.information.standard_errors
-        return self.information.values[:, None] + half[:, None] * [-1.0, 1.0]
-
-
-def judge_constants(spec: LoadSpec, fit: SharedFit) -> Constants:
-    """How far the constants of a fit scatter, and which are none."""
-    dips = [fit.dips[k] for k in fit.regular]
-    torques = fit.torques[fit.regular]
-    some = sorted(range(len(dips)), key=lambda k: -dips[k].promise)[:MOST_FITTED_DIPS]
-    problem = spec.pose([dips[k].event for k in some])
-    values = np.empty(problem.space.dimension)
-    values[problem.constants] = fit.constants
-    values[problem.shares] = torques[some]
-    likelihood = _weigh(problem, float(problem.objective(values[None])[0]))
-    unit = likelihood.to_unit(values)[0]
-    rows, J = _differentiate(likelihood, problem, unit)
-    own = _project_out(J, problem)
-    rows = rows.reshape(problem.drive.channels, -1)
-    columns = own.T.reshape(*rows.shape, -1)
-    blocks = _choose_blocks(problem)
-    moved = moves_without_blocks(
-        columns,
-        rows,
-        blocks,
-        own @ own.T,
-    )
-    root, _, _ = robust_root(own.T, moved)
-    scale = problem.scale_to_own_power
-    values = fit.constants * scale
-    width = (problem.upper - problem.lower)[problem.constants]
-    names = tuple(problem.space.names[k] for k in problem.constants)
-    information = Information(
-        names,
-        values,
-        width * scale,
-        root,
-        SINGULAR_ROUNDING,
-    )
-    spreads = _find_spreads(problem, columns, rows, fit.constants)
-    factor = interval_factor(max(len(blocks) - 1, 1))
-    return Constants(information, factor, spreads)
-
-
-def _choose_blocks(problem: SizedProblem) -> list[slice]:
-    """What is left out in turn: each dip, and stretches where there are few of them."""
-    free = len(problem.constants)
-    if problem.drive.events <= free:
-        return blocks_of(problem.events, problem.drive, free)
-    return [problem.drive.part(e) for e in range(problem.drive.events)]
-
-
-def _differentiate(
+def differentiate(
     likelihood: Likelihood, problem: SizedProblem, unit: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows (R,) at coordinates (D,), and derivatives (k + 1, R): to the constants, then to the
@@ -364,57 +313,6 @@ def _differentiate(
         problem.separable,
     )
     return rows[0], J[0]
-
-
-def _project_out(J: np.ndarray, problem: SizedProblem) -> np.ndarray:
-    """Derivatives (k, R) to the constants, of (k + 1, R), less what each dip's torque does."""
-    own = J[:-1].copy()
-    for mine in problem.separable.rows:
-        torque = J[-1, mine]
-        size = max(float(torque @ torque), SMALLEST_SQUARE)
-        part = own[:, mine] @ torque / size
-        own[:, mine] -= np.outer(part, torque)
-    return own
-
-
-def _find_spreads(
-    problem: SizedProblem, columns: np.ndarray, rows: np.ndarray, constants: np.ndarray
-) -> dict[str, float]:
-    """By how much constants differ from dip to dip beyond chance, as shares of them: of one step of
-    each dip's own, the others held. Source: DerSimonian and Laird 1986.
-    """
-    from scipy.special import chdtri
-
-    blocks = blocks_of(problem.events, problem.drive)
-    events = [_find_event(problem, block) for block in blocks]
-    spreads = {}
-    width = (problem.upper - problem.lower)[problem.constants]
-    for k, value in enumerate(constants.tolist()):
-        acting = np.zeros(problem.drive.events)
-        weight = np.zeros_like(acting)
-        squares = np.zeros_like(acting)
-        for e, block in zip(events, blocks, strict=True):
-            own = columns[:, block, k]
-            told = float(np.sum(own * rows[:, block]))
-            acting[e] -= told
-            weight[e] += np.sum(own**2)
-            squares[e] += told**2
-        seen = weight > LEAST_WEIGHT * weight.max()
-        weight = weight[seen]
-        step = acting[seen] / weight
-        precision = weight**2 / np.maximum(squares[seen], SMALLEST_SQUARE)
-        mean = np.average(step, weights=precision)
-        excess = float(np.sum(precision * (step - mean) ** 2))
-        freedom = int(seen.sum()) - 1
-        if freedom < 1 or excess <= chdtri(freedom, CONSTANT_CHANCE):
-            continue
-        total = np.sum(precision)
-        room = total - np.sum(precision**2) / total
-        step_spread = np.sqrt(max(excess - freedom, 0.0) / room)
-        spread = width[k] * step_spread / abs(value)
-        if spread > LEAST_VARIATION:
-            spreads[problem.space.names[problem.constants[k]]] = float(spread)
-    return spreads
 
 
 @dataclass(frozen=True, eq=False)

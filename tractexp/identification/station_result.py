@@ -16,7 +16,8 @@ from tractexp.identification.result import (
     model_errors,
     relative_errors,
 )
-from tractexp.identification.station import Constants, LoadSpec, SharedFit
+from tractexp.identification.station import LoadSpec, SharedFit
+from tractexp.identification.station_constants import Constants
 from tractexp.record import OwnBase
 from tractexp.record.identity import Identity
 

@@ -247,7 +247,7 @@ class _Report:
             return []
         if V[-1] > LEAST_DECAY * V[0] or f[-1] >= f[0]:
             return []
-        drawn = float(np.median(self.course.S[running].real)) / power
+        drawn = float(np.median(np.real(self.course.S[running]))) / power
         before = float(np.median(self.course.f[running]))
         decays = _fit_slopes(t, np.log(V / f), 1)
         # braked by the torque of before, and by one that falls with the speed
