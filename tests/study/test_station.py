@@ -200,3 +200,11 @@ def test_a_model_that_cannot_be_shared_is_told_of_each_load(made, settings, sent
 def test_the_spread_of_single_dips_is_told(fitted):
     for load in fitted.loads:
         assert load["spread"] < 6 * SCATTER
+
+
+def test_the_answer_is_one_screen(fitted):
+    lines = str(fitted.screen()).splitlines()
+    assert len(lines) <= 25
+    assert all(len(line) <= 80 for line in lines[:5])
+    for load in fitted.loads:
+        assert any(line.startswith(f"{load['load']}: motors") for line in lines)

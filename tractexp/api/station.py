@@ -105,6 +105,10 @@ class Station(Written):
         """What each load is, and what differs from dip to dip."""
         return shown.summary(self.content)
 
+    def screen(self) -> Report:
+        """The answer on one screen of a terminal."""
+        return shown.screen(self.content)
+
     def report(self) -> Report:
         """The page: each load over the years."""
         return shown.report(self.content)

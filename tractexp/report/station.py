@@ -3,6 +3,7 @@ were predicted.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime
 from typing import Any
 
@@ -12,9 +13,10 @@ from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
 from tractexp.identification.composition import DAYS_A_YEAR, HOUR
 from tractexp.inference.model_error import in_percent
-from tractexp.text.wording import count_noun, list_first
+from tractexp.text.wording import count_noun, list_first, shorten
 
-MOST_SCREEN_LOADS = 8  # loads of the first screen
+MOST_SCREEN_ROWS, MOST_SCREEN_LOADS = 8, 4  # loads of the first screen, and those it describes
+TWO_LINES = 150  # characters
 MOST_TOLD_ODD = 3  # odd dips that a line names
 TOLD_CONSTANTS = ("T_prime", "X_prime", "H")  # of a load's row
 TERM_NAMES = {
@@ -61,7 +63,7 @@ def tabulate_loads(content: Mapping[str, Any]) -> Table:
         [
             load["load"] or load["station"],
             load["dips"],
-            *(_tell_constant(load, name) for name in TOLD_CONSTANTS),
+            *(_find_constant(load, name) for name in TOLD_CONSTANTS),
             _tell_share(load["share"]),
             _percent(load["error"]["value"]),
             _percent(load["predicted"]["last_half"]),
@@ -70,15 +72,13 @@ def tabulate_loads(content: Mapping[str, Any]) -> Table:
         if "why" not in load
     ]
     columns = ["load", "dips", "T' [s]", "X' [pu]", "H [s]", "motors, of P", "error", "predicted"]
-    return Table(columns, rows, f"loads of {content['folder']}", words=(2, 3, 4, 5, 6, 7))
+    return Table(columns, rows, f"loads of {content['folder']}", words=(5, 6, 7))
 
 
-def _tell_constant(load: Mapping[str, Any], name: str) -> str:
-    row = next((row for row in load["constants"] if row["name"] == name), None)
-    if row is None:
-        return ""
-    half = (row["high"] - row["low"]) / 2
-    return f"{row['value']:.3g} ± {half:.2g}" if np.isfinite(half) else f"{row['value']:.3g}"
+def _find_constant(load: Mapping[str, Any], name: str) -> float | None:
+    """A constant of a load, as its row shows it; None where its model has none of this name."""
+    values = [row["value"] for row in load["constants"] if row["name"] == name]
+    return float(f"{values[0]:.3g}") if values else None
 
 
 def _tell_share(share: Mapping[str, Any]) -> str:
@@ -89,15 +89,33 @@ def _percent(value: float | None) -> str:
     return "" if value is None else in_percent(value)
 
 
+def screen(content: Mapping[str, Any]) -> Report:
+    """The answer in 25 lines: the loads in a table, and of the first what differs."""
+    page = Report().text(_tell_extent(content))
+    table = tabulate_loads(content)
+    rows = table.rows[:MOST_SCREEN_ROWS]
+    page.add(replace(table, rows=rows))
+    told = [shorten(sentence, TWO_LINES) for sentence in _describe_loads(content)]
+    page.text(*told[:MOST_SCREEN_LOADS])
+    if len(told) > MOST_SCREEN_LOADS:
+        page.text("of every load: --all, or the page")
+    unfitted = [shorten(sentence, TWO_LINES) for sentence in _tell_unfitted(content)]
+    return page.text(*unfitted[:1])
+
+
 def summary(content: Mapping[str, Any]) -> Report:
     """The loads in a table, then of each what differs, in sentences."""
     page = Report().text(_tell_extent(content)).add(tabulate_loads(content))
-    fitted = [load for load in content["loads"] if "why" not in load]
-    for load in fitted[:MOST_SCREEN_LOADS]:
-        page.text(f"{load['load'] or load['station']}: {describe_load(load)}")
-    if len(fitted) > MOST_SCREEN_LOADS:
-        page.text(f"{count_noun(len(fitted) - MOST_SCREEN_LOADS, 'load')} more, on the page")
-    return page.text(*_tell_unfitted(content))
+    return page.text(*_describe_loads(content), *_tell_unfitted(content))
+
+
+def _describe_loads(content: Mapping[str, Any]) -> list[str]:
+    """A line for each load that was fitted."""
+    return [
+        f"{load['load'] or load['station']}: {describe_load(load)}"
+        for load in content["loads"]
+        if "why" not in load
+    ]
 
 
 def _tell_extent(content: Mapping[str, Any]) -> str:
