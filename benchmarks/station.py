@@ -1,5 +1,5 @@
 """A made station: `python benchmarks/station.py [--dips N] [--loads N]` adds a row to
-benchmarks/station.json.
+benchmarks/station.json; with `--keep FOLDER` it may be ended and goes on.
 
 Four loads on one bus, 300 dips in five years, two of them with currents that the recorder clips
 (`tests/made_station.py` writes the files). Told are the largest error of the machines' constants,
@@ -9,6 +9,7 @@ that of the share by hour, what was left out, and the time of the whole call on 
 import argparse
 import json
 import os
+import resource
 import sys
 import tempfile
 import time
@@ -18,6 +19,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import numpy as np
+from joblib.externals.loky import get_reusable_executor
 from made_station import MACHINES, STATICS, expect_share, make_station
 
 import tractexp
@@ -56,18 +58,28 @@ def compare_shares(load: dict, k: int, shares: dict) -> float:
     )
 
 
+def spent() -> float:
+    """CPU seconds of this process and of those that have ended below it."""
+    get_reusable_executor().shutdown(wait=True)
+    both = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(usage.ru_utime + usage.ru_stime for usage in both)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--dips", type=int, default=300)
     parser.add_argument("--loads", type=int, default=4)
+    parser.add_argument("--keep", help="a folder in which a run that was ended goes on")
     given = parser.parse_args()
     faulty = (given.dips // 3, 2 * given.dips // 3)
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name, "records")
-        shares, _ = make_station(folder, given.loads, given.dips, faulty)
-        started = time.perf_counter()
-        made = tractexp.fit_station(folder, cores=CORES, progress=False)
-        seconds = time.perf_counter() - started
+        place = Path(given.keep or name)
+        folder, kept = place / "records", place / "kept"
+        fresh = not kept.exists()
+        shares, _ = make_station(folder, given.loads, given.dips, faulty, write=fresh)
+        before, started = spent(), time.perf_counter()
+        made = tractexp.fit_station(folder, cores=CORES, keep=kept, progress=False)
+        seconds, cpu = time.perf_counter() - started, spent() - before
     loads = [load for load in made.content["loads"] if "why" not in load]
     row = {
         "loads": given.loads,
@@ -75,7 +87,9 @@ def main() -> None:
         "fitted": [load["dips"] for load in loads],
         "cores": CORES,
         "load_average": round(os.getloadavg()[0], 1),
-        "seconds": round(seconds, 1),
+        # of a run that went on nobody knows how long it took
+        "seconds": round(seconds, 1) if fresh else None,
+        "cpu_seconds": round(cpu, 1) if fresh else None,
         "constants": round(max(compare_constants(o, k) for k, o in enumerate(loads)), 4),
         "by_hour": round(max(compare_hours(o, k) for k, o in enumerate(loads)), 4),
         "shares": round(max(compare_shares(o, k, shares) for k, o in enumerate(loads)), 4),

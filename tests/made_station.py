@@ -9,7 +9,7 @@ import numpy as np
 from made_recordings import RATE, recording, waves
 
 import tractexp
-from tractexp.filetypes.comtrade_writer import write
+from tractexp.filetypes import comtrade_writer
 from tractexp.model.drive import Drive, Excitation
 
 START, YEARS = datetime(2021, 1, 4), 5.0
@@ -54,7 +54,7 @@ def draw_voltage(depth, duration, length=1.6, start=0.5, edge=0.01):
     return t, 1 - depth * (fall - back)
 
 
-def make_station(folder, loads=2, dips=12, faulty=(), seed=0, noise=1e-3):
+def make_station(folder, loads=2, dips=12, faulty=(), seed=0, noise=1e-3, write=True):
     """Write so many dips of so many loads; those `faulty` by number with a current that the
     recorder clips. {(load, dip): share} and the moments of the dips.
     """
@@ -80,7 +80,8 @@ def make_station(folder, loads=2, dips=12, faulty=(), seed=0, noise=1e-3):
         if k in faulty:
             clip_currents(values[3:])
         file = folder / f"{moment:%Y}" / f"{moment:%Y%m%d_%H%M%S}.cfg"
-        write(recording(values, names, start=moment), file, "BINARY", 1999)
+        if write:
+            comtrade_writer.write(recording(values, names, start=moment), file, "BINARY", 1999)
     return shares, moments
 
 

@@ -78,7 +78,7 @@ def test_no_later_dip_changes_what_was_predicted():
     assert early == shown[:3]
 
 
-def draw_dip(k):
+def draw_frame(k):
     """A dip of a load whose motors draw from 40 to 60 % of P."""
     torque = 0.4 + 0.04 * k
     values = {"T_prime": 0.12, "C": 0.9, "p_v": 1.4, "q_v": 3.0, "T_m": torque}
@@ -87,7 +87,11 @@ def draw_dip(k):
     response = tractexp.simulate(tractexp.compose(), values, P0=0.9, Q0=0.35, **shape).responses[0]
     frame = response.to_frame()
     frame[["P", "Q"]] += 1e-3 * np.random.default_rng(k).standard_normal((len(frame), 2))
-    (event,) = tractexp.read(frame)
+    return frame
+
+
+def draw_dip(k):
+    (event,) = tractexp.read(draw_frame(k))
     return Dip(OwnBase.from_event(event).convert_event(event))
 
 
@@ -99,6 +103,21 @@ def test_a_motor_of_another_size_has_the_same_constants():
     assert found["X_prime"] == pytest.approx(0.15, rel=0.05)
     assert found["M"] == pytest.approx(0.011, rel=0.05)
     assert fit.torques == pytest.approx([0.4, 0.6], abs=0.01)
+
+
+def test_tables_of_one_folder_are_of_one_load(tmp_path):
+    for load in ("north", "south"):
+        (tmp_path / load).mkdir()
+        for k in (0, 5):
+            draw_frame(k).to_csv(tmp_path / load / f"dip{k}.csv", index=False)
+    found = tractexp.fit_station(tmp_path, cores=1, progress=False)
+    names = [f"{tmp_path.name}/{name}" for name in ("north", "south")]
+    assert [load["load"] for load in found.loads] == names
+    assert [load["dips"] for load in found.loads] == [2, 2]
+    for load in found.content["loads"]:
+        assert load["composition"]["varies"] == []
+        assert [event["when"] for event in load["events"]] == [None, None]
+    assert "dip, by its number" in found.report().html
 
 
 def test_what_was_read_and_fitted_is_not_done_again(fitted, made, monkeypatch):

@@ -151,7 +151,7 @@ def fit_station(
     ----------
     folder : path
         Of the recordings; each event of each load in it is found as `tractexp.survey` finds it.
-        Loads are told apart by station and name.
+        Loads are told apart by station and name, tables by their folders.
     model : as in `tractexp.identify`
         A model with a motor; "auto" races structures on the dips of a load that tell most.
     bounds, fixed, substeps, physical : as in `tractexp.identify`
@@ -187,7 +187,7 @@ def fit_station(
     if not rows:
         raise UserError(f"no event in {folder} is worth fitting; a survey says why of each")
     read = _read_dips(place, rows, workers, Path(keep) if keep else None, progress)
-    jobs, single = _group(rows, read, load)
+    jobs, single = _group(rows, read, load, place)
     tell(progress, [f"{count_noun(len(rows), 'dip')} of {count_noun(len(jobs), 'load')}"])
     fitted = _fit_loads(jobs, workers, Path(keep) if keep else None, progress)
     content = {
@@ -233,17 +233,21 @@ def _read_dips(
 
 
 def _group(
-    rows: Sequence[Mapping[str, Any]], read: Mapping[str, Mapping[str, Any]], model: LoadModel
+    rows: Sequence[Mapping[str, Any]],
+    read: Mapping[str, Mapping[str, Any]],
+    model: LoadModel,
+    folder: Path,
 ) -> tuple[list[LoadJob], list[dict[str, Any]]]:
     """What there is to fit, a job for each load; and the loads of which too few dips are there."""
     groups = defaultdict[tuple[str, str], list[tuple[str, str | None, Mapping[str, Any]]]](list)
     stamps = defaultdict[tuple[str, str], list[str]](list)
     for row in rows:
         one = read[row["event"]]
-        dips = groups[row["station"] or "", row["load"] or ""]
+        name = _name_load(row, folder)
+        dips = groups[name]
         if "record" in one:
             dips.append((row["event"], row["when"], one["record"]))
-            stamps[row["station"] or "", row["load"] or ""].append(row["event"] + one["key"])
+            stamps[name].append(row["event"] + one["key"])
     jobs = [
         LoadJob(load, station, dips, model, stamps[station, load])
         for (station, load), dips in groups.items()
@@ -259,6 +263,14 @@ def _group(
         if len(dips) < FEWEST_DIPS
     ]
     return jobs, single
+
+
+def _name_load(row: Mapping[str, Any], folder: Path) -> tuple[str, str]:
+    """Station and load of a row. A table names neither: those of one folder are of one load."""
+    file = Path(row["file"])
+    if row["load"] != file.stem:
+        return row["station"] or "", row["load"] or ""
+    return row["station"] or "", (Path(folder.resolve().name) / file.parent).as_posix()
 
 
 def _fit_loads(
