@@ -177,3 +177,11 @@ def test_the_stored_rows_are_whole_and_their_tables_are_shown():
     assert all(least <= {*own} and own == cases["paper_pso"] for own in cases.values())
     shown = (page.HERE / "README.md").read_text(encoding="utf-8")
     assert page.marked.parted(shown, page.MARK)[1].strip() == page.make_tables(rows)
+
+
+@pytest.mark.parametrize(
+    ("share", "told"),
+    [(0.0312, "3.1 %"), (7262.0, "over 100%"), (np.inf, "over 100%"), (np.nan, "")],
+)
+def test_an_error_above_the_response_is_told_as_that(share, told):
+    assert page.in_percent(share) == told
