@@ -127,12 +127,13 @@ def test_a_value_that_a_bound_holds_is_why_a_model_that_fits_is_unusable():
 
 
 def test_names_that_are_long_leave_each_parameter_a_line():
-    names = ["branch_resistance", "T_prime_second", "M", "C"]
+    names = ["branch_resistance", "T_prime_second", "M", "C", "X_prime"]
     verdicts = [
         "weakly identified: it trades",
         "not identifiable from this record",
         "identified",
         "at its bound: 0.85",
+        "at the end of what machines have: 0.08",
     ]
     fit = fitted(
         parameters=dict.fromkeys(names, 0.0123456),
@@ -143,7 +144,7 @@ def test_names_that_are_long_leave_each_parameter_a_line():
     )
     fit.__dict__["operating_point"] = None
     rows = print_at(Report().add(tabulate_parameters(fit)), WIDTH)
-    assert [row.split()[-1] for row in rows[2:]] == ["weakly", "no", "yes", "bound"]
+    assert [row.split()[-1] for row in rows[2:]] == ["weakly", "no", "yes", "bound", "end"]
     assert len(rows) == 2 + len(names)
 
 

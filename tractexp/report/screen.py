@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.blocks import Report, Table
 from tractexp.identification.result import Result
-from tractexp.identification.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, brief
+from tractexp.identification.verdict import (
+    BOUND,
+    END_OF_RANGE,
+    IDENTIFIED,
+    UNIDENTIFIED,
+    WEAK,
+    brief,
+)
 from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import UNKNOWN, Identity, label
 from tractexp.text.wording import count_noun, list_first, shorten, with_error
@@ -18,7 +25,13 @@ if TYPE_CHECKING:
 MOST_PARAMETERS = 10  # rows of the table of parameters
 MOST_EVENTS = 2  # events that a line names
 # verdicts in a word, so that rows fit a line beside long names
-SHORT = {IDENTIFIED: "yes", WEAK: "weakly", UNIDENTIFIED: "no", BOUND: "at bound"}
+SHORT = {
+    IDENTIFIED: "yes",
+    WEAK: "weakly",
+    UNIDENTIFIED: "no",
+    BOUND: "at bound",
+    END_OF_RANGE: "at end",
+}
 
 
 def screen(fit: "Identification") -> Report:
