@@ -136,11 +136,11 @@ def parquet(path: Path, **odd: object) -> Path:
 
 
 def endless_text_parquet(path: Path) -> Path:
-    """A few kilobytes that stand for a text of 32 MB in each row."""
+    """A few kilobytes that stand for a text of 8 MB in each row."""
     import pyarrow
     from pyarrow import parquet
 
-    notes = pyarrow.DictionaryArray.from_arrays(np.zeros(ROWS, np.int8), ["x" * (32 << 20)])
+    notes = pyarrow.DictionaryArray.from_arrays(np.zeros(ROWS, np.int8), ["x" * (8 << 20)])
     numbers = dict(zip(NAMES, columns().T, strict=True))
     parquet.write_table(
         pyarrow.table({**numbers, "notes": notes}),
@@ -335,7 +335,6 @@ INPUTS: dict[str, Callable[[Path], Path]] = {
     "byte_times.parquet": lambda path: parquet(path, t=[b"0.1"] * ROWS),
     "cut.parquet": written(b"PAR1" + bytes(40) + b"PAR1"),
     "long.parquet": long_parquet,
-    "endless_text.parquet": endless_text_parquet,
     # what is no ordinary file
     "pipe.csv": pipe,
     "pipe.cfg": pipe,
