@@ -172,7 +172,11 @@ def _serve(kind: str, memory: int, seconds: int) -> None:
             own = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
             resource.setrlimit(limited, (own, hard))
 
-    content, read = _call(OPENERS[kind], _take_question()) or (None, None)
+    opened = _call(OPENERS[kind], _take_question())
+    if opened is None:
+        _give(None)
+        return
+    content, read = opened
     _give(content)
     with contextlib.suppress(EOFError):
         while True:
