@@ -177,39 +177,34 @@ class CSV(Tabular, Reader):
         quantities = powers(
             table, mapping, declared, self.reverse_current, kilovolts=given is not None
         )
-        window = sidecar.window or (
-            self.estimator and estimator_of(self.estimator).window(quantities.frequency)
-        )
-        begun = {"time": quantities.start.isoformat()} if quantities.start else {}
-        arrays: Any = {
-            **quantities.columns,
-            "more": table.numbers(sidecar.more),
-            "window": window or None,
-        }
-        raw = Record(
-            name=self._name(path, sidecar),
-            source=path,
-            notes=(*sidecar.notes, *quantities.notes),
-            identity=begun,
-            base=Base(frequency=quantities.frequency),
-            **arrays,
-        )
+        raw = self._raw_record(path, sidecar, quantities, table.numbers(sidecar.more))
         even = raw if sidecar.uniform else raw.uniform(table.place)
         base, note = self._base(even, quantities, sidecar, base)
-        voltage, power = (
-            size
-            if quantities.absolute[key] or (quantities.absolute[key] is None and size_given)
-            else 1.0
-            for key, size, size_given in (
-                ("U", base.voltage, given),
-                ("P", base.power, self.base_power or sidecar.base),
-            )
-        )
-        by = Base(voltage, power)
-        arrays = by.per_unit(even.channels)
+        voltage = _one_of(quantities.absolute["U"], base.voltage, given)
+        power = _one_of(quantities.absolute["P"], base.power, self.base_power or sidecar.base)
+        arrays: Any = Base(voltage, power).per_unit(even.channels)
         record = replace(even, base=base, notes=(*even.notes, *note), **arrays)
         record.check(table.place if record.samples == raw.samples else None)
         return replace(record, notes=(*record.notes, *signs(record)))
+
+    def _raw_record(
+        self, path: str, sidecar: Sidecar, quantities: Powers, more: dict[str, Any]
+    ) -> Record:
+        """A table as a record of what stands in it, at its own times and in its own units."""
+        window = sidecar.window
+        if window is None and self.estimator:
+            window = estimator_of(self.estimator).window(quantities.frequency)
+        arrays: Any = quantities.columns
+        return Record(
+            name=self._name(path, sidecar),
+            source=path,
+            notes=(*sidecar.notes, *quantities.notes),
+            identity={"time": quantities.start.isoformat()} if quantities.start else {},
+            base=Base(frequency=quantities.frequency),
+            more=more,
+            window=window,
+            **arrays,
+        )
 
     def _name(self, path: str, sidecar: Sidecar) -> str:
         stem = Path(path.removeprefix(PACKAGE)).stem
@@ -227,7 +222,8 @@ class CSV(Tabular, Reader):
         earlier = sidecar.base or same
         voltage = self.base_voltage or (earlier and earlier.voltage)
         power = self.base_power or (earlier and earlier.power)
-        absolute_U, absolute_P = quantities.absolute["U"], quantities.absolute["P"]
+        absolute_U = quantities.absolute["U"]
+        absolute_P = quantities.absolute["P"]
         if voltage is None and power is None and absolute_U and absolute_P is None:
             raise UserError(
                 f"{record.where}: U is in kV, and the unit of P and Q is not told; say"
@@ -254,9 +250,17 @@ class CSV(Tabular, Reader):
                 voltage = U
                 sources.append(f"{U:.4g} kV line to line")
             if lacks_power:
-                power, origin = S, LOAD
+                power = S
+                origin = LOAD
                 sources.append(f"{S:.4g} MVA")
         base = Base(voltage or 1.0, power or 1.0, quantities.frequency, origin)
         if not sources:
             return base, []
         return base, [f"base: {' and '.join(sources)}, the steady state before the first dip"]
+
+
+def _one_of(absolute: bool | None, size: float, given: Any) -> float:
+    """What a table's values are divided by: the size of one per unit [kV, MVA] where they are
+    absolute, or have no unit and the user has `given` that size; else 1.
+    """
+    return size if absolute or (absolute is None and given) else 1.0

@@ -77,6 +77,11 @@ def is_number(cell: Any, decimal: str = ".") -> bool:
     return True
 
 
+def is_plain_number(cell: Any) -> bool:
+    """Whether a cell is a number written with either decimal mark."""
+    return is_number(cell) or is_number(cell, ",")
+
+
 def group_mark(cell: Any, decimal: str) -> str:
     """The mark between groups of three digits of a number, where it can be no decimal mark; ""
     where there is none.
@@ -100,14 +105,19 @@ def find_group_mark(rows: Sequence[Sequence[Any]], decimal: str) -> str:
     before three digits.
     """
     cells = [cell for row in rows for cell in row if isinstance(cell, str)]
-    marks = {mark for cell in cells if (mark := group_mark(cell, decimal))}
-    other = {".": ",", ",": "."}[decimal]
-    open_marks = [cell for cell in cells if is_number(cell, other) and other in cell]
-    if decimal == "." and open_marks and any(is_number(cell) and "." in cell for cell in cells):
-        marks |= (
-            {","} if all(GROUPED["."].fullmatch(cell.strip()) for cell in open_marks) else set()
-        )
+    marks = {group_mark(cell, decimal) for cell in cells} - {""}
+    if decimal == "." and _are_commas_of_groups(cells):
+        marks.add(",")
     return marks.pop() if len(marks) == 1 else ""
+
+
+def _are_commas_of_groups(cells: Sequence[str]) -> bool:
+    """Whether points are there, and each comma that could be a decimal mark is before three
+    digits.
+    """
+    commas = [cell.strip() for cell in cells if "," in cell and is_number(cell, ",")]
+    points = any("." in cell and is_number(cell) for cell in cells)
+    return points and bool(commas) and all(map(GROUPED["."].fullmatch, commas))
 
 
 def find_rising_group_mark(rows: Sequence[Sequence[Any]]) -> str:
@@ -117,14 +127,21 @@ def find_rising_group_mark(rows: Sequence[Sequence[Any]]) -> str:
     for column in zip(*rows, strict=False):
         texts = [cell.strip() if isinstance(cell, str) else "" for cell in column]
         for mark in ".,":
-            if not all(re.fullmatch(rf"\d{{1,3}}(?:\{mark}\d{{3}})*", text) for text in texts):
-                continue
-            grouped = [int(text.replace(mark, "")) for text in texts]
-            parts = [text.replace(mark, " ").split() for text in texts]
-            plain = [float(f"{first}.{''.join(rest)}") for first, *rest in parts]
-            if _rises(grouped) and not _rises(plain):
+            if _rises_by_groups(texts, mark):
                 return mark
     return ""
+
+
+def _rises_by_groups(texts: Sequence[str], mark: str) -> bool:
+    """Whether texts are whole numbers that rise where a mark parts groups, and not where it is the
+    decimal mark.
+    """
+    if not all(re.fullmatch(rf"\d{{1,3}}(?:\{mark}\d{{3}})*", text) for text in texts):
+        return False
+    parts = [text.split(mark) for text in texts]
+    grouped = [float("".join(groups)) for groups in parts]
+    plain = [float(f"{first}.{''.join(rest)}") for first, *rest in parts]
+    return _rises(grouped) and not _rises(plain)
 
 
 def _rises(values: Sequence[float]) -> bool:

@@ -7,6 +7,7 @@ instantaneous primary amperes and kilovolts over the root of two; `>` marks the 
 """
 
 import csv
+import functools
 import re
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
@@ -31,6 +32,7 @@ LARGEST_SUMMARY_DIFFERENCE = 0.1  # of a current: so well the summary's agrees w
 FEWEST_WAVE_RATE = 10  # samples a cycle: fewer are a filtered report, which holds phasors
 BEGINNING = 1 << 16  # bytes in which a report names the samples in a cycle
 LEAST, MOST = 10.0, 100.0  # Hz
+CURRENTS = ("IA", "IB", "IC", "IA(A)", "IB(A)", "IC(A)")  # as the summary names them
 # what the settings say of the load and of its transformers: full-load and locked-rotor current,
 # service factor, ratios
 RATING = re.compile(
@@ -135,17 +137,9 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     t = opened.t[quarter:]
     back = np.exp(-2j * np.pi * opened.nominal * t)
     columns = [("t", "s", t), ("f", "Hz", opened.frequency[quarter:])]
-    for k in range(opened.values.shape[1]):
-        channel = (
-            _channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks)
-            if _is_named(report, k)
-            else None
-        )
-        if (
-            channel is not None
-            and channel.form == "waveform"
-            and channel.phase in ("A", "B", "C", "AB", "BC", "CA")
-        ):
+    for k in filter(functools.partial(_is_named, report), range(opened.values.shape[1])):
+        channel = _channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks)
+        if channel.form == "waveform" and channel.phase in ("A", "B", "C", "AB", "BC", "CA"):
             x = channel.ratio * channel.read_values()
             X = (x[quarter:] + 1j * x[:-quarter]) * back
             columns += [
@@ -190,7 +184,7 @@ def _open_report(path: Path, encoding: str | None) -> _Opened:
     values, marks, words = _samples(path, report, remarks)
     per_cycle, frequency = _rate(path, report)
     _note_lost_rows(report, per_cycle, remarks)
-    marked = next((i for sign in (">", "*") for i, mark in enumerate(marks) if sign in mark), None)
+    marked = _find_marked_row(marks, ">*")
     if marked is None:
         remarks.add(
             "no row is marked as the trigger's ('>'); the report's time is taken as that of the"
@@ -252,7 +246,7 @@ def _read_tracked_frequency(
 
 
 def checksum(text: str) -> str:
-    """Of a row, up to its last comma: the sum of the bytes, four hexadecimal digits."""
+    """The checksum of a row up to its last comma: the sum of its bytes, four hexadecimal digits."""
     return f"{sum(text.encode('latin-1', 'replace')) & 0xFFFF:04X}"
 
 
@@ -262,47 +256,61 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
     """
     body, _, rest = re.sub(r"[\x02\x03\x1a\0]", "", text).partition('"SETTINGS"')
     report = EventReport(settings=rest.partition("\n")[2].strip())
-    names: list[str] | None = None
+    names: list[str] = []
     sums: list[bool] = []  # whether each row has its checksum
     for line, row in _join_quoted_rows(body):
         if line > HEAD and not report.columns:
             break
-        try:
-            cells = next(csv.reader([row], strict=False), [])
-        except csv.Error:  # a cell without end
-            cells = [row]
-        if len(cells) > 1 and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
-            if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
-                remarks.add(
-                    "the checksum does not fit: the line was altered, or damaged on its way", line
-                )
-            cells, checked = cells[:-1], True
-        else:
-            checked = False
-        if report.columns:
-            if not cells or cells[0].strip() == "FID":
-                remarks.add("a second report in the file is not read", line)
-                break
-            report.rows.append((line, cells))
-            sums.append(checked)
-        elif any(cell.strip() == "TRIG" for cell in cells):
-            report.columns = [cell.strip() for cell in cells]
-        elif names is None and not report.about and "FID" not in [cell.strip() for cell in cells]:
-            remarks.add("text before the report is passed over", line)
-        elif names is None:
-            names = [cell.strip() for cell in cells]
-        else:
-            report.about |= dict(zip(names, map(str.strip, cells), strict=False))
-            names = None
-    if len(sums) > 1 and all(sums[:-1]) and not sums[-1]:
+        cells, checked = _split_row(row, line, remarks)
+        if not report.columns:
+            names = _read_summary(report, names, list(map(str.strip, cells)), line, remarks)
+            continue
+        if not cells or cells[0].strip() == "FID":
+            remarks.add("a second report in the file is not read", line)
+            break
+        report.rows.append((line, cells))
+        sums.append(checked)
+    if sums[-2:] == [True, False] and all(sums[:-1]):
         remarks.add("the file ends within a line, which is not used", report.rows.pop()[0])
-    if not report.columns or not report.rows:
+    if not report.rows:
         raise UserError(
             f"{path}: no compressed event report: there is no row of column names with TRIG and"
             " samples below it; get "
             "it from the relay with the command CEV, or its COMTRADE file"
         )
     return report
+
+
+def _split_row(row: str, line: int, remarks: Remarks) -> tuple[list[str], bool]:
+    """(the cells of a row without its checksum, whether it has one); a remark where that does not
+    fit.
+    """
+    try:
+        cells = next(csv.reader([row], strict=False), [])
+    except csv.Error:  # a cell without end
+        cells = [row]
+    if len(cells) < 2 or not re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
+        return cells, False
+    if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
+        remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
+    return cells[:-1], True
+
+
+def _read_summary(
+    report: EventReport, names: list[str], cells: list[str], line: int, remarks: Remarks
+) -> list[str]:
+    """Take in a row above the samples: their columns, or values below `names`. The names that the
+    next row has values of; [] for none.
+    """
+    if "TRIG" in cells:
+        report.columns = cells
+    elif names:
+        report.about |= zip(names, cells, strict=False)
+    elif report.about or "FID" in cells:
+        return cells
+    else:
+        remarks.add("text before the report is passed over", line)
+    return []
 
 
 def _join_quoted_rows(body: str) -> list[tuple[int, str]]:
@@ -367,7 +375,8 @@ def _value(path: Path, line: int, name: str, cell: str) -> float:
 def _rate(path: Path, report: EventReport) -> tuple[float, float]:
     """Samples a cycle and the frequency that the relay sampled by."""
     numbers = {key: number(report.about.get(key, "")) for key in ("SAM/CYC_A", "FREQ")}
-    per_cycle, frequency = numbers["SAM/CYC_A"], numbers["FREQ"]
+    per_cycle = numbers["SAM/CYC_A"]
+    frequency = numbers["FREQ"]
     if per_cycle is None or not 1 <= per_cycle <= 10_000:
         raise UserError(
             f"{path}: SAM/CYC_A, the samples in a cycle, is"
@@ -397,26 +406,26 @@ def _channel(
     match = _COLUMN.fullmatch(report.columns[k])
     name, unit = (match[1], match[2] or "") if match else (report.columns[k], "")
     wave = _WAVE.fullmatch(name.upper())
-    if not unit:
-        unit = "Hz" if name == "FREQ" else "V" if name.startswith(("VDC", "VBAT")) else ""
-        if wave and name[0] in "IV":
-            unit = "A" if name[0] == "I" else "kV"
-            if unit == "kV":
-                remarks.add(f"no unit of {name}, kV taken")
+    unit = unit or _usual_unit(name, wave is not None, remarks)
     quantity = "frequency" if name == "FREQ" else unit_of(unit)[0]
-    ratio = _ratio(report, name, remarks) if wave else 1.0
-    return Channel(
-        name,
-        values,
-        unit,
-        quantity,
-        (wave[1] or "") if wave else "",
-        (wave[2] or "") if wave else "",
-        gain if wave else 1.0,
-        0.0,
-        ratio,
-        form="waveform" if wave else "value",
-    )
+    if wave is None:
+        return Channel(name, values, unit, quantity, form="value")
+    phase = wave[1] or ""
+    circuit = wave[2] or ""
+    ratio = _ratio(report, name, remarks)
+    return Channel(name, values, unit, quantity, phase, circuit, gain, ratio=ratio, form="waveform")
+
+
+def _usual_unit(name: str, is_wave: bool, remarks: Remarks) -> str:
+    """The unit of a column that names none; "" where it is not known."""
+    if is_wave and name[0] == "V":
+        remarks.add(f"no unit of {name}, kV taken")
+        return "kV"
+    if is_wave and name[0] == "I":
+        return "A"
+    if name == "FREQ":
+        return "Hz"
+    return "V" if name.startswith(("VDC", "VBAT")) else ""
 
 
 def _ratio(report: EventReport, name: str, remarks: Remarks) -> float:
@@ -445,18 +454,12 @@ def _gain(
         "columns are taken as instantaneous values over the root of two, as SEL's manuals say"
     )
     quarter = round(per_cycle / 4)
-    row = next((i for sign in ("*", ">") for i, mark in enumerate(marks) if sign in mark), None)
+    row = _find_marked_row(marks, "*>")
     if row is None or row < quarter or 4 * quarter != per_cycle:
         return ROOT
-    ratios = []
-    for k, column in enumerate(report.columns[: values.shape[1]]):
-        rms = number(report.about.get(column, ""))
-        here = float(np.hypot(values[row, k], values[row - quarter, k]))
-        if column in ("IA", "IB", "IC", "IA(A)", "IB(A)", "IC(A)") and rms and here > 0:
-            ratios.append((rms, here / rms))
-    if not ratios:
+    ratio = _compare_with_summary(report, np.hypot(values[row], values[row - quarter]))
+    if ratio is None:
         return ROOT
-    ratio = max(ratios)[1]  # of the greatest current
     if abs(ratio / ROOT - 1) < LARGEST_SUMMARY_DIFFERENCE:
         remarks.add(
             "but their greatest current, by the summary, says that they are not divided; taken as"
@@ -471,8 +474,28 @@ def _gain(
     return ROOT
 
 
+def _compare_with_summary(report: EventReport, sizes: np.ndarray) -> float | None:
+    """The size of the greatest current over what the summary gives of it, by the `sizes` of the
+    columns; None where there is none.
+    """
+    ratios = []
+    for column, here in zip(report.columns, sizes.tolist(), strict=False):
+        rms = number(report.about.get(column, "")) if column in CURRENTS else None
+        if rms and here > 0:
+            ratios.append((rms, here / rms))
+    return max(ratios)[1] if ratios else None
+
+
+def _find_marked_row(marks: list[str], signs: str) -> int | None:
+    """The first row with the first of some signs that a row has; None where none has."""
+    rows = (i for sign in signs for i, mark in enumerate(marks) if sign in mark)
+    return next(rows, None)
+
+
 def _start(report: EventReport, before: float, remarks: Remarks) -> datetime | None:
-    """Of the first sample; the report's time is that of the trigger."""
+    """The moment of the first sample, `before` s before the report's, which is that of the trigger;
+    None, with a remark, where the summary has no date.
+    """
     keys = ("YEAR", "MONTH", "DAY", "HOUR", "MIN", "SEC", "MSEC")
     parts = [number(report.about.get(key, "")) for key in keys]
     try:
@@ -493,7 +516,8 @@ def _states(report: EventReport, words: list[str]) -> list[StatusChannel]:
     """One channel for each bit with a name; a row without a word keeps the one before."""
     at = report.columns.index("TRIG")
     names = report.columns[at + 1].split() if len(report.columns) > at + 1 else []
-    held, rows = "", []
+    held = ""
+    rows = []
     for word in words:
         held = word if re.fullmatch(r"[0-9A-Fa-f]+", word) else held
         rows.append(bytes.fromhex(held if len(held) % 2 == 0 else f"{held}0"))

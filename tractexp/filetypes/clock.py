@@ -112,7 +112,8 @@ def times(cells: Sequence[Any]) -> ClockTimes:
     moments = [_moment(cell, row) for row, cell in enumerate(cells)]
     _check_dates(moments, cells)
     clock = np.array([one.second for one in moments])
-    start, remarks = None, []
+    start = None
+    remarks = []
     if moments[0].day is not None:
         seconds, start, remarks = _add_days(moments, clock)
     else:
@@ -155,15 +156,16 @@ def _run_on(seconds: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, list[tu
     `local` (N,) are the seconds of the day by which an hour that is left out in spring is known;
     infinite for times of a zone, which leave out none.
     """
-    steps, remarks = np.diff(seconds), list[tuple[int, str]]()
+    steps = np.diff(seconds)
+    remarks = list[tuple[int, str]]()
     usual = float(np.median(steps)) if len(steps) else 0.0
     if usual <= 0:
         return seconds, []
-    shifts, back = np.zeros(len(seconds)), list[float]()
+    shifts = np.zeros(len(seconds))
+    back = list[float]()
     for k in np.flatnonzero((steps < 0) | (steps > 2 * usual)):
         jump = float(steps[k]) - usual
-        expected = [*back, HOUR] if local[k] / HOUR < LATEST_SUMMER else back
-        forth = next((each for each in expected if abs(each - jump) <= usual), 0.0)
+        forth = _match_jump(jump, usual, [*back, HOUR] if local[k] / HOUR < LATEST_SUMMER else back)
         if -SET_BACK <= jump < -SWAPPED * usual:
             back.append(-jump)
             way = "back"
@@ -176,6 +178,13 @@ def _run_on(seconds: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, list[tu
         remarks.append((int(k) + 1, said))
         shifts[k + 1] = -jump
     return seconds + np.cumsum(shifts), remarks
+
+
+def _match_jump(jump: float, usual: float, expected: Sequence[float]) -> float:
+    """The first of the times [s] by which a clock is expected to be set forth that a jump is, but
+    for a usual step; 0 for none.
+    """
+    return next((each for each in expected if abs(each - jump) <= usual), 0.0)
 
 
 def _moment(cell: Any, row: int) -> _Moment:
@@ -201,7 +210,8 @@ def _read_text(cell: str, row: int) -> _Moment | None:
     match = CLOCK.fullmatch(cell)
     if match is None:
         return None
-    hours, minutes = int(match["h"] or 0), int(match["m"])
+    hours = int(match["h"] or 0)
+    minutes = int(match["m"])
     second = float(match["s"].replace(",", ".").replace(":", "."))
     if hours > 24 or minutes > 59 or second >= 61:
         raise BadCell(row, f"{quote_cell(cell)} is no time of a day")

@@ -16,45 +16,32 @@ from tractexp.recording.unit import amount
 # {unit in lower case, but those of voltage and current: (quantity, factor to s, MW, Mvar, Hz, rad,
 # pu)}
 UNITS: Mapping[str, tuple[str, float]] = {
-    **{unit: ("t", 1.0) for unit in ("s", "sec", "second", "seconds", "sek", "秒", "с", "сек")},
-    **{unit: ("t", 1e-3) for unit in ("ms", "msec", "millisecond", "milliseconds", "毫秒", "мс")},
-    **{unit: ("t", 1e-6) for unit in ("us", "µs", "μs", "usec", "microseconds", "微秒", "мкс")},
-    "ns": ("t", 1e-9),
-    "min": ("t", 60.0),
-    "h": ("t", 3600.0),
-    "day": ("t", 86400.0),
-    "days": ("t", 86400.0),
-    "mw": ("power", 1.0),
-    "kw": ("power", 1e-3),
-    "w": ("power", 1e-6),
-    "gw": ("power", 1e3),
-    "мвт": ("power", 1.0),
-    "квт": ("power", 1e-3),
-    "mvar": ("reactive", 1.0),
-    "kvar": ("reactive", 1e-3),
-    "var": ("reactive", 1e-6),
-    "gvar": ("reactive", 1e3),
-    "mva": ("reactive", 1.0),
-    "kva": ("reactive", 1e-3),
-    "va": ("reactive", 1e-6),
-    "兆瓦": ("power", 1.0),
-    "千瓦": ("power", 1e-3),
-    "兆乏": ("reactive", 1.0),
-    "千乏": ("reactive", 1e-3),
-    "мвар": ("reactive", 1.0),
-    "квар": ("reactive", 1e-3),
-    "hz": ("frequency", 1.0),
-    "mhz": ("frequency", 1e-3),
-    "гц": ("frequency", 1.0),
-    "hz/s": ("rocof", 1.0),
-    **{
-        unit: ("angle", 0.017453292519943295)
-        for unit in ("deg", "degree", "degrees", "°", "grad", "度")
-    },
-    **{unit: ("angle", 1.0) for unit in ("rad", "radian", "radians")},
-    **{unit: ("", 1.0) for unit in ("pu", "p.u.", "p.u", "per unit", "puv", "1")},
-    "%": ("", 1e-2),
-}
+    unit: (quantity, size)
+    for quantity, sizes in {
+        "t": {
+            1.0: "s sec second seconds sek 秒 с сек",
+            1e-3: "ms msec millisecond milliseconds 毫秒 мс",
+            1e-6: "us µs μs usec microseconds 微秒 мкс",
+            1e-9: "ns",
+            60.0: "min",
+            3600.0: "h",
+            86400.0: "day days",
+        },
+        "power": {1.0: "mw мвт 兆瓦", 1e-3: "kw квт 千瓦", 1e-6: "w", 1e3: "gw"},
+        "reactive": {
+            1.0: "mvar mva мвар 兆乏",
+            1e-3: "kvar kva квар 千乏",
+            1e-6: "var va",
+            1e3: "gvar",
+        },
+        "frequency": {1.0: "hz гц", 1e-3: "mhz"},
+        "rocof": {1.0: "hz/s"},
+        "angle": {0.017453292519943295: "deg degree degrees ° grad 度", 1.0: "rad radian radians"},
+        "": {1.0: "pu p.u. p.u puv 1", 1e-2: "%"},
+    }.items()
+    for size, units in sizes.items()
+    for unit in units.split()
+} | {"per unit": ("", 1.0)}
 PER_UNIT = frozenset(unit for unit, (quantity, _) in UNITS.items() if not quantity)
 FITTING: Mapping[str, tuple[str, ...]] = {
     "t": ("t",),
@@ -95,177 +82,69 @@ UNMISTAKABLE = frozenset(
     )
 )
 
+
+def _by_word(words: Mapping[str, str]) -> dict[str, str]:
+    """{word: what it stands for}, of {what: its words, parted by spaces}."""
+    return {word: what for what, several in words.items() for word in several.split()}
+
+
 # {word: quantity}; longer ones match within a name too, in scripts that do not part words
-WORDS: Mapping[str, str] = {
-    **dict.fromkeys(
-        (
-            "t",
-            "time",
-            "timestamp",
-            "datetime",
-            "zeit",
-            "zeitpunkt",
-            "uhrzeit",
-            "zeitstempel",
-            "clock",
-            "temps",
-            "tiempo",
-            "tempo",
-            "tnow",
-            "utc",
-            "unixtime",
-            "epoch",
-            "время",
-            "时间",
-            "时刻",
+WORDS: Mapping[str, str] = _by_word(
+    {
+        "t": (
+            "t time timestamp datetime zeit zeitpunkt uhrzeit zeitstempel clock temps tiempo "
+            "tempo tnow utc unixtime epoch время 时间 时刻"
         ),
-        "t",
-    ),
-    **dict.fromkeys(("soc", "century"), "soc"),
-    **dict.fromkeys(("date", "datum", "日期", "дата"), "day"),
-    **dict.fromkeys(
-        (
-            "u",
-            "v",
-            "vm",
-            "um",
-            "voltage",
-            "volt",
-            "volts",
-            "vmag",
-            "umag",
-            "urms",
-            "vrms",
-            "u1l",
-            "ul",
-            "ull",
-            "uln",
-            "vll",
-            "vln",
-            "ulg",
-            "vlg",
-            "uac",
-            "vac",
-            "umean",
-            "vmean",
-            "uavg",
-            "vavg",
-            "spannung",
-            "leiterspannung",
-            "vline",
-            "uline",
-            "vph",
-            "uph",
-            "vphase",
-            "uphase",
-            "vpn",
-            "upn",
-            "電圧",
-            "전압",
-            "напряжение",
-            "напряж",
-            "电压",
-            "tension",
-            "tensión",
-            "voltaje",
-            "tensione",
+        "soc": "soc century",
+        "day": "date datum 日期 дата",
+        "U": (
+            "u v vm um voltage volt volts vmag umag urms vrms u1l ul ull uln vll vln ulg vlg "
+            "uac vac umean vmean uavg vavg spannung leiterspannung vline uline vph uph "
+            "vphase uphase vpn upn 電圧 전압 напряжение напряж 电压 tension tensión voltaje "
+            "tensione"
         ),
-        "U",
-    ),
-    **dict.fromkeys(
-        (
-            "i",
-            "im",
-            "current",
-            "curr",
-            "irms",
-            "strom",
-            "ток",
-            "电流",
-            "courant",
-            "corriente",
-            "corrente",
+        "I": "i im current curr irms strom ток 电流 courant corriente corrente",
+        "P": (
+            "p ptot psum ptotal totw pload pl pelec plod powr ppq active real wirkleistung "
+            "активная 有功 有功功率"
         ),
-        "I",
-    ),
-    **dict.fromkeys(
-        (
-            "p",
-            "ptot",
-            "psum",
-            "ptotal",
-            "totw",
-            "pload",
-            "pl",
-            "pelec",
-            "plod",
-            "powr",
-            "ppq",
-            "active",
-            "real",
-            "wirkleistung",
-            "активная",
-            "有功",
-            "有功功率",
+        "Q": (
+            "q qtot qsum qtotal totvar qload ql qelec qlod vars qpq reactive blindleistung "
+            "реактивная 无功 无功功率"
         ),
-        "P",
-    ),
-    **dict.fromkeys(
-        (
-            "q",
-            "qtot",
-            "qsum",
-            "qtotal",
-            "totvar",
-            "qload",
-            "ql",
-            "qelec",
-            "qlod",
-            "vars",
-            "qpq",
-            "reactive",
-            "blindleistung",
-            "реактивная",
-            "无功",
-            "无功功率",
-        ),
-        "Q",
-    ),
-    **dict.fromkeys(
-        ("f", "fe", "freq", "frequency", "fehz", "fq", "frequenz", "frq", "частота", "频率"), "f"
-    ),
-    **dict.fromkeys(("dfdt", "df", "rocof", "dfreq"), "dfdt"),
-}
+        "f": "f fe freq frequency fehz fq frequenz frq частота 频率",
+        "dfdt": "dfdt df rocof dfreq",
+    }
+)
 # {word of a column that holds the fractions of the seconds in another: their unit, "" where their
 # size tells it}
-FRACTIONS: Mapping[str, str] = {
-    **dict.fromkeys(
-        ("fracsec", "frac", "fraction", "fractions", "fractional", "subsecond", "subseconds"), ""
-    ),
-    **dict.fromkeys(
-        ("ms", "msec", "millis", "millisec", "millisecond", "milliseconds", "毫秒"), "ms"
-    ),
-    **dict.fromkeys(("usec", "micros", "microsec", "microsecond", "microseconds", "微秒"), "us"),
-    **dict.fromkeys(("nsec", "nanosecond", "nanoseconds", "纳秒"), "ns"),
-}
+FRACTIONS: Mapping[str, str] = _by_word(
+    {
+        "": "fracsec frac fraction fractions fractional subsecond subseconds",
+        "ms": "ms msec millis millisec millisecond milliseconds 毫秒",
+        "us": "usec micros microsec microsecond microseconds 微秒",
+        "ns": "nsec nanosecond nanoseconds 纳秒",
+    }
+)
 ANGLE = frozenset(("angle", "ang", "winkel", "arg", "phi", "theta", "угол", "相角", "角度", "deg"))
-POSITIVE = frozenset(("pos", "positive", "ps", "1", "正序", "mitsystem"))
-PHASES: Mapping[str, str] = {
-    **dict.fromkeys(("a", "l1", "an", "ag"), "a"),
-    **dict.fromkeys(("b", "l2", "bn", "bg"), "b"),
-    **dict.fromkeys(("c", "l3", "cn", "cg"), "c"),
-    **dict.fromkeys(("ab", "12", "l12", "l1l2"), "ab"),
-    **dict.fromkeys(("bc", "23", "l23", "l2l3"), "bc"),
-    **dict.fromkeys(("ca", "31", "l31", "l3l1"), "ca"),
-    "ba": "ba",
-    "cb": "cb",
-    "ac": "ac",
-    **dict.fromkeys(POSITIVE, "1"),
-    **dict.fromkeys(("neg", "negative", "ns", "2", "负序", "gegensystem"), "2"),
-    **dict.fromkeys(("0", "zero", "zs", "零序"), "0"),
-    "3": "3",
-    "n": "n",
-}
+PHASES: Mapping[str, str] = _by_word(
+    {
+        "a": "a l1 an ag",
+        "b": "b l2 bn bg",
+        "c": "c l3 cn cg",
+        "ab": "ab 12 l12 l1l2",
+        "bc": "bc 23 l23 l2l3",
+        "ca": "ca 31 l31 l3l1",
+        "ba": "ba",
+        "cb": "cb",
+        "ac": "ac",
+        "1": "pos positive ps 1 正序 mitsystem",
+        "2": "neg negative ns 2 负序 gegensystem",
+        "0": "0 zero zs 零序",
+        "3": "3",
+        "n": "n",
+    }
+)
 # line voltages that are the opposite of those of `data.columns`
 BACKWARD = {"ba": "ab", "cb": "bc", "ac": "ca"}
 LINE = frozenset(
@@ -333,7 +212,8 @@ def split_unit(name: str) -> tuple[str, str]:
     in a name of a million brackets.
     """
     name = name.strip().strip('"').strip("'").strip()
-    before, end = name[:-LONGEST_NAME_END], name[-LONGEST_NAME_END:]
+    before = name[:-LONGEST_NAME_END]
+    end = name[-LONGEST_NAME_END:]
     for pattern in BRACKETED:
         if (match := re.fullmatch(pattern, end)) and is_unit(match[2]):
             return before + match[1].strip(), match[2]
@@ -375,7 +255,7 @@ def fits(quantity: str, unit: str, exact: bool = False) -> bool:
     """Whether a unit is one of a quantity, as `data.units` calls it; P in Mvar, Q in MW are, unless
     `exact`.
     """
-    kind = _unit_quantity(amount(unit)[1])
+    kind = unit_quantity(amount(unit)[1])
     return kind in (FITTING[quantity] if exact else {*FITTING[quantity], *ALSO.get(quantity, ())})
 
 
@@ -403,7 +283,8 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     """What a column of that name and unit is, in a table with that order of phases; None for
     anything else.
     """
-    words, kind = _words(name), _unit_quantity(unit)
+    words = _words(name)
+    kind = unit_quantity(unit)
     electrical = kind in (*BY_UNIT, "angle") or not ELECTRICAL.isdisjoint(map(WORDS.get, words))
     if unmarked := _fraction(words, unit) or _other_role(words, unit, electrical):
         return unmarked
@@ -416,7 +297,8 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     key, phase = said
     if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
         return role(f"{name} {unit}", order=order)
-    whole, backward = BACKWARD.get(phase, phase), phase in BACKWARD
+    whole = BACKWARD.get(phase, phase)
+    backward = phase in BACKWARD
     if key in ("U", "I") and _is_angle(words, kind):
         return Role(f"{key}{whole}_angle", unit, backward=backward)
     if key == "U":
@@ -424,7 +306,7 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     return Role(key + whole, unit)
 
 
-def _unit_quantity(unit: str) -> str:
+def unit_quantity(unit: str) -> str:
     """The quantity of a unit; "" of per unit, and for no unit."""
     return (meaning(unit) or ("",))[0]
 

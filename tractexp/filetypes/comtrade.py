@@ -65,9 +65,11 @@ def read_header(path: Path, encoding: str | None = None) -> Header:
         parts = _sections(_find_existing_path(path))
         if "CFG" not in parts:
             raise UserError(f"{path}: no section CFG")
-        place, first = parts["CFG"], parts["CFG"].line
+        place = parts["CFG"]
+        first = parts["CFG"].line
     else:
-        place, first = _whole(_pair(path)[0]), 1
+        place = _whole(_pair(path)[0])
+        first = 1
     text, _ = decode(_configuration(place), str(path), encoding)
     return parse(str(path), lines(text), Remarks(str(path)), first)
 
@@ -112,7 +114,8 @@ def _sections(path: Path) -> dict[str, ByteRange]:
     content: Any = ByteRange(path, 0, files.size(path)).numbers(np.dtype(np.uint8))
     counted, line, at = 0, 1, 0
     while (match := _SECTION.search(content, at)) is not None:
-        name, length = match[1].decode().upper(), match[3]
+        name = match[1].decode().upper()
+        length = match[3]
         begin = match.end()
         if name == "DAT" and match[2].upper() != b"ASCII":
             stop = min(len(content), begin + int(length[:15])) if length else len(content)
@@ -121,7 +124,8 @@ def _sections(path: Path) -> dict[str, ByteRange]:
             stop = following.start() if following else len(content)
         line += int(np.count_nonzero(content[counted:begin] == ord("\n")))
         sections[name] = ByteRange(path, begin, stop, line)
-        counted, at = begin, stop
+        counted = begin
+        at = stop
     return sections
 
 
@@ -161,7 +165,8 @@ def _recording(
 
 def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> Channel:
     """An analog channel with its raw integers, at even times, missing ones marked."""
-    analog, raw = header.analogs[k], samples.analogs[k]
+    analog = header.analogs[k]
+    raw = samples.analogs[k]
     raw, missing = _find_missing_values(header.kind, analog, raw)
     return Channel(
         analog.name,
@@ -193,17 +198,25 @@ def _find_missing_values(
     """The raw values, and which of them stands for none: a value that the file declares possible
     does not.
     """
-    least, greatest = analog.limits or (-np.inf, np.inf)
-    if kind == "BINARY" and least >= 0 and greatest > 32767:  # declared without sign
-        return raw.view("<u2"), 65535.0 if greatest < 65535 else None
     if kind == "ASCII":
-        if analog.limits is None or greatest < MISSING_TEXT[0]:
-            old = raw == MISSING_TEXT[1]
-            raw = np.where(old, raw.dtype.type(MISSING_TEXT[0]), raw) if old.any() else raw
-            return raw, MISSING_TEXT[0]
-        return raw, MISSING_TEXT[1] if greatest < MISSING_TEXT[1] else None
+        return _find_missing_text(analog, raw)
+    least, greatest = analog.limits or (np.inf, np.inf)
     missing = MISSING.get(kind)
-    return raw, missing if missing is None or analog.limits is None or least > missing else None
+    if kind == "BINARY" and analog.limits and least >= 0 and greatest > 32767:
+        return raw.view("<u2"), 65535.0 if greatest < 65535 else None  # declared without sign
+    return raw, None if missing is None or least <= missing else missing
+
+
+def _find_missing_text(analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, float | None]:
+    """The values of a text file, those that stood for none in 1991 as they do now, and which does;
+    None where the file declares both possible.
+    """
+    if analog.limits is not None and analog.limits[1] >= MISSING_TEXT[0]:
+        return raw, MISSING_TEXT[1] if analog.limits[1] < MISSING_TEXT[1] else None
+    old = raw == MISSING_TEXT[1]
+    if old.any():
+        raw = np.where(old, raw.dtype.type(MISSING_TEXT[0]), raw)
+    return raw, MISSING_TEXT[0]
 
 
 def _stretches(
@@ -212,16 +225,22 @@ def _stretches(
     """Segments from the rates; from the time stamps where there are none."""
     fine = all("." in date and len(date.strip().rpartition(".")[2]) > 6 for date in header.dates)
     unit = header.timemult * (1e-9 if fine else 1e-6)
-    if header.rates[0][0] > 0:
-        result = timeline.from_rates(
-            header.rates, _read_stamped_times(header, samples.stamps, unit, remarks)
+    if header.rates[0][0] <= 0:
+        return _stretches_by_stamps(data, header, samples, unit, remarks)
+    t = _read_stamped_times(header, samples.stamps, unit, remarks)
+    result = timeline.from_rates(header.rates, t)
+    if any(s.t is not None for s in result):
+        remarks.add(
+            "sampling rates within 2 % of their neighbours are taken as one waveform",
+            header.lines["rates"],
         )
-        if any(s.t is not None for s in result):
-            remarks.add(
-                "sampling rates within 2 % of their neighbours are taken as one waveform",
-                header.lines["rates"],
-            )
-        return result
+    return result
+
+
+def _stretches_by_stamps(
+    data: ByteRange, header: Header, samples: Samples, unit: float, remarks: Remarks
+) -> list[Stretch]:
+    """Segments from the time stamps, of `unit` s each."""
     stamps = samples.stamps.astype(np.float64)
     if header.kind != "ASCII":
         # the counter ran over
@@ -235,10 +254,9 @@ def _stretches(
             "correct the multiplier"
         )
     if len(result) > 1:
-        gaps = ", ".join(f"{s.segment.start:.6g}" for s in result[1:6]) + (
-            " ..." if len(result) > 6 else ""
-        )
-        remarks.add(f"the steps between time stamps change: a new segment begins at {gaps} s")
+        gaps = ", ".join(f"{s.segment.start:.6g}" for s in result[1:6])
+        more = " ..." if len(result) > 6 else ""
+        remarks.add(f"the steps between time stamps change: a new segment begins at {gaps}{more} s")
     return result
 
 
@@ -256,7 +274,8 @@ def _read_stamped_times(
         return None  # the counter ran over
     first = 0
     for rate, stop in header.rates:
-        duration, stamped = (stop - first - 1) / rate, float(t[stop - 1] - t[first])
+        duration = (stop - first - 1) / rate
+        stamped = float(t[stop - 1] - t[first])
         if abs(duration - stamped) > 2 * unit + 0.01 * duration:
             at = f"samples {first + 1} to {stop} take {duration:.6g} s at {rate:g} Hz"
             remarks.add(

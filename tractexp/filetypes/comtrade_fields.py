@@ -46,12 +46,18 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
     if len(match[1]) > 2:
         orders = [(a, b, c), (a, c, b)]
     for k, (year, month, day) in enumerate(orders):
-        year += (1900 if year >= 70 else 2000) if year < 100 else 0
         try:
-            moment = datetime(year, month, day, hour, minute, second, micro)
+            moment = datetime(_full_year(year), month, day, hour, minute, second, micro)
         except ValueError:
             continue
         return moment, f"date {quote_field(text)} read as {moment:%Y-%m-%d}" if k or len(
             match[1]
         ) > 2 else ""
     return None, f"{quote_field(text)} is not a day of the calendar; not used"
+
+
+def _full_year(year: int) -> int:
+    """A year of which two digits may be written: 70 to 99 are of the last century."""
+    if year >= 100:
+        return year
+    return year + (1900 if year >= 70 else 2000)

@@ -5,6 +5,7 @@ Source: IEEE C37.111-1991, -1999 and -2013. Harmless departures are mended and n
 line.
 """
 
+import functools
 import re
 from collections import deque
 from dataclasses import dataclass, field
@@ -126,7 +127,8 @@ def parse(where: str, lines: list[str], remarks: Remarks, first: int = 1) -> Hea
 
     Raises `UserError` naming line, channel, value, and what is allowed.
     """
-    rows, header = _Lines(where, lines, remarks, first), Header()
+    rows = _Lines(where, lines, remarks, first)
+    header = Header()
     _station(rows, header)
     analogs, digitals = _counts(rows)
     header.lines["analog"] = rows.rest[0][0] if rows.rest else 0
@@ -172,7 +174,8 @@ def _counts(rows: _Lines) -> tuple[int, int]:
             " status",
         )
     counts = {match[3].upper(): int(match[2]), match[5].upper(): int(match[4])}
-    analogs, digitals = counts["A"], counts["D"]
+    analogs = counts["A"]
+    digitals = counts["D"]
     if int(match[1]) != analogs + digitals:
         raise rows.refuse(
             line,
@@ -198,57 +201,76 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
     """The k-th analog channel of so many."""
     line, text = rows.take(f"analog channel {k + 1} of {count}")
     fields = [part.strip() for part in text.split(",")]
-    if len(fields) > 13 and not any(fields[13:]):
-        fields = fields[:13]
     name = fields[1] if len(fields) > 1 else ""
     channel = f"analog channel {k + 1} of {count} {quote_field(name)}"
-    # without P or S
-    short = len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None
-    if len(fields) not in (10, 13) and not short:
+    if not any(fields[13:]):
+        fields = fields[:13]
+    # the first without P or S
+    if len(fields) not in (10, 13) and not _lacks_side(fields):
         raise rows.refuse(
             line,
             f"{channel} has {count_noun(len(fields), 'field')}, but an analog channel has 13, or 10"
             " by the standard "
             "of 1991; correct the line, or the numbers of channels in line 2",
         )
-
-    def value(i: int, what: str, default: float | None) -> float:
-        if not fields[i] and default is not None:
-            rows.remarks.add(f"no {what}, {default:g} taken", line)
-            return default
-        parsed = number(fields[i])
-        if parsed is None or abs(parsed) > GREATEST:
-            raise rows.refuse(
-                line,
-                f"{channel}: {what} {quote_field(fields[i])} is not a number between -1e12 and"
-                " 1e12; correct it",
-            )
-        return parsed
-
     fields += [""] * (13 - len(fields))
+    side = _read_side(rows, line, fields)
+    value = functools.partial(_read_value, rows, line, channel)
+    gain = value(fields[5], "multiplier", None)
+    offset = value(fields[6], "offset", 0.0)
+    skew = value(fields[7], "time skew", 0.0) if fields[7] else 0.0
+    if side:
+        ratio = value(fields[10], "primary ratio", 1.0), value(fields[11], "secondary ratio", 1.0)
+    else:
+        ratio = number(fields[10]) or 1.0, number(fields[11]) or 1.0
+    limits = _read_limits(fields)
+    analog = Analog(name, fields[2], fields[3], fields[4], gain, offset, skew, limits, *ratio, side)
+    return _checked_ratio(rows, line, channel, analog)
+
+
+def _lacks_side(fields: list[str]) -> bool:
+    """Whether the fields of an analog channel are whole but for P or S at their end."""
+    return len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None
+
+
+def _read_limits(fields: list[str]) -> tuple[float, float] | None:
+    """The least and the greatest raw value that a channel declares; None where it does not."""
+    low = number(fields[8])
+    high = number(fields[9])
+    return None if low is None or high is None or low >= high else (low, high)
+
+
+def _read_side(rows: _Lines, line: int, fields: list[str]) -> str:
+    """P or S of an analog channel; "", with a remark where ratios stand without it, for none."""
     side = fields[12].upper()
-    declared = side in ("P", "S")
-    if side and not declared:
+    if side in ("P", "S"):
+        return side
+    if side:
         rows.remarks.add(
             f"{quote_field(fields[12])} is neither P nor S, primary values taken", line
         )
-    elif not declared and any(fields[10:12]):
+    elif any(fields[10:12]):
         rows.remarks.add("neither P nor S stands there, primary values taken", line)
-    low, high = number(fields[8]), number(fields[9])
-    analog = Analog(
-        name,
-        fields[2],
-        fields[3],
-        fields[4],
-        value(5, "multiplier", None),
-        value(6, "offset", 0.0),
-        value(7, "time skew", 0.0) if fields[7] else 0.0,
-        (low, high) if low is not None and high is not None and low < high else None,
-        value(10, "primary ratio", 1.0) if declared else number(fields[10]) or 1.0,
-        value(11, "secondary ratio", 1.0) if declared else number(fields[11]) or 1.0,
-        side if declared else "",
-    )
-    return _checked_ratio(rows, line, channel, analog)
+    return ""
+
+
+def _read_value(
+    rows: _Lines, line: int, channel: str, field: str, what: str, default: float | None
+) -> float:
+    """The number of a field, `default`, with a remark, for an empty one; raises `UserError` for
+    what is no number.
+    """
+    if not field and default is not None:
+        rows.remarks.add(f"no {what}, {default:g} taken", line)
+        return default
+    parsed = number(field)
+    if parsed is None or abs(parsed) > GREATEST:
+        raise rows.refuse(
+            line,
+            f"{channel}: {what} {quote_field(field)} is not a number between -1e12 and"
+            " 1e12; correct it",
+        )
+    return parsed
 
 
 def _checked_ratio(rows: _Lines, line: int, channel: str, analog: Analog) -> Analog:
@@ -326,6 +348,11 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
             "the network there, 50 or 60",
         )
     header.frequency = parsed
+    return _rate_count(rows)
+
+
+def _rate_count(rows: _Lines) -> int | None:
+    """The announced number of sampling rates; None, with a remark, where its line is missing."""
     if "," in rows.peek().strip(", "):
         rows.remarks.add("the number of sampling rates is missing", rows.rest[0][0])
         return None
@@ -340,25 +367,13 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
 
 
 def _rates(rows: _Lines, header: Header, count: int | None) -> None:
-    """Rows of rate and last sample, as many as announced or as there are."""
-    header.lines["rates"] = rows.rest[0][0] if rows.rest else 0
+    """Read rows of rate and last sample into the header, as many as announced or as there are."""
     read = 0
     while not header.rates or _is_rate(rows.peek()):
-        line, text = rows.take("the sampling rates")
+        line, rate, end = _take_rate(rows)
+        header.lines.setdefault("rates", line)
         read += 1
-        fields = [number(part) for part in text.strip(", ").split(",")]
-        rate, end = (*fields, None, None)[:2]
-        if len(fields) != 2 or rate is None or end is None or end != int(end) or abs(end) > 1e15:
-            raise rows.refuse(
-                line,
-                f"{quote_field(text)} is not a sampling rate [Hz] and its last sample, as in"
-                " 4000,8000",
-            )
         last = header.rates[-1][1] if header.rates else 0
-        if rate < 0 or rate > 1e9:
-            raise rows.refuse(
-                line, f"sampling rate {quote_field(text.split(',')[0])} is not between 0 and 1e9 Hz"
-            )
         if end == last and last:
             rows.remarks.add("a sampling rate without samples of its own is passed over", line)
             continue
@@ -369,10 +384,15 @@ def _rates(rows: _Lines, header: Header, count: int | None) -> None:
                 " that of the line before",
             )
         header.rates.append((rate, int(end)))
-    if count not in (None, 0, read) or (count == 0 and read > 1):
+    if count is not None and read != max(count, 1):
         rows.remarks.add(
             f"{count} sampling rates announced, {read} present", header.lines["rates"] - 1
         )
+    _check_rates(rows, header)
+
+
+def _check_rates(rows: _Lines, header: Header) -> None:
+    """Raise `UserError` where time stamps are valid for some rates only."""
     if len({rate > 0 for rate, _ in header.rates}) > 1:
         listed = ", ".join(f"{rate:g}" for rate, _ in header.rates)
         raise rows.refuse(
@@ -380,6 +400,25 @@ def _rates(rows: _Lines, header: Header, count: int | None) -> None:
             f"sampling rates {listed} Hz: a rate of 0 means that time stamps are valid, and "
             "must be the only one",
         )
+
+
+def _take_rate(rows: _Lines) -> tuple[int, float, float]:
+    """(line, sampling rate [Hz], its last sample) of the next line; raises `UserError` for another
+    one.
+    """
+    line, text = rows.take("the sampling rates")
+    fields = [number(part) for part in text.strip(", ").split(",")]
+    rate, end = (*fields, None, None)[:2]
+    if len(fields) != 2 or rate is None or end is None or end != int(end) or abs(end) > 1e15:
+        raise rows.refuse(
+            line,
+            f"{quote_field(text)} is not a sampling rate [Hz] and its last sample, as in 4000,8000",
+        )
+    if rate < 0 or rate > 1e9:
+        raise rows.refuse(
+            line, f"sampling rate {quote_field(text.split(',')[0])} is not between 0 and 1e9 Hz"
+        )
+    return line, rate, end
 
 
 def _is_rate(text: str) -> bool:
@@ -397,21 +436,26 @@ def _dates(rows: _Lines, header: Header) -> None:
         rows.remarks.add("there is no date of the first sample")
         return
     header.dates = entries[0][1], entries[1][1] if len(entries) > 1 else ""
-    moments = []
-    for line, text in entries:
-        moment, remark = date(text, header.revision < 1997)
-        moments.append(moment)
-        if remark:
-            rows.remarks.add(remark, line)
+    moments = [_read_date(rows, line, text, header.revision < 1997) for line, text in entries]
     begin, at = (*moments, None)[:2]
-    unset = begin is not None and begin.date() == EPOCH.date()
-    header.start = None if unset else begin
-    if unset:
-        rows.remarks.add(
-            "the clock was not set (1970); the time of the first sample is missing", entries[0][0]
-        )
-    if begin is not None and at is not None and at != EPOCH:
+    if begin is None:
+        return
+    if at not in (None, EPOCH):
         header.trigger = (at - begin) / timedelta(seconds=1)
+    if begin.date() != EPOCH.date():
+        header.start = begin
+        return
+    rows.remarks.add(
+        "the clock was not set (1970); the time of the first sample is missing", entries[0][0]
+    )
+
+
+def _read_date(rows: _Lines, line: int, text: str, american: bool) -> datetime | None:
+    """The moment that a line says, with a remark on how it was read; None where it is none."""
+    moment, remark = date(text, american)
+    if remark:
+        rows.remarks.add(remark, line)
+    return moment
 
 
 _LIKE_DATE = re.compile(r"^[\s,]*$|\d.*[/:.,\-]|[/:,\-].*\d", re.ASCII)

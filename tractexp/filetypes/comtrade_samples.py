@@ -241,34 +241,44 @@ def _cells(
     ]
     if len(numbered) < len(lines) - last:
         remarks.add(f"blank lines in {place.path.name} are passed over")
-    rows = []
-    for n, text in numbered:
-        if text.count(b",") != width - 1:
-            text = text.rstrip(b", \t")
-        if text.count(b",") != width - 1:
-            if last and n == numbered[-1][0] and rows:
-                remarks.add(f"{place.path.name} ends within a line, which is not used", None)
-                break
-            raise UserError(
-                f"{place.path}: line {n}: {text.count(b',') + 1} cells, but {width} are announced:"
-                " number, time, and "
-                "one for each channel; correct the line, or the numbers of channels in the"
-                " configuration"
-            )
-        rows.append(text)
+    rows = _check_width(place, width, numbered, last, remarks)
     if not rows:
         return np.empty((0, width))
-    flat = _numbers(b",".join(rows), len(rows) * width)
+    flat = _numbers(b",".join(text for _, text in rows), len(rows) * width)
     if flat is None:  # empty cells, or something that is no number
         flat = np.array(
             [
                 _cell(place, n, k, cell)
-                for n, text in numbered
-                for k, cell in enumerate(text.split(b",")[:width])
+                for n, text in rows
+                for k, cell in enumerate(text.split(b","))
             ]
         )
-        flat = flat[: len(rows) * width]
     return flat.reshape(-1, width)
+
+
+def _check_width(
+    place: ByteRange, width: int, numbered: list[tuple[int, bytes]], last: bool, remarks: Remarks
+) -> list[tuple[int, bytes]]:
+    """The numbered lines without commas too many at their ends, and without the file's `last` line
+    where it is cut. Raises `UserError` for one with other cells than `width`.
+    """
+    rows = []
+    for n, text in numbered:
+        if text.count(b",") != width - 1:
+            text = text.rstrip(b", \t")
+        if text.count(b",") == width - 1:
+            rows.append((n, text))
+            continue
+        if last and n == numbered[-1][0] and rows:
+            remarks.add(f"{place.path.name} ends within a line, which is not used", None)
+            break
+        raise UserError(
+            f"{place.path}: line {n}: {text.count(b',') + 1} cells, but {width} are announced:"
+            " number, time, and "
+            "one for each channel; correct the line, or the numbers of channels in the"
+            " configuration"
+        )
+    return rows
 
 
 def _numbers(text: bytes, count: int) -> np.ndarray | None:
@@ -315,7 +325,8 @@ def _narrow(column: np.ndarray) -> np.ndarray:
     """Whole numbers as integers of the fewest bytes; the values stay what they are."""
     if np.isnan(column).any() or (column != np.trunc(column)).any():
         return column.copy()
-    least, greatest = column.min(), column.max()
+    least = column.min()
+    greatest = column.max()
     for kind in (np.int16, np.int32):
         if np.iinfo(kind).min <= least and greatest <= np.iinfo(kind).max:
             return column.astype(kind)

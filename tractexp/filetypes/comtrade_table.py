@@ -2,13 +2,15 @@
 phasors, as a table.
 """
 
+import itertools
 from pathlib import Path
 
 import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.filetypes.columns import meaning, role, split_unit
+from tractexp.filetypes.columns import role, split_unit, unit_quantity
+from tractexp.filetypes.comtrade_header import Header
 from tractexp.filetypes.table import Rows
 from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel
 
@@ -31,18 +33,21 @@ def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
         header = comtrade.read_header(path, encoding)
     except UserError:
         return True
+    quantities, keys = _read_meanings(header)
+    powers = {"power", "reactive"} <= quantities or {"P", "Q"} <= {key[0] for key in keys}
+    if powers and "current" not in quantities:
+        return False
+    phasors = {"U", "I"} <= {key[0] for key in keys if key.endswith("_angle")}
+    fast = max(header.rates)[0] >= FEWEST_PER_CYCLE * header.frequency
+    return fast or not (powers or phasors)
+
+
+def _read_meanings(header: Header) -> tuple[set[str], set[str]]:
+    """(the quantities that the channels' units say, the keys that their names and units say)."""
     parted = [(*split_unit(one.name.strip()), one.unit) for one in header.analogs]
-    units = [unit or inside for _, inside, unit in parted]
-    roles = {
-        one.key for (name, *_), unit in zip(parted, units, strict=True) if (one := role(name, unit))
-    }
-    quantities = [(meaning(unit) or ("",))[0] for unit in units]
-    powers = {"power", "reactive"} <= {*quantities} or {"P", "Q"} <= {key[0] for key in roles}
-    phasors = {"U", "I"} <= {key[0] for key in roles if key.endswith("_angle")}
-    fast = any(rate >= FEWEST_PER_CYCLE * header.frequency for rate, _ in header.rates)
-    if fast or not (powers or phasors):
-        return not (powers and "current" not in quantities)
-    return False
+    columns = [(name, unit or inside) for name, inside, unit in parted]
+    roles = itertools.starmap(role, columns)
+    return {unit_quantity(unit) for _, unit in columns}, {one.key for one in roles if one}
 
 
 def table(path: Path, encoding: str | None = None) -> Rows:

@@ -1,7 +1,9 @@
 """COMTRADE records written, 1999 or 2013: what is read back is what was written."""
 
+from collections.abc import Mapping
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +21,7 @@ FULL = {
     "BINARY32": (-2147483647, 2147483647),
     "FLOAT32": (-3.4028235e38, 3.4028235e38),
 }
-FULL["ASCII"] = (-99999, 99998)
+FULL["ASCII"], FULL["UNSIGNED"] = (-99999, 99998), (0, 65534)
 
 
 def write(
@@ -65,23 +67,22 @@ def _kind(recording: Recording, first_kind: str, revision: int) -> str:
 
 def _fits(channel: Channel, kind: str) -> bool:
     """Whether a type of file can hold every value of a channel as it is."""
-    raw, lacking = np.asarray(channel.raw), _find_lacking_samples(channel)
+    raw = np.asarray(channel.raw)
+    lacking = _find_lacking_samples(channel)
     present = raw[~lacking]
     if kind == "ASCII":
         return True
     if kind == "FLOAT32":
         with np.errstate(over="ignore"):
             return bool((present.astype(np.float32) == present).all())
-    least, greatest = (0, 65534) if _is_unsigned(channel, kind) else FULL[kind]
+    least, greatest = FULL["UNSIGNED" if _is_unsigned(channel, kind) else kind]
+    low, high = channel.limits or (least, greatest)
     if not lacking.any():  # then the value that stands for none is free
-        least, greatest = (0, 65535) if _is_unsigned(channel, kind) else (least - 1, greatest)
-    elif channel.limits is not None and (
-        channel.limits[0] < least or greatest < channel.limits[1] == 65535
-    ):
+        least, greatest = (least, 65535) if least == 0 else (least - 1, greatest)
+    elif low < least or greatest < high == 65535:
         return False  # the file would declare that value possible
-    if raw.dtype.kind == "f" and (present != np.trunc(present)).any():
-        return False
-    return not len(present) or bool(least <= present.min() and present.max() <= greatest)
+    whole = raw.dtype.kind != "f" or present == np.trunc(present)
+    return bool((whole & (least <= present) & (present <= greatest)).all())
 
 
 def _is_unsigned(channel: Channel, kind: str) -> bool:
@@ -102,13 +103,14 @@ def _find_lacking_samples(channel: Channel) -> np.ndarray:
 
 
 def _limits(channel: Channel, kind: str) -> tuple[float, float]:
-    """Those of the channel, or of the kind; wider where a value would else be taken for a missing
-    one.
+    """The least and greatest raw value that the channel declares, or its kind has; wider where a
+    value would else be taken for a missing one.
     """
     raw = np.asarray(channel.raw)[~_find_lacking_samples(channel)]
     if not len(raw):
         return channel.limits or FULL[kind]
-    least, greatest = float(raw.min()), float(raw.max())
+    least = float(raw.min())
+    greatest = float(raw.max())
     low, high = channel.limits or FULL[kind]
     if kind == "ASCII":
         return (low, high) if greatest < 99999 else (low, max(high, greatest, 999999.0))
@@ -123,37 +125,42 @@ def _times(recording: Recording) -> tuple[list[tuple[float, int]], np.ndarray, f
     """Rates with last samples, time stamps (N,) and their multiplier: the file's own where it had
     some.
     """
-    extra, segments = recording.extra, recording.segments
-    own, timemult = extra.get("stamps"), float(extra.get("timemult", 1.0))
-    usable = own is not None and len(own) == recording.samples
-    edges, rates = [0, *(s.stop for s in segments)], extra.get("rates")
-    by_stamps = bool(rates) and rates[0][0] == 0 and "stamps" in extra
-    if [s.first for s in segments] != edges[:-1] or edges[-1] != recording.samples or by_stamps:
-        if not usable:
+    extra, segments, count = recording.extra, recording.segments, recording.samples
+    timemult = float(extra.get("timemult", 1.0))
+    stamps = np.asarray(extra.get("stamps", ()), float)
+    firsts = [s.first for s in segments]
+    stops = [s.stop for s in segments]
+    if _has_stamps_alone(extra) or [*firsts, count] != [0, *stops]:
+        if len(stamps) != count:
             raise UserError(
                 f"{recording.source}: its segments leave samples out, and it has no time stamps: it"
                 " cannot be written "
                 "as COMTRADE; write it as a table"
             )
-        return [(0.0, recording.samples)], np.asarray(own, float), timemult
-    if not usable or not np.isfinite(np.asarray(own, float)).all():
-        last = segments[-1].t[-1] if len(segments) else 0.0
-        while not usable and last > 4.29e3 * timemult:  # a counter of 32 bits
+        return [(0.0, count)], stamps, timemult
+    if len(stamps) != count:
+        t = np.concatenate([s.t for s in segments])
+        while t[-1] > 4.29e3 * timemult:  # a counter of 32 bits
             timemult *= 10
-        own = (
-            own if usable else np.concatenate([np.round(s.t / (1e-6 * timemult)) for s in segments])
-        )
-    return [(s.rate, s.stop) for s in segments], np.asarray(own, float), timemult
+        stamps = np.round(t / (1e-6 * timemult))
+    return [(s.rate, s.stop) for s in segments], stamps, timemult
+
+
+def _has_stamps_alone(extra: Mapping[str, Any]) -> bool:
+    """Whether the file that was read had no rate, but time stamps."""
+    rates = extra.get("rates")
+    return bool(rates) and rates[0][0] == 0 and "stamps" in extra
 
 
 def _lines(
     recording: Recording, kind: str, revision: int, rates: list[tuple[float, int]], timemult: float
 ) -> list[str]:
     """The lines of a configuration."""
-    count, states = len(recording.channels), len(recording.status)
+    count = len(recording.channels)
+    states = len(recording.status)
     sides = recording.extra.get("sides", [])
     if len(sides) != count:
-        sides = [(1.0, 1.0, "P" if channel.ratio == 1 else "") for channel in recording.channels]
+        sides = [(1.0, 1.0, "")] * count
     lines = [
         f"{_name(recording.station)},{_name(recording.device)},{revision}",
         f"{count + states},{count}A,{states}D",
@@ -200,9 +207,12 @@ def _side(channel: Channel, original: tuple[float, float, str]) -> tuple[float, 
 
 
 def _dates(recording: Recording) -> tuple[str, str]:
-    """Of the first sample and the trigger: as the file had them, where they still hold."""
+    """The lines of the first sample's moment and the trigger's: as the file that was read had them,
+    where they still hold.
+    """
     first, second = recording.extra.get("dates", ("", ""))
-    start, at = date(first, False)[0], date(second, False)[0]
+    start = date(first, False)[0]
+    at = date(second, False)[0]
     if recording.extra.get("revision", 1991) >= 1999 and start is not None and at is not None:
         trigger = None if at == EPOCH else (at - start) / timedelta(seconds=1)
         if (start, trigger) == (recording.start, recording.trigger):

@@ -2,12 +2,13 @@
 begin.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tractexp.errors import UserError
-from tractexp.filetypes.cells import is_gap, is_grouped, is_number
+from tractexp.filetypes.cells import is_gap, is_grouped, is_plain_number
 from tractexp.filetypes.clock import is_date, is_time
 from tractexp.filetypes.columns import is_unit, split_unit
 
@@ -34,33 +35,40 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     Raises `UserError` where there are no rows of numbers, no names above them, or too many columns.
     """
     check_column_count(max(map(len, rows), default=0), source)
-    begin = 0 if header is None else header + 1
-    first = next((i for i in range(begin, len(rows)) if _begins(rows, i)), None)
-    if first is None:
-        above = "" if header is None else f" below the header line {header + 1}"
-        names_only = len(rows) == 1 and len(rows[0]) > 1
-        raise UserError(
-            f"{source}: there are no rows below the header line"
-            if names_only
-            else f"{source}: there are no rows of numbers{above}; a table has a line that names its"
-            " columns, "
-            "such as t,U,P,Q, and rows of numbers below it"
-        )
+    first = _find_first_values(rows, source, header)
     named = header if header is not None else _find_name_row(rows, first)
     if named is None:
-        width = len(rows[first])
-        return TableHeading(("",) * width, ("",) * width, first, None)
-    width = max(len(rows[first]), len(rows[named]))
+        blank = ("",) * len(rows[first])
+        return TableHeading(blank, blank, first, None)
     parted = [split_unit(_text(cell)) for cell in rows[named]]
-    beside = _units_beside(rows, named, first, any(unit for _, unit in parted))
-    unit_row = [] if beside is None else _bare(rows[beside])
-    units = [
-        unit_row[k] if k < len(unit_row) and unit_row[k] else unit
-        for k, (_, unit) in enumerate(parted)
-    ]
-    groups = named - 2 if beside == named - 1 else named - 1
-    names = _join_group_names(rows[groups] if groups >= 0 else [], [name for name, _ in parted])
+    names, units = map(list, zip(*parted, strict=True))
+    beside = _units_beside(rows, named, first, any(units))
+    if beside is not None:
+        own = _pad_texts(_bare(rows[beside]), len(units))
+        units = [unit or by_name for unit, by_name in zip(own, units, strict=False)]
+    above = rows[: named - 1 if beside == named - 1 else named]
+    for groups in above[-1:]:
+        names = _join_group_names(groups, names)
+    width = max(len(rows[first]), len(rows[named]))
     return TableHeading(_pad_texts(names, width), _pad_texts(units, width), first, named)
+
+
+def _find_first_values(rows: Sequence[Sequence[Any]], source: str, header: int | None) -> int:
+    """The row, from 0, at which values begin, below a `header` that is given; raises `UserError`
+    where there is none.
+    """
+    begin = 0 if header is None else header + 1
+    for i in range(begin, len(rows)):
+        if _begins(rows, i):
+            return i
+    if len(rows) == 1 and len(rows[0]) > 1:
+        raise UserError(f"{source}: there are no rows below the header line")
+    above = "" if header is None else f" below the header line {header + 1}"
+    raise UserError(
+        f"{source}: there are no rows of numbers{above}; a table has a line that names its"
+        " columns, "
+        "such as t,U,P,Q, and rows of numbers below it"
+    )
 
 
 def check_column_count(count: int, source: str) -> None:
@@ -74,7 +82,7 @@ def check_column_count(count: int, source: str) -> None:
 
 def is_value(cell: Any) -> bool:
     """Whether a cell may stand below a heading: a number in any spelling, a time, or a gap."""
-    return is_number(cell) or is_number(cell, ",") or is_grouped(cell) or is_time(cell)
+    return is_plain_number(cell) or is_grouped(cell) or is_time(cell)
 
 
 def _text(cell: Any) -> str:
@@ -137,18 +145,22 @@ def _are_units(texts: Sequence[str]) -> bool:
 
 
 def _join_group_names(groups: Sequence[Any], names: list[str]) -> list[str]:
-    """The names, after those of a row of groups above them ("Bus 1; Bus 1; Load 2") where there is
-    one.
+    """The names, after those of the row above them where it is one of groups ("Bus 1; Bus 1; Load
+    2").
     """
     above = _spread_merged_cells([_text(cell) for cell in groups], names)
-    repeated = [
-        upper for upper, name in zip(above, names, strict=False) if name and names.count(name) > 1
-    ]
-    told = bool(repeated) and all(repeated) and len({*repeated}) > 1
+    repeated = _find_repeated(names)
+    over = [upper for upper, name in zip(above, names, strict=False) if name in repeated]
+    told = all(over) and len({*over}) > 1
     few = sum(map(bool, above)) < len(names) - 1
     if len(above) != len(names) or len(names) < 3 or (few and not told):
         return names
     return [f"{upper} {name}".strip() for upper, name in zip(above, names, strict=True)]
+
+
+def _find_repeated(names: Sequence[str]) -> set[str]:
+    """The names that several columns have."""
+    return {name for name, count in Counter(names).items() if name and count > 1}
 
 
 def _spread_merged_cells(above: list[str], names: Sequence[str]) -> list[str]:
@@ -157,11 +169,12 @@ def _spread_merged_cells(above: list[str], names: Sequence[str]) -> list[str]:
 
     Only where names repeat, so that they need the groups to be told apart.
     """
-    repeated = {name for name in names if name and names.count(name) > 1}
+    repeated = _find_repeated(names)
     if not repeated or sum(map(bool, above)) < 2:
         return above
     padded = _pad_texts(above, len(names))
-    filled, last = list[str](), ""
+    filled = list[str]()
+    last = ""
     for text, name in zip(padded, names, strict=False):
         last = text or last
         filled.append(last if name in repeated or text else "")

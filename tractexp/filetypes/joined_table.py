@@ -27,20 +27,18 @@ class JoinedTable(TableFile):
     def __init__(self, parts: Sequence[TableFile], paths: Sequence[str]) -> None:
         """Raises `UserError` for other rates, and for times that do not overlap."""
         self.parts, self.source = parts, parts[0].source
-        read = [_times(part) for part in parts]
-        self.aligned = align(
-            [_describe_samples(part, times) for part, (times, _) in zip(parts, read, strict=True)]
-        )
-        first, count = self.aligned.first[0], self.aligned.count
-        times = read[0][0]
+        every, used = zip(*map(_times, parts), strict=True)
+        self.aligned = align(list(map(_describe_samples, parts, every)))
+        first = self.aligned.first[0]
+        count = self.aligned.count
+        times = every[0]
         t = times.t[first : first + count]
-        for k, part in enumerate(parts):
-            _check_rows(part, read[k][0].t[self.aligned.first[k] :][:count], t, parts[0].source)
+        for part, own, begin in zip(parts, every, self.aligned.first, strict=True):
+            _check_rows(part, own.t[begin:][:count], t, parts[0].source)
         if times.start is not None:
             self.start, t = times.start + timedelta(seconds=float(t[0] - times.t[0])), t - t[0]
         self.t, self.frequency = t, parts[0].frequency
-        taken = [used for _, used in read]
-        self.columns, names, said = _columns(parts, taken, tell_apart(paths))
+        self.columns, names, said = _columns(parts, used, tell_apart(paths))
         self.heading = TableHeading(
             ("t", *(name for name, _ in names)), ("s", *(unit for _, unit in names)), 0, 0
         )
@@ -140,12 +138,12 @@ def _columns(
     ]
     columns, names, notes = [], [], []
     for k, number, name, unit in every:
-        alike = [one for one in every if one[2].lower() == name.lower() and one[0] != k]
+        alike = [one for one in every if one[0] != k and one[2].lower() == name.lower()]
         if any(one[0] < k and _same(parts, one[:2], (k, number)) for one in alike):
             notes.append(f"column '{name}' of {parts[k].source} is that of an earlier file")
             continue
         columns.append((k, number))
-        names.append((_tell(name, unit, told[k]) if alike or not role(name, unit) else name, unit))
+        names.append((_tell(name, unit, told[k], bool(alike)), unit))
     return columns, names, notes
 
 
@@ -156,15 +154,21 @@ def _same(parts: Sequence[TableFile], one: Place, other: Place) -> bool:
         _cell(x, a) != _cell(y, b) for x, y in zip(parts[j].sample, parts[k].sample, strict=False)
     ):
         return False
-    first, second = list(parts[j].cells(a)), list(parts[k].cells(b))
+    first = list(parts[j].cells(a))
+    second = list(parts[k].cells(b))
     return first == second and any(cell != first[0] for cell in first)
 
 
-def _tell(name: str, unit: str, told: str) -> str:
-    """A column's name with what its file's name says; that alone where the column says nothing."""
+def _tell(name: str, unit: str, told: str, is_shared: bool) -> str:
+    """A column's name, with what its file's name says where others have it or it says nothing; that
+    alone where it says all.
+    """
+    own = role(name, unit)
+    if own and not is_shared:
+        return name
+    if not own and role(told, unit):
+        return told
     options = [f"{name} {told}", f"{told} {name}", told]
     known = [(option, one) for option in options if (one := role(option, unit))]
-    if not role(name, unit) and role(told, unit):
-        return told
     with_phase = [option for option, one in known if len(one.key) > 1]
     return next(iter((*with_phase, *(option for option, _ in known))), f"{name} {told}".strip())

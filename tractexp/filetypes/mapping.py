@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tractexp.errors import DATA, UserError, among, nearest, setting
-from tractexp.filetypes.cells import is_number
+from tractexp.filetypes.cells import is_plain_number
 from tractexp.filetypes.clock import first_day, is_time
 from tractexp.filetypes.columns import Role, fits, is_unit, meaning, order_of, role
 from tractexp.filetypes.heading import TableHeading
@@ -217,7 +217,8 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
     """The number of a column chosen by name, with or without its unit, or by number; raises
     `UserError` for one that is not there, or several times.
     """
-    names, units = [name.strip() for name in table.heading.names], table.heading.units
+    names = [name.strip() for name in table.heading.names]
+    units = table.heading.units
     if isinstance(choice, int) or (str(choice).isdigit() and str(choice) not in names):
         if 0 <= int(choice) < len(names):
             return int(choice)
@@ -356,7 +357,8 @@ def _spell_out_names(names: Sequence[str]) -> Sequence[str]:
 
 def _resolve_numbered_roles(roles: Mapping[int, Role]) -> dict[str, str]:
     """What U1, U2, U3 are: the phases where there are three; P1 alone is P."""
-    keys, phases = {one.key for one in roles.values()}, {}
+    keys = {one.key for one in roles.values()}
+    phases = {}
     for letter in "UIPQ":
         for ending in ("", "_angle"):
             numbered = [f"{letter}{n}{ending}" for n in (1, 2, 3)]
@@ -417,7 +419,8 @@ def _kind(
     """What the table holds, and the keys that make it up, t first; raises `UserError` for what is
     no such table.
     """
-    kinds, times = _find_kinds(table, options), [key for key in ("t", "frac") if key in options]
+    kinds = _find_kinds(table, options)
+    times = [key for key in ("t", "frac") if key in options]
     for kind, keys in kinds.items():
         if "t" not in options or not {*chosen} <= {"t", "frac", *keys}:
             continue
@@ -438,7 +441,8 @@ def _find_kinds(table: TableFile, options: Mapping[str, Any]) -> dict[str, list[
     Columns of one quantity alone, and columns beside powers, are waveforms only where they
     oscillate.
     """
-    wave, powers = _waveform(options), _powers(options)
+    wave = _waveform(options)
+    powers = _powers(options)
     swings = _oscillates(table, options, wave)
     if len({key[0] for key in wave}) == 1 and not swings:
         wave = []
@@ -471,7 +475,8 @@ def _set(keys: Iterable[str], letter: str, single: Sequence[str]) -> list[str]:
 def _powers(options: Mapping[str, Any]) -> list[str]:
     """The keys of U, P and Q, and of what stands beside them; [] where one is missing."""
     U = _set(options, "U", ("U", "U1")) or _some(options, "U")
-    P, Q = _set(options, "P", ("P",)), _set(options, "Q", ("Q",))
+    P = _set(options, "P", ("P",))
+    Q = _set(options, "Q", ("Q",))
     if not (U and P and Q):
         return []
     angle = [key for key in ("U_angle", "U1_angle") if key in options][:1]
@@ -503,7 +508,8 @@ def _some(keys: Iterable[str], letter: str) -> list[str]:
 
 def _phasors(options: Mapping[str, Any]) -> list[str]:
     """Magnitudes and angles of voltages and currents, and f; [] where those of one are missing."""
-    voltages, currents = _phasor_keys(options, "U"), _phasor_keys(options, "I")
+    voltages = _phasor_keys(options, "U")
+    currents = _phasor_keys(options, "I")
     if not (voltages and currents):
         return []
     return [*voltages, *currents, *(key for key in ("f",) if key in options)]
@@ -551,11 +557,7 @@ def _oscillates(
 def _sample_numbers(table: TableFile, number: int) -> list[float]:
     """The numbers among a column's cells in the first rows, with either decimal mark."""
     cells = [row[number] for row in table.sample if number < len(row)]
-    return [
-        float(str(cell).replace(",", "."))
-        for cell in cells
-        if is_number(cell) or is_number(cell, ",")
-    ]
+    return [float(str(cell).replace(",", ".")) for cell in filter(is_plain_number, cells)]
 
 
 def _describe_missing_columns(
@@ -647,7 +649,8 @@ def _notes(
     other_columns: Collection[str],
 ) -> list[str]:
     """Notes on the role of each column, where names alone do not say it, and on unused columns."""
-    notes, used = [], {one.number for one in (*chosen.values(), *days)}
+    notes = []
+    used = {one.number for one in (*chosen.values(), *days)}
     if any(key != one.name or table.heading.units[one.number] for key, one in chosen.items()):
         notes.append("columns: " + ", ".join(f"{key} = {one.label}" for key, one in chosen.items()))
     served = {"", *other_columns}

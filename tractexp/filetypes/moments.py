@@ -52,16 +52,12 @@ def times_of(table: TableFile, mapping: Mapped, cells: Mapping[int, TableColumn]
     """
     one = mapping.columns["t"]
     time = cells[one.number]
-    result = TableTimes(time.values, None, ())
-    if time.start is None and not time.clock and len(time.values):
+    if time.clock:
+        result = _read_clock_times(table, mapping, time)
+    elif time.start is None and len(time.values):
         result = _read_numeric_times(table, time.values, one.role.unit, FASTEST[mapping.kind])
-    elif time.clock:
-        start = time.start
-        if start is None and mapping.day is not None:
-            start = _midnight(mapping.day) + dt.timedelta(seconds=time.begin)
-        said = [f"{table.place(row)}: {words}" for row, words in time.remarks]
-        said += [f"t counted from {start.isoformat()}, the first row"] if start is not None else []
-        result = TableTimes(time.values, start, tuple(said))
+    else:
+        result = TableTimes(time.values, None, ())
     if "frac" in mapping.columns:
         result = _with_fractions(
             table, mapping, result, cells[mapping.columns["frac"].number].values
@@ -69,6 +65,17 @@ def times_of(table: TableFile, mapping: Mapped, cells: Mapping[int, TableColumn]
     if result.start is None and table.start is not None:
         result = replace(result, start=table.start + dt.timedelta(seconds=float(result.t[0])))
     return result
+
+
+def _read_clock_times(table: TableFile, mapping: Mapped, time: TableColumn) -> TableTimes:
+    """Times of day, with the date that they have or that stands in a column of its own."""
+    start = time.start
+    if start is None and mapping.day is not None:
+        start = _midnight(mapping.day) + dt.timedelta(seconds=time.begin)
+    said = [f"{table.place(row)}: {words}" for row, words in time.remarks]
+    if start is not None:
+        said.append(f"t counted from {start.isoformat()}, the first row")
+    return TableTimes(time.values, start, tuple(said))
 
 
 def _midnight(day: dt.date) -> dt.datetime:
@@ -110,7 +117,8 @@ def _since_1970(seconds: float) -> dt.datetime | None:
 
 def _read_ticks(values: np.ndarray, fastest: float) -> TableTimes | None:
     """Times in tenths of a microsecond, as Windows and .NET count them; None for others."""
-    first, span = float(values[0]), float(values[-1] - values[0])
+    first = float(values[0])
+    span = float(values[-1] - values[0])
     for since, before in TICKS_SINCE.items():
         begun = first * TICK_SECONDS - before
         if EARLIEST <= begun <= LATEST and span * TICK_SECONDS * fastest >= len(values) - 1:
@@ -122,7 +130,8 @@ def _read_ticks(values: np.ndarray, fastest: float) -> TableTimes | None:
 
 def _read_days(table: TableFile, values: np.ndarray, fastest: float) -> TableTimes | None:
     """Times in days, as spreadsheets and MATLAB count them; None where they are none."""
-    span, steps = float(values[-1] - values[0]), len(values) - 1
+    span = float(values[-1] - values[0])
+    steps = len(values) - 1
     if not 0 < span * fastest < steps:
         return None
     for since, more in DAYS_SINCE.items():
@@ -188,8 +197,10 @@ def _unit_of(unit: str, seconds: np.ndarray, fractions: np.ndarray) -> tuple[flo
     most = float(fractions.max(initial=0.0))
     if most < 1:
         return 1.0, "which are below 1"
-    steps, turns = np.diff(fractions), np.diff(seconds)
-    within, across = steps[turns == 0], np.flatnonzero(turns == 1)
+    steps = np.diff(fractions)
+    turns = np.diff(seconds)
+    within = steps[turns == 0]
+    across = np.flatnonzero(turns == 1)
     if len(within) and len(across):
         whole = float(np.median(within)) - float(np.median(steps[across]))
     else:

@@ -97,23 +97,14 @@ def load(path: Path, encoding: str | None = None) -> Recording:
             f"data=csv data.path={path}"
         )
     segments, evened = _segments(str(path), stretches)
-    start, begin = content.observations[0].start, stretches[0].t[0]
+    start = content.observations[0].start
+    begin = stretches[0].t[0]
     last = segments[-1].start + (segments[-1].stop - segments[-1].first) / segments[-1].rate
     stated = (seconds(o.triggered, start) - begin for o in content.observations if o.triggered)
     triggers = sorted({float(t) for t in stated if 0 < t < last})
     return Recording(
         source=str(path),
-        channels=[
-            Channel(
-                d.name,
-                evened[k],
-                unit,
-                QUANTITIES.get(unit, ""),
-                PHASES.get(d.phase, ""),
-                d.circuit,
-            )
-            for k, (d, unit) in ((k, channels[k]) for k in evened)
-        ],
+        channels=[_channel(*channels[k], values) for k, values in evened.items()],
         segments=segments,
         frequency=content.frequency if 10 <= content.frequency <= 100 else 50.0,
         station=content.station,
@@ -125,6 +116,13 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     )
 
 
+def _channel(definition: ChannelDefinition, unit: str, values: np.ndarray) -> Channel:
+    """A defined channel with its values (N,)."""
+    quantity = QUANTITIES.get(unit, "")
+    phase = PHASES.get(definition.phase, "")
+    return Channel(definition.name, values, unit, quantity, phase, definition.circuit)
+
+
 def _waves(
     content: Observed, channels: dict[int, tuple[ChannelDefinition, str]], remarks: Remarks
 ) -> list[Stretch]:
@@ -133,31 +131,31 @@ def _waves(
     """
     stretches: dict[tuple[float, ...], Stretch] = {}
     for each in content.observations:
-        begin, own = (
-            seconds(each.start, content.observations[0].start),
-            dict[tuple[float, ...], Stretch](),
-        )
+        begin = seconds(each.start, content.observations[0].start)
+        own: dict[tuple[float, ...], Stretch] = {}
         for one in each.instances:
             sampled = ((d, v) for d, v in one.series if d.value in (VALUE, INSTANT))
             definition, values = next(sampled, (None, None))
             if definition is None or values is None or len(one.t) < FEWEST_WAVE_SAMPLES:
                 continue
-            if not (np.isfinite(one.t).all() and (np.diff(one.t) > 0).all()):
+            steps = np.diff(one.t)
+            if not ((steps > 0) & (steps < np.inf)).all():
                 raise UserError(
                     f"{remarks.where}: {one.channel.name}: its times do not increase: the file is"
                     " damaged"
                 )
             channels[one.channel.number] = (one.channel, UNITS.get(definition.unit, ""))
-            own.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[
-                one.channel.number
-            ] = values
+            stretch = own.setdefault(_key(begin, one.t), Stretch(begin + one.t, {}))
+            stretch.columns[one.channel.number] = values
         for stretch in _merge_rates([*own.values()], remarks):
             stretches.setdefault(_key(0.0, stretch.t), stretch).columns.update(stretch.columns)
     return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
 
 
 def _key(begin: float, t: np.ndarray) -> tuple[float, ...]:
-    """What times (N,) have in common that are the same."""
+    """(first [s], count, duration [s]) of times (N,), to the microsecond: equal where they are the
+    same times.
+    """
     return round(begin + float(t[0]), 6), len(t), round(float(t[-1] - t[0]), 6)
 
 
@@ -275,15 +273,10 @@ def _logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]
                 if not name or len(one.t) < 2:
                     continue
                 number = numbers.setdefault((one.channel.number, k), len(numbers))
-                name = (
-                    f"{one.channel.circuit} {name}"
-                    if len(circuits) > 1 and one.channel.circuit
-                    else name
-                )
-                names[number] = (name, UNITS[definition.unit])
-                stretches.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[
-                    number
-                ] = column
+                circuit = one.channel.circuit if len(circuits) > 1 else ""
+                names[number] = (" ".join(filter(None, (circuit, name))), UNITS[definition.unit])
+                stretch = stretches.setdefault(_key(begin, one.t), Stretch(begin + one.t, {}))
+                stretch.columns[number] = column
     return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
 
 
@@ -294,15 +287,16 @@ def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value:
     unit = UNITS.get(definition.unit, "")
     phase = SEQUENCES.get(definition.characteristic, channel.phase)
     mark = PHASES.get(phase, MEANS.get(phase, ""))
+    values = (VALUE,) if has_value else (AVERAGE, INSTANT)
     if definition.value in ANGLES and unit == "deg" and channel.quantity in ("U", "I"):
         return f"{channel.quantity}{mark} angle"
     letter = LETTERS.get(unit, "")
-    if not letter or definition.value not in ((VALUE,) if has_value else (AVERAGE, INSTANT)):
+    if not letter or definition.value not in values:
         return ""
-    mark = mark if letter in "UI" or mark in "ABC" else ""
+    name = letter + mark if letter in "UI" or mark in "ABC" else letter
     if definition.characteristic in FUNDAMENTAL:
-        return f"{letter}{mark} fundamental"
-    return f"{letter}{mark}" if definition.characteristic in (*PLAIN, *SEQUENCES) else ""
+        return f"{name} fundamental"
+    return name if definition.characteristic in (*PLAIN, *SEQUENCES) else ""
 
 
 def _longest(

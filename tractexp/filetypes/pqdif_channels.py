@@ -46,7 +46,8 @@ GROUP, KIND = (
 )
 SERIES_DEFINITIONS = tag("b48d8598-f5f5-11cf-9d89-0080c72e70a3")
 SERIES_DEFINITION = tag("b48d859a-f5f5-11cf-9d89-0080c72e70a3")
-QUANTITY, QUANTITIES = tag("c690e872-f755-11cf-9d89-0080c72e70a3"), {1: "U", 2: "I", 3: "P"}
+QUANTITY = tag("c690e872-f755-11cf-9d89-0080c72e70a3")
+QUANTITIES = {1: "U", 2: "I", 3: "P"}
 UNIT, VALUE = (
     tag("b48d859b-f5f5-11cf-9d89-0080c72e70a3"),
     tag("b48d859c-f5f5-11cf-9d89-0080c72e70a3"),
@@ -171,7 +172,8 @@ class Observed:
 
     def source(self, body: Collection) -> None:
         """Take in a record that defines the channels."""
-        name, channels = body.text(SOURCE_NAME), body.collection(CHANNELS)
+        name = body.text(SOURCE_NAME)
+        channels = body.collection(CHANNELS)
         self.station, self.ratios, self.definitions = self.station or name, {}, []
         for each in channels.collections(CHANNEL) if channels else ():
             listed = each.collection(SERIES_DEFINITIONS)
@@ -185,7 +187,8 @@ class Observed:
                 for one in (listed.collections(SERIES_DEFINITION) if listed else ())
             ]
             circuit = " ".join(each.texts(GROUP)) or (name if name != self.station else "")
-            phase, kind = int(each.number(PHASE)), each.identifier(KIND)
+            phase = int(each.number(PHASE))
+            kind = each.identifier(KIND)
             quantity = QUANTITIES.get(int(each.number(QUANTITY)), "")
             definition = ChannelDefinition(
                 self.count, each.text(NAME), phase, circuit, quantity, kind, tuple(series)
@@ -200,13 +203,15 @@ class Observed:
         if not body.number(USE_RATIO):
             return
         for each in listed.collections(CHANNEL_SETTING) if listed else ():
-            primary, secondary = each.number(PRIMARY), each.number(SECONDARY)
+            primary = each.number(PRIMARY)
+            secondary = each.number(SECONDARY)
             if primary > 0 and secondary > 0:
                 self.ratios[int(each.number(NUMBER, -1))] = primary / secondary
 
     def observation(self, body: Collection) -> None:
         """Take in a record of samples."""
-        start, listed = body.moment(START), body.collection(INSTANCES)
+        start = body.moment(START)
+        listed = body.collection(INSTANCES)
         if start is None or listed is None:
             self.remarks.add(
                 f"{_record(body)}: an observation without start or channels is not read"
@@ -246,22 +251,34 @@ class Observed:
         key = (clock[1].owner.at, clock[0])
         if key not in times:
             times[key] = self._times(*clock, start, longest)
-        t, series = times[key], list[tuple[SeriesDefinition, np.ndarray]]()
+        t = times[key]
         if t is None:
             return None
+        series = self._sampled_series(channel, pairs, len(t), longest)
+        return Instance(channel, t, tuple(series)) if series else None
+
+    def _sampled_series(
+        self,
+        channel: ChannelDefinition,
+        pairs: Sequence[tuple[SeriesDefinition, "_Series"]],
+        count: int,
+        longest: int,
+    ) -> list[tuple[SeriesDefinition, np.ndarray]]:
+        """The series of a channel but its times, with their primary values (count,); others are
+        passed over with a remark.
+        """
+        ratio = self.ratios.get(channel.number - self.definitions[0].number, 1.0)
+        series = []
         for definition, one in pairs:
             values = None if definition.value == TIME else self._values(definition, one, longest)
-            if values is not None and len(values) == len(t):
-                series.append(
-                    (
-                        definition,
-                        values * self.ratios.get(channel.number - self.definitions[0].number, 1.0),
-                    )
-                )
-            elif values is not None:
-                counts = f"{len(values)} values at {len(t)} times"
-                self.remarks.add(f"{_record(one.own)}: {channel.name} has {counts}: not read")
-        return Instance(channel, t, tuple(series)) if series else None
+            if values is None:
+                continue
+            if len(values) == count:
+                series.append((definition, values * ratio))
+                continue
+            counts = f"{len(values)} values at {count} times"
+            self.remarks.add(f"{_record(one.own)}: {channel.name} has {counts}: not read")
+        return series
 
     def _times(
         self, definition: SeriesDefinition, one: "_Series", start: tuple[int, float], longest: int
@@ -309,7 +326,8 @@ class Observed:
     def _expand_steps(self, one: "_Series", raw: np.ndarray, longest: int) -> np.ndarray:
         """Values of [runs, count, step, count, step, ...]: each run goes on from the one before."""
         runs = int(raw[0]) if len(raw) and 0 <= raw[0] <= len(raw) / 2 else -1
-        counts, steps = raw[1 : 1 + 2 * max(runs, 0) : 2], raw[2 : 2 + 2 * max(runs, 0) : 2]
+        counts = raw[1 : 1 + 2 * max(runs, 0) : 2]
+        steps = raw[2 : 2 + 2 * max(runs, 0) : 2]
         if runs < 0 or len(steps) < runs or not np.isfinite(raw).all() or (counts < 0).any():
             raise one.own.body.describe_damage(
                 "a series of equal steps does not say how many there are of each"

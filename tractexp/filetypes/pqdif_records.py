@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,14 +25,16 @@ from tractexp.storage import files
 from tractexp.text.wording import count_noun
 
 SIGNATURE = uuid.UUID("4a111440-e49f-11cf-9900-505144494600").bytes_le
-HEADER, ENTRY = struct.Struct("<16s16siiiI"), struct.Struct("<16sBBBxii")
+HEADER = struct.Struct("<16s16siiiI")
+ENTRY = struct.Struct("<16sBBBxii")
 HEADER_BYTES = 64
 LARGEST = 256 * 2**20  # bytes of all bodies together, decompressed
 MOST_RECORDS = 100_000
 # of one record: compressed zeros may announce millions, each of which takes memory
 MOST_ELEMENTS = 200_000
 LONGEST_TEXT = 400  # letters of a text that are read
-BYTE, COUNT = np.dtype("u1"), np.dtype("<i4")
+BYTE = np.dtype("u1")
+COUNT = np.dtype("<i4")
 COLLECTION, SCALAR, VECTOR = 1, 2, 3  # kinds of elements
 MOMENT = np.dtype([("day", "<u4"), ("second", "<f8")])  # since 30 December 1899
 TYPES = {
@@ -198,48 +200,77 @@ def records(
     while count < MOST_RECORDS:
         count += 1
         where = f"{path}: record {count}"
-        if at + HEADER_BYTES > len(data):
-            remarks.add(
-                f"the file ends before record {count}: it is not whole; what comes before is read"
-            )
+        stored = _read_stored(data, at, count, path, remarks)
+        if stored is None:
             return
-        signature, kind, header, size, following, checksum = HEADER.unpack_from(data, at)
-        if signature != SIGNATURE or header < HEADER_BYTES or size < 0:
-            raise UserError(
-                f"{where}: byte {at} is no header of a record: the file is damaged; get it again"
-            )
-        content = data[at + header : at + header + size]
-        if len(content) < size:
-            remarks.add(
-                f"the file ends within record {count}: it is not whole; what comes before is read"
-            )
-            return
-        reached[at] = at + header + size
-        body = _decompress_body(content, room, where) if compressed else content
+        reached[at], following = stored.end, stored.following
+        body = _decompress_body(stored.content, room, where) if compressed else stored.content
         room -= len(body)
-        if checksum and checksum not in _checksums(content, body):
+        if stored.checksum not in (0, *_checksums(stored.content, body)):
             remarks.add(
                 f"record {count}: the checksum does not fit: it was altered, or damaged on its way"
             )
-        if size:
+        if body:
             collection = Collection(Body(body, where, encoding), 0)
-            if kind == CONTAINER:
+            if stored.kind == CONTAINER:
                 compressed = _compression(collection, where)
             else:
-                yield kind, collection
+                yield stored.kind, collection
         if not 0 < following < len(data) or following in reached:
             break
         at = following
-    if following > len(data):
-        remarks.add(
-            f"the file ends before record {count + 1}: it is not whole; what comes before is read"
-        )
-    elif following > 0 and following in reached:
+    _tell_link(count, following, len(data), reached, remarks)
+    _tell_unreached(data, reached, remarks)
+
+
+def _tell_link(
+    count: int, following: int, size: int, reached: Mapping[int, int], remarks: Remarks
+) -> None:
+    """Remark on the last record that was read, whose link leads behind the end, or back."""
+    if following > size:
+        remarks.add(_describe_end("before", count + 1))
+    elif following and following in reached:
         remarks.add(
             f"record {count} links back to byte {following}, a record that was read: a link is"
             " damaged"
         )
-    _tell_unreached(data, reached, remarks)
+
+
+class _Stored(NamedTuple):
+    """A record as the file holds it: its content compressed or not, the byte after it, and the
+    first one of the record that it links to.
+    """
+
+    kind: bytes
+    content: bytes
+    checksum: int
+    end: int
+    following: int
+
+
+def _read_stored(data: bytes, at: int, count: int, path: Path, remarks: Remarks) -> _Stored | None:
+    """The record, the `count`-th, at a byte of the file; None, with a remark, where the file ends
+    before or in it. Raises `UserError` where there is none.
+    """
+    if at + HEADER_BYTES > len(data):
+        remarks.add(_describe_end("before", count))
+        return None
+    signature, kind, header, size, following, checksum = HEADER.unpack_from(data, at)
+    if signature != SIGNATURE or header < HEADER_BYTES or size < 0:
+        raise UserError(
+            f"{path}: record {count}: byte {at} is no header of a record: the file is damaged; get"
+            " it again"
+        )
+    end = at + header + size
+    if len(data) < end and size:
+        remarks.add(_describe_end("within", count))
+        return None
+    return _Stored(kind, data[at + header : end], checksum, end, following)
+
+
+def _describe_end(where: str, count: int) -> str:
+    """The remark on a file that ends "before" or "within" a record."""
+    return f"the file ends {where} record {count}: it is not whole; what comes before is read"
 
 
 def _checksums(content: bytes, body: bytes) -> Iterator[int]:
@@ -272,7 +303,8 @@ def _tell_unreached(data: bytes, reached: Mapping[int, int], remarks: Remarks) -
 
 def _compression(container: Collection, where: str) -> bool:
     """Whether the records after the container are compressed, each by itself."""
-    style, algorithm = container.number(STYLE), container.number(ALGORITHM)
+    style = container.number(STYLE)
+    algorithm = container.number(ALGORITHM)
     if not (style and algorithm):
         return False
     if (style, algorithm) != (PER_RECORD, ZLIB):

@@ -34,11 +34,12 @@ class Results(TableFile):
         as many.
         """
         self.source, self.parts = source, parts
-        self.columns = [(part, k) for part in parts for k in range(1, part.width)]
-        if len(names) != len(self.columns):
+        channels = [(part, k) for part in parts for k in range(1, part.width)]
+        self.columns = [(parts[0], 0), *channels]  # whose time is that of all
+        if len(names) != len(channels):
             raise UserError(
                 f"{source}: its .inf file names {len(names)} channels, and the .out files have"
-                f" {len(self.columns)}; "
+                f" {len(channels)}; "
                 "keep those of one run in a folder"
             )
         self.heading = TableHeading(
@@ -57,16 +58,10 @@ class Results(TableFile):
         """
         cells: dict[int, TableColumn] = {}
         for part in self.parts:
-            first = part is self.parts[0]  # whose time is that of all
-            own = {
-                k: kind
-                for k, kind in wanted.items()
-                if (self.columns[k - 1][0] is part if k else first)
-            }
-            columns = part.read(
-                {0: "time", **{self.columns[k - 1][1]: kind for k, kind in own.items() if k}}
-            )
-            cells |= {k: columns[self.columns[k - 1][1] if k else 0] for k in own}
+            own = {k: self.columns[k][1] for k in wanted if self.columns[k][0] is part}
+            kinds = {number: wanted[k] for k, number in own.items()}
+            columns = part.read({**kinds, 0: "time"})
+            cells |= {k: columns[number] for k, number in own.items()}
         lengths = {len(one.values) for one in cells.values()}
         if len(lengths) > 1:
             counts = " and ".join(map(str, sorted(lengths)))
@@ -77,7 +72,7 @@ class Results(TableFile):
 
     def cells(self, number: int) -> Sequence[str]:
         """The cells of a column, as its file has them."""
-        part, own = self.columns[number - 1] if number else (self.parts[0], 0)
+        part, own = self.columns[number]
         return part.cells(own)
 
     def place(self, row: int) -> str:
@@ -100,19 +95,14 @@ def table(path: Path, form: TableForm) -> Results:
             " it, which is not "
             "there; export that of another simulator as .csv"
         )
-    parts = [
-        each
-        for each in beside
-        if each.suffix.lower() == ENDING
-        and (
-            each == path
-            if number is None
-            else (m := _NUMBERED.fullmatch(each.stem)) is not None and m[1] == case
-        )
-    ]
-    return Results(
-        str(path), [_columns(each, form) for each in parts], _names(names, form.encoding)
-    )
+    parts = [_columns(each, form) for each in beside if each == path or _is_part(each, number)]
+    return Results(str(path), parts, _names(names, form.encoding))
+
+
+def _is_part(path: Path, number: re.Match[str] | None) -> bool:
+    """Whether a file holds channels of the case that another numbered one is of."""
+    own = _NUMBERED.fullmatch(path.stem) if path.suffix.lower() == ENDING else None
+    return own is not None and number is not None and own[1] == number[1]
 
 
 def _columns(path: Path, form: TableForm) -> TextTable:

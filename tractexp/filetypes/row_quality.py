@@ -33,7 +33,8 @@ def find_bad_rows(table: TableFile, count: int) -> tuple[np.ndarray, tuple[str, 
 
     Rows marked in a row are used as they stand: what they are worth, nobody but the reader knows.
     """
-    bad, said = np.zeros(count, dtype=bool), list[str]()
+    bad = np.zeros(count, dtype=bool)
+    said = list[str]()
     for number, name in enumerate(table.heading.names):
         if not NAMED.search(name):
             continue
@@ -73,16 +74,20 @@ def _read_marks(cells: Sequence[Any], name: str) -> np.ndarray | None:
     if not any(text[:1].isdigit() for text in texts):
         return np.array([text in BAD for text in texts])
     if "stat" in name.lower():
-        words = [_read_word(text, texts) for text in texts]
-        return np.array([word is not None and bool(word & DATA_ERROR) for word in words])
-    codes = [int(float(text)) if re.fullmatch(r"\d+(\.0*)?", text) else None for text in texts]
+        return np.array([bool(word & DATA_ERROR) for word in _read_status_words(texts)])
+    codes = list(map(_read_code, texts))
     if Counter(codes).most_common(1)[0][0] != OPC_GOOD:
         return None
     return np.array([code is not None and not code & OPC_QUALITY for code in codes])
 
 
-def _read_word(text: str, texts: Sequence[str]) -> int | None:
-    """A status word, written in decimal digits or as four hexadecimal ones."""
-    if all(HEX_WORD.fullmatch(each) for each in texts):
-        return int(text.removeprefix("0x").removesuffix("h"), 16)
+def _read_status_words(texts: Sequence[str]) -> list[int]:
+    """Status words, written in decimal digits or as four hexadecimal ones; 0 for what is none."""
+    if all(map(HEX_WORD.fullmatch, texts)):
+        return [int(text.removeprefix("0x").removesuffix("h"), 16) for text in texts]
+    return [_read_code(text) or 0 for text in texts]
+
+
+def _read_code(text: str) -> int | None:
+    """A whole number in decimal digits; None for another text."""
     return int(float(text)) if re.fullmatch(r"\d+(\.0*)?", text) else None

@@ -44,17 +44,16 @@ def read_sidecar(path: str) -> Sidecar:
     content = files.read_json(file)
     if not isinstance(content, dict):
         return Sidecar()
-    notes = [content["note"]] if isinstance(content.get("note"), str) else []
-    notes += [note for note in _take_kind(list, content, "notes") if isinstance(note, str)]
+    notes = [content.get("note"), *_take_kind(list, content, "notes")]
     return Sidecar(
         str(content["name"]) if "name" in content else None,
-        tuple(notes),
+        tuple(note for note in notes if isinstance(note, str)),
         _base(file, content.get("base")),
         _take_kind(dict, content, "columns"),
         {key: str(unit) for key, unit in _take_kind(dict, content, "units").items()},
         content.get("uniform") is True,
         _window(file, content.get("window")),
-        tuple(str(name) for name in _take_kind(list, content, "more")),
+        tuple(map(str, _take_kind(list, content, "more"))),
         _take_kind(dict, content, "recording") or None,
     )
 

@@ -207,16 +207,15 @@ def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
     if form.join:
         from tractexp.filetypes.joined_table import JoinedTable
 
-        alone, paths = replace(form, join=()), (path, *form.join)
+        alone = replace(form, join=())
+        paths = (path, *form.join)
         return JoinedTable([open_table(one, alone) for one in paths], paths)
 
     if instrument := instrument_of(locate_file(path)):
         return instrument.table(locate_file(path), form.encoding)
     if Path(path).suffix.lower() == pscad.ENDING:
         return pscad.table(locate_file(path), form)
-    data = content(path, None if whole else HEAD)
-    if not whole and data.startswith((PARQUET, *SPREADSHEETS)):
-        data = content(path)
+    data = content(path, None if whole else HEAD, whole=(PARQUET, *SPREADSHEETS))
     if data.startswith(PARQUET):
         return _parquet(path, data)
     if data.startswith(SPREADSHEETS):
@@ -227,28 +226,32 @@ def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
     return open_text(path, data, form)
 
 
-def content(path: str, limit: int | None = None) -> bytes:
+def content(path: str, limit: int | None = None, whole: tuple[bytes, ...] = ()) -> bytes:
     """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole
-    lines to a limit.
+    lines to a limit, but for files that begin as `whole` do.
+
+    Raises `UserError` where it is not there.
     """
     file = locate_file(path)
-    folder = file.parent
     if not files.there(file):
-        if file.is_dir():
-            raise UserError(
-                f"{path} is a folder, not a file; give a file in it, or task=survey"
-                f" data.path={path}"
-            )
-        there = folder.is_dir() or files.is_archive(folder)
-        names = (
-            [item.name for item in files.list_folder(folder) if not item.is_dir()]
-            if there
-            else None
-        )
-        hint = "; that folder does not exist" if names is None else nearest(file.name, names)
-        raise UserError(f"{path}: there is no such file in {folder}{hint}")
+        raise UserError(_describe_missing(path, file))
     data = files.read(file, limit)
-    return data if limit is None or len(data) < limit else data[: data.rfind(b"\n") + 1] or data
+    if limit is None or len(data) < limit:
+        return data
+    return files.read(file) if data.startswith(whole) else data[: data.rfind(b"\n") + 1] or data
+
+
+def _describe_missing(path: str, file: Path) -> str:
+    """What to give in place of a file that is not there."""
+    if file.is_dir():
+        return f"{path} is a folder, not a file; give a file in it, or task=survey data.path={path}"
+    folder = file.parent
+    if not (folder.is_dir() or files.is_archive(folder)):
+        hint = "; that folder does not exist"
+    else:
+        names = [item.name for item in files.list_folder(folder) if not item.is_dir()]
+        hint = nearest(file.name, names)
+    return f"{path}: there is no such file in {folder}{hint}"
 
 
 def _parquet(path: str, data: bytes) -> TableFile:
@@ -325,7 +328,7 @@ def _rows_of(path: str, book: ReadingProcess, name: str, form: TableForm) -> Row
             raise
         raise UserError(f"{path}: sheet '{name}' cannot be read; save it as CSV") from bad
     source = f"{path}: sheet '{name}'"
-    filled = [i for i, row in enumerate(rows) if any(cell not in ("", None) for cell in row)]
+    filled = [i for i, row in enumerate(rows) if any(map(_is_filled, row))]
     if not filled:
         raise UserError(
             f"{source} is empty; it must have a line naming the columns, such as t, U, P, Q"
@@ -345,5 +348,10 @@ def _rows_of(path: str, book: ReadingProcess, name: str, form: TableForm) -> Row
 
 def _trim_row(row: Sequence[Any]) -> list[Any]:
     """A row without the empty cells at its end."""
-    filled = [k for k, cell in enumerate(row) if cell not in ("", None)]
+    filled = [k for k, cell in enumerate(row) if _is_filled(cell)]
     return list(row[: filled[-1] + 1])
+
+
+def _is_filled(cell: Any) -> bool:
+    """Whether anything stands in a cell of a sheet."""
+    return cell not in ("", None)

@@ -20,12 +20,11 @@ from tractexp.filetypes.cells import (
     find_group_mark,
     find_rising_group_mark,
     group_mark,
-    is_grouped,
     is_number,
 )
 from tractexp.filetypes.clock import is_time
 from tractexp.filetypes.columns import split_unit
-from tractexp.filetypes.heading import TableHeading, heading
+from tractexp.filetypes.heading import TableHeading, heading, is_value
 from tractexp.filetypes.table import TableColumn, TableFile, TableForm, column
 from tractexp.filetypes.text import MARKS, decode
 from tractexp.text.wording import count_noun
@@ -64,10 +63,7 @@ class TextTable(TableFile):
         )
         self.heading = self._heading(rows, header)
         self.sample = rows[self.heading.first :]
-        rising = "" if form.decimal else find_rising_group_mark(self.sample)
-        decimal = {".": ",", ",": "."}.get(rising) or _decimal(self.sample)
-        self.decimal = form.decimal or decimal
-        self.group = rising or find_group_mark(self.sample, self.decimal)
+        self.decimal, self.group = _detect_marks(self.sample, form.decimal)
         self.line = lines[self.heading.first][0]  # of the first row of values, from 1
         self.width = len(self.sample[0])
         self._lines: np.ndarray | None = None  # of the rows, where they were read cell by cell
@@ -122,22 +118,26 @@ class TextTable(TableFile):
         rows = head.count(b"\n") + 1 - self.line
         if not line_end or not last.strip() or rows < FEWEST_WHOLE:
             return
-        before = (
-            head[-HEAD:].split(b"\n")[-SAMPLE:]
-            if rows >= SAMPLE
-            else head.split(b"\n")[self.line - 1 :]
-        )
-        cells = [_cells(text.decode(errors="replace"), self.delimiter) for text in (last, *before)]
-        counts = [_decimals(row[-1], self.decimal) for row in cells if len(row) == len(cells[0])]
-        shorter = len(counts) > 1 and counts[0] < min(counts[1:])
-        if len({*counts}) == 1 and counts[0] > 0:
+        before = head.split(b"\n")[self.line - 1 :] if rows < SAMPLE else head[-HEAD:].split(b"\n")
+        decimals, others = self._count_last_decimals(last, before[-SAMPLE:])
+        if decimals > 0 and others <= {decimals}:
             return
         said = (
             f"line {self.data.count(LINE_END) + 1}, the last one, has no line end and may be cut"
             " short"
         )
-        self.notes += (f"{said}: it is not used" if shorter else said,)
-        self.data = head + line_end if shorter else self.data
+        if others and decimals < min(others):
+            said += ": it is not used"
+            self.data = head + line_end
+        self.notes += (said,)
+
+    def _count_last_decimals(self, last: bytes, before: Sequence[bytes]) -> tuple[int, set[int]]:
+        """(decimals of the last cell of a line, those of the lines before with as many cells)."""
+        cells, *others = [
+            _cells(text.decode(errors="replace"), self.delimiter) for text in (last, *before)
+        ]
+        counts = {_decimals(row[-1], self.decimal) for row in others if len(row) == len(cells)}
+        return _decimals(cells[-1], self.decimal), counts
 
     def cells(self, number: int) -> list[str]:
         """The cells of a column."""
@@ -155,9 +155,9 @@ class TextTable(TableFile):
         """The wanted columns {number: kind}: all at once where they are plain numbers, else cell by
         cell.
         """
-        texts = [n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)]
-        columns = None if texts or self.group else self._at_once(list(wanted))
-        return self._cell_by_cell(wanted) if columns is None else columns
+        clocks = [n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)]
+        columns = None if clocks or self.group else self._at_once(list(wanted))
+        return self._cell_by_cell(wanted, clocks) if columns is None else columns
 
     def _is_clock(self, number: int) -> bool:
         """Whether a column holds times of the day."""
@@ -177,13 +177,10 @@ class TextTable(TableFile):
         if self.decimal == ",":
             body = body.replace(b",", b".")
         spaced = self.delimiter == " "
+        delimiter, columns = (None, None) if spaced else (self.delimiter, wanted)
+        text = io.TextIOWrapper(io.BytesIO(body), "utf-8")
         try:
-            matrix = np.loadtxt(
-                io.TextIOWrapper(io.BytesIO(body), "utf-8"),
-                delimiter=None if spaced else self.delimiter,
-                usecols=None if spaced else wanted,
-                ndmin=2,
-            )
+            matrix = np.loadtxt(text, delimiter=delimiter, usecols=columns, ndmin=2)
         except (ValueError, OverflowError):
             return None
         if not len(matrix) or not (spaced or cells == len(matrix) * (self.width - 1)):
@@ -192,36 +189,49 @@ class TextTable(TableFile):
             matrix = matrix[:, list(wanted)]
         return {number: TableColumn(matrix[:, k].copy()) for k, number in enumerate(wanted)}
 
-    def _cell_by_cell(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
-        """The columns, each cell looked at; raises `UserError` naming line, column and cell."""
-        clock = {n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)}
-        times: dict[int, list[str]] = {n: [] for n in clock}
-        done: dict[int, list[np.ndarray]] = {n: [np.empty(0)] for n in wanted if n not in clock}
-        self._lines, lines, rows = None, np.empty(0, int), self._rows(max(wanted))
+    def _cell_by_cell(
+        self, wanted: Mapping[int, str], clocks: Sequence[int]
+    ) -> dict[int, TableColumn]:
+        """The columns, each cell looked at, those of `clocks` as a whole; raises `UserError` naming
+        line, column and cell.
+        """
+        texts: dict[int, list[str]] = {n: [] for n in clocks}
+        kinds = {n: wanted[n] for n in wanted.keys() - texts.keys()}
+        parts: dict[int, list[np.ndarray]] = {n: [np.empty(0)] for n in kinds}
+        self._lines, rows = np.empty(0, int), self._rows(max(wanted))
         while block := list(itertools.islice(rows, BLOCK)):
-            before, lines = len(lines), np.append(lines, [line for line, _ in block])
-            # of all columns alike, so that the first bad line is refused
-            bad: list[tuple[int, int, str]] = []
-            for number, kind in wanted.items():
-                cells = [row[number] for _, row in block]
-                if number in clock:
-                    times[number] += cells
-                    continue
-                try:
-                    done[number].append(column(cells, kind, self.decimal, self.group).values)
-                except BadCell as one:
-                    bad.append((before + one.row, number, one.why))
-            if bad:
-                self._lines = lines
-                raise self.refuse(*min(bad))
-        self._lines = lines
-        columns = {n: TableColumn(np.concatenate(parts)) for n, parts in done.items()}
-        for number, cells in times.items():
+            lines, block_rows = zip(*block, strict=True)
+            before, self._lines = len(self._lines), np.append(self._lines, lines)
+            for n, values in self._read_block(block_rows, kinds, before).items():
+                parts[n].append(values)
+            for n, cells in texts.items():
+                cells += [row[n] for row in block_rows]
+        columns = {n: TableColumn(np.concatenate(values)) for n, values in parts.items()}
+        return columns | {n: self._read_clock(n, cells) for n, cells in texts.items()}
+
+    def _read_block(
+        self, rows: Sequence[Sequence[str]], kinds: Mapping[int, str], before: int
+    ) -> dict[int, np.ndarray]:
+        """The values (M,) of columns {number: kind} in rows that come after so many; raises
+        `UserError` for the first cell of all that is none.
+        """
+        values = {}
+        bad = list[tuple[int, int, str]]()
+        for n, kind in kinds.items():
             try:
-                columns[number] = column(cells, "time", self.decimal)
+                values[n] = column([row[n] for row in rows], kind, self.decimal, self.group).values
             except BadCell as one:
-                raise self.refuse(one.row, number, one.why) from None
-        return columns
+                bad.append((before + one.row, n, one.why))
+        if bad:
+            raise self.refuse(*min(bad))
+        return values
+
+    def _read_clock(self, number: int, cells: Sequence[str]) -> TableColumn:
+        """A column of times of day; raises `UserError` for a cell that is none."""
+        try:
+            return column(cells, "time", self.decimal)
+        except BadCell as one:
+            raise self.refuse(one.row, number, one.why) from None
 
     def _rows(self, last: int) -> Iterator[tuple[int, list[str]]]:
         """The rows of cells with their lines; a last row that is cut short is skipped,
@@ -277,7 +287,8 @@ def _check_lines(path: str, data: bytes) -> None:
     while begin + LONGEST < len(data):
         last = data.rfind(LINE_END, begin, begin + LONGEST + 1)
         if last < 0:
-            end, line = data.find(LINE_END, begin), data.count(LINE_END, 0, begin) + 1
+            end = data.find(LINE_END, begin)
+            line = data.count(LINE_END, 0, begin) + 1
             length = (len(data) if end < 0 else end) - begin
             raise UserError(
                 f"{path}: line {line} has {length:,} characters; a row of a table has at most"
@@ -313,7 +324,7 @@ def _delimiter(lines: Sequence[str]) -> str:
         rows = [_cells(line, mark) for line in tail]
         width = max(set(map(len, rows)), key=[len(row) for row in rows].count)
         share = sum(len(row) == width for row in rows) / len(rows) if width > 1 else 0.0
-        valued = any(sum(_is_value(cell) for cell in row) >= 2 for row in rows)
+        valued = any(sum(map(is_value, row)) >= 2 for row in rows)
         return (share if valued else share / 10), -DELIMITERS.index(mark)
 
     best = max(DELIMITERS, key=alike)
@@ -327,9 +338,15 @@ def _decimals(cell: str, mark: str) -> int:
     return len(cell.strip().partition(mark)[2])
 
 
-def _is_value(cell: str) -> bool:
-    """Whether a cell is a number in some notation, or a time."""
-    return is_number(cell) or is_number(cell, ",") or is_grouped(cell) or is_time(cell)
+def _detect_marks(sample: Sequence[Sequence[str]], decimal: str) -> tuple[str, str]:
+    """(decimal mark, the given one where there is one; mark between groups of digits, "" for
+    none).
+    """
+    rising = "" if decimal else find_rising_group_mark(sample)
+    if rising:
+        return {".": ",", ",": "."}[rising], rising
+    decimal = decimal or _decimal(sample)
+    return decimal, find_group_mark(sample, decimal)
 
 
 def _decimal(sample: Sequence[Sequence[str]]) -> str:
@@ -371,7 +388,7 @@ def _parse_rows(
     reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=True)
     try:
         for row in reader:
-            if row and any(cell.strip() for cell in row):
+            if any(map(str.strip, row)):
                 yield begin + reader.line_num - 1, row
     except csv.Error as error:
         line = begin + reader.line_num - 1

@@ -77,7 +77,8 @@ class Tabular:
         what is no table, or ambiguous.
         """
         table = open_table(path, replace(self._form, join=tuple(join)))
-        columns, units = {**sidecar.columns, **self.columns}, {**sidecar.units, **self.units}
+        columns = {**sidecar.columns, **self.columns}
+        units = {**sidecar.units, **self.units}
         try:
             return table, map_columns(table, columns, units, sidecar.more)
         except UserError:
@@ -129,7 +130,8 @@ def kind_of(path: str, *join: str) -> str:
     "powers" where it is ambiguous.
     """
     try:
-        sidecar, instrument = read_sidecar(path), instrument_of(locate_file(path))
+        sidecar = read_sidecar(path)
+        instrument = instrument_of(locate_file(path))
         if sidecar.recording is not None or (
             instrument and instrument.holds_waveforms(locate_file(path))
         ):
@@ -178,12 +180,13 @@ def powers(
 
 
 def _tune_nominal_frequency(result: Powers, declared: float, source: MappedColumn | None) -> Powers:
-    """The same with the nominal frequency that f shows, and without an f that is none; both with a
-    note.
+    """The powers with the nominal frequency [Hz] that f shows, else the declared one, and without
+    an f that is none; a note on what was found.
     """
     if "f" not in result.columns or source is None:
         return replace(result, frequency=declared)
-    columns, U = {**result.columns}, result.columns["U"]
+    columns = {**result.columns}
+    U = result.columns["U"]
     f = (
         columns["f"]
         if source.role.unit.strip().lower() not in PER_UNIT
@@ -214,7 +217,8 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     """
     _check_power_units(table, mapping)
     values, start, said = _read(table, mapping)
-    columns, notes = {"t": values["t"]}, [*mapping.notes, *said]
+    columns = {"t": values["t"]}
+    notes = [*mapping.notes, *said]
     keys = {
         letter: [key for key in values if key[0] == letter and key not in BESIDE]
         for letter in "UPQI"
@@ -240,7 +244,8 @@ def _merge_phases(
     """
     if len(keys) == 1:
         return values[keys[0]], []
-    letter, names = keys[0][0], ", ".join(keys)
+    letter = keys[0][0]
+    names = ", ".join(keys)
     total = np.add.reduce([values[key] for key in keys])
     if letter == "U":
         return total / len(keys), [f"U is the mean of {names}"]
@@ -253,7 +258,8 @@ def _settle_voltage(
     """The powers with U of column `one` line to line where it is in kV; raises `UserError` for a
     direct voltage.
     """
-    absolute, columns = result.absolute["U"], result.columns
+    absolute = result.absolute["U"]
+    columns = result.columns
     if not (absolute or (absolute is None and kilovolts)):
         return result
     notes = check_alternating(source, one.name, columns, kilovolts) if absolute else []
@@ -386,7 +392,8 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     """U, P and Q of a table of voltages and currents by size and angle."""
     values, start, note = _read(table, mapping)
     values, absolute = _in_units(table, mapping, values)
-    voltages, currents = _list_magnitudes(values, "U"), _list_magnitudes(values, "I")
+    voltages = _list_magnitudes(values, "U")
+    currents = _list_magnitudes(values, "I")
     scale, angle_notes = _radians(table, mapping, values)
     V, turned = _forward(
         _join_phasors(values, voltages, scale), [mapping.columns[k] for k in voltages]
@@ -397,7 +404,8 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     if absolute:
         V1, sort = _to_ground(mapping.columns[voltages[0]], V1)
     elif voltages[0][1:] in LINES:  # per unit of a line voltage
-        V1, V2 = np.sqrt(3) * V1, None if V2 is None else np.sqrt(3) * V2
+        V1 = np.sqrt(3) * V1
+        V2 = None if V2 is None else np.sqrt(3) * V2
     size, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
     S = three * V1 * I1.conj()
     columns = {"t": values["t"], "U": size * np.abs(V1), "P": S.real, "Q": S.imag}

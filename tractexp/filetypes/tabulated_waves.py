@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tractexp.errors import DATA, UserError
-from tractexp.filetypes.cells import is_number
+from tractexp.filetypes.cells import is_plain_number
 from tractexp.filetypes.columns import role
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped, find_other_columns
@@ -41,7 +41,7 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
     times = [number for number in keys if keys[number] in ("t", "frac")]
     named = find_other_columns(table, times)
     numbers = {k: "gaps" for k in named if _is_sampled(_numbers_of(table, k))}
-    _refuse_other_rates(table, [k for k in keys if k not in {*numbers, *times}])
+    _refuse_other_rates(table, sorted(keys.keys() - {*numbers, *times}))
     kinds = dict.fromkeys(times, "number") | {mapping.columns["t"].number: "time"}
     cells = table.read({**kinds, **numbers})
     _refuse_wild(table, {k: cells[k] for k in numbers})
@@ -76,8 +76,7 @@ def _refuse_wild(table: TableFile, cells: Mapping[int, TableColumn]) -> None:
 
 def _numbers_of(table: TableFile, number: int) -> list[bool]:
     """Which of a column's first cells are numbers."""
-    cells = [row[number] if number < len(row) else "" for row in table.sample[:20]]
-    return [is_number(cell) or is_number(cell, ",") for cell in cells]
+    return [number < len(row) and is_plain_number(row[number]) for row in table.sample[:20]]
 
 
 def _is_sampled(numbers: Sequence[bool]) -> bool:
@@ -106,7 +105,8 @@ def _channel(
     table: TableFile, mapping: Mapped, number: int, values: np.ndarray, key: str
 ) -> Channel:
     """A column as a channel; its key says what it measures, else its name."""
-    name, unit = table.label(number), table.heading.units[number]
+    name = table.label(number)
+    unit = table.heading.units[number]
     meaning = role(name, unit)
     key = key or (meaning.key if meaning else "")
     unit = mapping.columns[key].role.unit if key in mapping.columns else unit
@@ -124,7 +124,8 @@ def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]
     steps = np.diff(t)
     usual = float(np.median(steps))
     breaks = [0, *(np.flatnonzero(steps > SEGMENT_GAP_STEPS * usual) + 1).tolist(), len(t)]
-    segments, widest = [], 0.0
+    segments = []
+    widest = 0.0
     for first, stop in itertools.pairwise(breaks):
         if stop - first < 3:
             continue
