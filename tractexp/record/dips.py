@@ -50,8 +50,10 @@ def cut_dips(
         )
         for first, (start, end), stop in zip(firsts, dips, stops, strict=False):
             early, late = np.searchsorted(t, [t[start] - pre, t[start] + post]).tolist()
-            window, number = slice(max(first, early), min(stop, late)), len(file_dips) + 1
-            name, source = f"{whole.name}_dip{number}", f"{where} dip {number}"
+            window = slice(max(first, early), min(stop, late))
+            number = len(file_dips) + 1
+            name = f"{whole.name}_dip{number}"
+            source = f"{where} dip {number}"
             result: Record | UserError = replace(whole.part(window), name=name, source=source)
             try:
                 detect(result)
@@ -72,7 +74,8 @@ def leave_out(record: Record, times: Sequence[float], reach: float) -> Record:
     """
     if not len(times):
         return record
-    t, inside = record.t, np.zeros(record.samples, dtype=bool)
+    t = record.t
+    inside = np.zeros(record.samples, dtype=bool)
     for start, end in find_dips(t, record.U):
         inside[start:end] = True
     first, stop = (np.searchsorted(times, t + side) for side in (-reach, reach))
@@ -86,7 +89,8 @@ def around(event: Event) -> Event:
 
     Every simulation goes through all of it, and a load has answered long before an hour is over.
     """
-    record, t = event.record, event.record.t
+    record = event.record
+    t = event.record.t
     end = t[min(event.end, record.samples - 1)]
     first, stop = np.searchsorted(t, [event.t_start - LONGEST_REACH, end + LONGEST_REACH]).tolist()
     if record.waves is not None or stop - first == record.samples:
@@ -169,21 +173,17 @@ def chosen(
     dips, for one that cannot be used.
     """
     results = {dip.number: dip.result for dip in dips}
-    usable = [number for number, result in results.items() if isinstance(result, Record)]
-    fitted = list(train or usable[:1] or [1])
+    usable = _select_usable(results)
+    fitted = list(train or [*usable][:1] or [1])
     first, *rest = [_pick_dip(where, number, results) for number in fitted]
-    notes = (*first.notes, *notes)
+    notes = [*first.notes, *notes]
     if validate is not None:
         held = [_pick_dip(where, number, results) for number in validate]
-        return Events([replace(first, notes=notes), *rest], held)
-    others = [result for number, result in results.items() if number not in fitted]
-    notes += tuple(
-        f"not used for validation: {result}" for result in others if isinstance(result, UserError)
-    )
-    return Events(
-        [replace(first, notes=notes), *rest],
-        [result for result in others if isinstance(result, Record)],
-    )
+    else:
+        held = [record for number, record in usable.items() if number not in fitted]
+        unusable = sorted(results.keys() - usable.keys())
+        notes += [f"not used for validation: {results[number]}" for number in unusable]
+    return Events([replace(first, notes=tuple(notes)), *rest], held)
 
 
 def check_numbers(train: Sequence[int] | None, validate: Sequence[int] | None) -> None:
@@ -205,14 +205,17 @@ def _pick_dip(where: str, number: int, results: Mapping[int, Record | UserError]
     """The record of a dip by its number from 1. Raises `UserError` with the dips that can be
     used.
     """
-    usable = ", ".join(
-        f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s"
-        for n, r in results.items()
-        if isinstance(r, Record)
-    )
     result = results.get(
         number, UserError(f"{where}: there is no dip {number}; the file has {len(results)}")
     )
-    if isinstance(result, UserError):
-        raise UserError(f"{result}; dips that can be used: {usable or 'none'}")
-    return result
+    if isinstance(result, Record):
+        return result
+    usable = ", ".join(
+        f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s" for n, r in _select_usable(results).items()
+    )
+    raise UserError(f"{result}; dips that can be used: {usable or 'none'}")
+
+
+def _select_usable(results: Mapping[int, Record | UserError]) -> dict[int, Record]:
+    """{number: record} of the dips that can be used."""
+    return {number: one for number, one in results.items() if isinstance(one, Record)}

@@ -46,47 +46,48 @@ def direction(
     if not valid.any() or (calm is not None and not (calm & valid).any()):
         return ""
     U, P, Q = U[valid], P[valid], Q[valid]
-    rough = (
-        3 * float(np.median(np.abs(np.diff(U)))) / max(float(np.median(U)), 1e-12)
-        if len(U) > 1
-        else 0.0
-    )
-    near = max(LARGEST_CALM_DEVIATION, rough)
+    near = max(LARGEST_CALM_DEVIATION, 3 * _usual_step(U) / max(float(np.median(U)), 1e-12))
     calm = at_level(U, near) if calm is None else calm[valid]
     level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
     normal = np.abs(U - level) <= near * level
-    spread = float(np.median(np.abs(np.diff(P)))) if len(P) > 1 else 0.0
-    if not -LEAST_SIGN_RATIO * spread > P0:
+    if not -LEAST_SIGN_RATIO * _usual_step(P) > P0:
         return ""
     if np.count_nonzero(P[normal] > -TURNS * P0) > max(FEWEST_STATE_SAMPLES, 0.02 * len(P)):
         return (
             "P changes its sign at normal voltage, as of a train that brakes and motors: power"
             " flows both ways"
         )
-    a, fell = _exponent(U / level, P / P0)
-    answer = (
-        f"|P| goes as U^{round(a, 2) + 0.0:g} when the voltage falls"
-        if fell
-        else "the voltage is never disturbed"
-    )
-    if polarity < 0 or (polarity == 0 and fell and _load_like(a, P0, Q0)):
-        shown = (
-            "the negative-sequence current is that of a load turned round"
-            if polarity < 0
-            else f"{answer}, as a load's"
-        )
-        return f"{shown}: {OUTWARD} ({REMEDY})"
+    return _tell_cause(polarity, *_exponent(U / level, P / P0), P0, Q0)
+
+
+def _tell_cause(polarity: int, a: float, fell: bool, P0: float, Q0: float) -> str:
+    """Why P is negative, by the negative sequence, else by |P| as U to the power `a` while the
+    voltage `fell`.
+    """
+    if polarity < 0:
+        return f"the negative-sequence current is that of a load turned round: {OUTWARD} ({REMEDY})"
     if polarity > 0:
         return (
             "the negative-sequence current is that of a load, so its direction is right and this is"
             " regeneration"
         )
-    if fell and a < LEAST_LOAD_EXPONENT:
+    ambiguous = f"which cannot separate a reversed current ({REMEDY}) from regeneration"
+    if not fell:
+        return f"the voltage is never disturbed, {ambiguous}"
+    answer = f"|P| goes as U^{round(a, 2) + 0.0:g} when the voltage falls"
+    if _load_like(a, P0, Q0):
+        return f"{answer}, as a load's: {OUTWARD} ({REMEDY})"
+    if a < LEAST_LOAD_EXPONENT:
         return (
             f"{answer}, as a converter's or a generator's: regeneration (a braking train), no"
             " reversed current"
         )
-    return f"{answer}, which cannot separate a reversed current ({REMEDY}) from regeneration"
+    return f"{answer}, {ambiguous}"
+
+
+def _usual_step(x: np.ndarray) -> float:
+    """The median size of the steps of values (N,); 0 of a single one."""
+    return float(np.median(np.abs(np.diff(x)))) if len(x) > 1 else 0.0
 
 
 def _load_like(a: float, P0: float, Q0: float) -> bool:
@@ -107,5 +108,6 @@ def _exponent(u: np.ndarray, p: np.ndarray) -> tuple[float, bool]:
     low = (u < 1 - DISTURBED) & (u > 0.1)
     if np.count_nonzero(low) < FEWEST_STATE_SAMPLES:
         return float("nan"), False
-    x, y = np.log(u[low]), np.log(np.clip(p[low], 0.05, None))
+    x = np.log(u[low])
+    y = np.log(np.clip(p[low], 0.05, None))
     return float(np.median(y / x)), True

@@ -31,16 +31,9 @@ def starting_level(
     what follows counts if it is higher; and so it does where a record begins inside a dip, lower by
     more than a step, and most of it is at the later level.
     """
-    if trigger is not None and CERTAIN < trigger - t[0] < NEAR_TRIGGER:
-        before = levels[:, (t < trigger - CERTAIN) & (t > trigger - CERTAIN - STEADY)]
-        last = before[:, -max(2, round(REFERENCE * (len(t) - 1) / (t[-1] - t[0]))) :]
-        middle = (
-            np.maximum(np.median(last, axis=1), 1e-12)
-            if last.shape[1] > 1
-            else np.zeros(len(levels))
-        )
-        if last.shape[1] > 1 and (np.ptp(last, axis=1) <= limits * middle).all():
-            return middle
+    at_trigger = _level_before_trigger(t, levels, limits, trigger)
+    if at_trigger is not None:
+        return at_trigger
     first = levels[:, :most]
     middle = np.maximum(measure_growing_medians(first), 1e-12)
     stays = np.all(np.abs(first / middle - 1) <= limits[:, None] / 2, axis=0)
@@ -48,7 +41,8 @@ def starting_level(
     count = len(stays) if stays.all() else max(1, int(np.argmin(stays)))
     level = np.median(first[:, :count], axis=1)
     last = levels[:, t >= t[-1] - max(REFERENCE, (t[-1] - t[0]) / 5)]
-    after, usual = np.median(last, axis=1), np.median(levels, axis=1)
+    after = np.median(last, axis=1)
+    usual = np.median(levels, axis=1)
     if len(t) < FEWEST_BEFORE or (np.ptp(last, axis=1) > limits * after).any():
         return level
     if count < first.shape[1] and t[count - 1] - t[0] < CERTAIN / 2:
@@ -57,6 +51,22 @@ def starting_level(
         level > DEAD_VOLTAGE_SHARE * after
     ).all()
     return after if begun and level[0] < (1 - NO_STEP) * after[0] else level
+
+
+def _level_before_trigger(
+    t: np.ndarray, levels: np.ndarray, limits: np.ndarray, trigger: float | None
+) -> np.ndarray | None:
+    """The levels (K,) of voltages (K, N) right before the recorder's trigger [s]; None without one,
+    where it comes at once or late, or where they are not steady there.
+    """
+    if trigger is None or not CERTAIN < trigger - t[0] < NEAR_TRIGGER:
+        return None
+    before = levels[:, (t < trigger - CERTAIN) & (t > trigger - CERTAIN - STEADY)]
+    last = before[:, -max(2, round(REFERENCE * (len(t) - 1) / (t[-1] - t[0]))) :]
+    if last.shape[1] < 2:
+        return None
+    middle = np.maximum(np.median(last, axis=1), 1e-12)
+    return middle if (np.ptp(last, axis=1) <= limits * middle).all() else None
 
 
 def find_dips(t: np.ndarray, U: np.ndarray, trigger: float | None = None) -> list[tuple[int, int]]:
@@ -130,7 +140,8 @@ def find_sudden_change(x: np.ndarray, within: int, least: float) -> int | None:
 
 def measure_median(x: np.ndarray) -> float:
     """The median of finite values (N,), N at least 1; of few much sooner than NumPy's."""
-    low, high = (len(x) - 1) // 2, len(x) // 2
+    low = (len(x) - 1) // 2
+    high = len(x) // 2
     ordered = np.partition(x, (low, high))
     return float(ordered[low] + ordered[high]) / 2
 

@@ -33,7 +33,7 @@ class Identity:
 
     @classmethod
     def from_record(cls, record: Record) -> "Identity":
-        """That of a record."""
+        """The identity of a record, with the sum of its bytes."""
         in_mva = record.file_base.in_mva
         given = None if record.original_base is None else _sizes(record.original_base, in_mva)
         source = {"file": record.source, **record.identity}
@@ -41,14 +41,15 @@ class Identity:
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> "Identity":
-        """That of an entry of `records` in `result.json`; of an early one, without
-        what it lacks.
+        """The identity that an entry of `records` in `result.json` tells; an early one lacks parts
+        of it.
         """
-        source, base = content.get("source", {}), content.get("base", {})
+        source = content.get("source", {})
+        base = content.get("base", {})
         return cls(source, base, content.get("given_base"), content.get("sha256", ""))
 
     def to_dict(self) -> dict[str, Any]:
-        """As `result.json` has it."""
+        """The identity as an entry of `records` in `result.json`."""
         content = {"sha256": self.sha256, "source": dict(self.source), "base": dict(self.base)}
         return content | ({} if self.given_base is None else {"given_base": dict(self.given_base)})
 
@@ -80,14 +81,14 @@ class Identity:
 
     @property
     def recording(self) -> "Identity":
-        """The same for all dips of one recording."""
+        """The identity of the recording that a dip was cut from, alike for all its dips."""
         return Identity(
             dict(self.source) | {"file": DIP.sub("", self.source.get("file", ""))}, self.base
         )
 
     @property
     def parts(self) -> list[str]:
-        """What is known of it, in words."""
+        """What is known of where the record is from and of its bases, each in words."""
         said = [
             text if key == "file" else f"{key} {text}" for key, text in self.source.items() if text
         ]
@@ -103,7 +104,7 @@ class Identity:
 
     @property
     def unknown(self) -> list[str]:
-        """That nobody said what one per unit is, in words; [] where somebody did."""
+        """The sentence that nobody said what one per unit is; [] where somebody did."""
         return [UNKNOWN] if self.parts and not (self.voltage or self.power) else []
 
     def __str__(self) -> str:
@@ -143,7 +144,7 @@ def title(identities: Iterable[Identity], names: Iterable[str]) -> str:
 
 
 def title_of(records: Iterable[Record]) -> str:
-    """The same of records at hand."""
+    """The title of a page about records at hand, as `title` makes it."""
     records = list(records)
     return title(map(Identity.from_record, records), (record.name for record in records))
 

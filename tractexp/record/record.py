@@ -91,7 +91,7 @@ class Base:
         return {name: values * self._one(name) for name, values in columns.items()}
 
     def _one(self, name: str) -> float:
-        """What one per unit of a column is."""
+        """One per unit of a column, in kV, MW or Mvar; 1 of a frequency or an angle."""
         if name in ("P", "Q") or name.startswith("P_"):
             return self.power
         return self.voltage if name in ("U", "U2") else 1.0
@@ -387,16 +387,7 @@ class Record:
                 raise UserError(
                     f"{self.where}: {name} has shape {values.shape} where t has {n} samples"
                 )
-        for name, values in self.channels.items():
-            bad = np.isinf(values) if name in ("P", "Q") else ~np.isfinite(values)
-            if bad.any():
-                i = int(np.argmax(bad))
-                gap = "" if name in ("P", "Q") else ONLY_SINGLE
-                raise UserError(
-                    f"{self.where}: {place(i)}: {name} = {values[i]} is not a finite number{gap}"
-                )
-            if np.isnan(values).all():
-                raise UserError(f"{self.where}: {name} holds no number at all")
+        self._check_finite(place)
         if n < FEWEST_SAMPLES:
             raise UserError(
                 f"{self.where}: only {n} samples; a record needs at least {FEWEST_SAMPLES}"
@@ -415,6 +406,20 @@ class Record:
                 " everywhere; without it "
                 "no load draws power: give the rows before it, or after it, as a file of their own"
             )
+
+    def _check_finite(self, place: Callable[[int], str]) -> None:
+        """Raise `UserError` for a value that is no number, but for gaps of P and Q."""
+        for name, values in self.channels.items():
+            may_lack = name in ("P", "Q")
+            bad = np.isinf(values) if may_lack else ~np.isfinite(values)
+            if bad.any():
+                i = int(np.argmax(bad))
+                gap = "" if may_lack else ONLY_SINGLE
+                raise UserError(
+                    f"{self.where}: {place(i)}: {name} = {values[i]} is not a finite number{gap}"
+                )
+            if np.isnan(values).all():
+                raise UserError(f"{self.where}: {name} holds no number at all")
 
     def _check_times(self, place: Callable[[int], str]) -> None:
         """Raise `UserError` for times that are not even, or a record shorter than a cycle."""

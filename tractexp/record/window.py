@@ -50,13 +50,13 @@ class Window:
         return weights[:-1]
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain data."""
+        """The window as JSON holds it, its arrays as lists."""
         return {"name": self.name, "at": self.at.tolist(), "weights": self.weights.tolist()}
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> "Window":
-        """What `to_dict` told; of anything else a `ValueError`, `TypeError`, `KeyError` or
-        `OverflowError`.
+        """The window that `to_dict` made; raises `ValueError`, `TypeError`, `KeyError` or
+        `OverflowError` for anything else.
         """
         at, weights = (np.array(content[key], dtype=float) for key in ("at", "weights"))
         if (
@@ -91,7 +91,8 @@ def average(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
     ring of whole cycles, such as the offset of a stator flux, would not average out at the ends of
     a y that stood still there.
     """
-    most, cycle = len(weights) // 2, max(round(1 / float(weights.max())), 1)
+    most = len(weights) // 2
+    cycle = max(round(1 / float(weights.max())), 1)
     if y.shape[-1] < 2 * cycle or most > cycle:
         wide = np.pad(y, [(0, 0)] * (y.ndim - 1) + [(most, most)], "edge")
     else:
@@ -126,7 +127,8 @@ def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Even
     """
     from scipy.linalg import cho_solve_banded
 
-    step, U = event.record.step, event.record.U
+    step = event.record.step
+    U = event.record.U
     at, near = (
         np.arange(1 - len(weights) // 2, len(U) + len(weights) // 2 - 1),
         (window + BEND_SECONDS) / step,
@@ -146,8 +148,10 @@ def _factor(weights: bytes, n: int, free: bytes, error: float) -> np.ndarray:
     from scipy.linalg import cholesky_banded
     from scipy.sparse import diags_array
 
-    w, bends = np.frombuffer(weights), np.where(np.frombuffer(free, bool), BENT, CALM) ** -2.0
-    wide, most = n + len(w) - 1, max(len(w) - 1, 2)
+    w = np.frombuffer(weights)
+    bends = np.where(np.frombuffer(free, bool), BENT, CALM) ** -2.0
+    wide = n + len(w) - 1
+    most = max(len(w) - 1, 2)
     # SciPy's type of it is inferred from its default, one diagonal
     across: Any = list(range(len(w)))
     second: Any = [0, 1, 2]

@@ -27,13 +27,19 @@ def describe_directions(sights: "Sequence[Sight]") -> "list[Sight]":
             buses.setdefault(shown.feeder.voltages, []).append(k)
     told = list(sights)
     for bus in buses.values():
-        power = {k: _measure_power(sights[k]) for k in bus}
-        drawn = sum(P for P in power.values() if P > 0)
-        drawing = [sights[k].name for k in bus if power[k] > 0]
-        for k in bus:
-            if power[k] < 0 < drawn:
-                told[k] = _describe_direction(sights[k], -power[k] / drawn, drawing)
+        for k, share, names in _find_negative([(k, sights[k]) for k in bus]):
+            told[k] = _describe_direction(sights[k], share, names)
     return told
+
+
+def _find_negative(bus: "Sequence[tuple[int, Sight]]") -> list[tuple[int, float, list[str]]]:
+    """(number, its power over that of the loads that draw power, the names of those) of the loads
+    of a bus whose power is negative; [] where none draws power.
+    """
+    power = {k: _measure_power(sight) for k, sight in bus}
+    drawn = sum(P for P in power.values() if P > 0)
+    drawing = [sight.name for k, sight in bus if power[k] > 0]
+    return [(k, -P / drawn, drawing) for k, P in power.items() if P < 0 < drawn]
 
 
 def _measure_power(shown: "Sight") -> float:

@@ -1,5 +1,6 @@
 """One recording of the files of one event: their channels side by side, at the same instants."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import timedelta
@@ -31,11 +32,7 @@ def join_recordings(recordings: Sequence[Recording]) -> Recording:
     aligned = _align(recordings)
     cut = [_cut_common(each, aligned, k) for k, each in enumerate(recordings)]
     channels, said = _name_channels(cut)
-    notes = [
-        note if note in first.notes else f"{Path(each.source).name}: {note}"
-        for each in recordings
-        for note in each.notes
-    ]
+    notes = itertools.chain.from_iterable(_list_notes(each, first) for each in recordings)
     return replace(
         cut[0],
         channels=channels,
@@ -45,6 +42,12 @@ def join_recordings(recordings: Sequence[Recording]) -> Recording:
         notes=list(dict.fromkeys([*aligned.notes, *said, *notes])),
         extra={},
     )
+
+
+def _list_notes(recording: Recording, first: Recording) -> list[str]:
+    """The notes of a recording, with its file's name where they are not of the first one, too."""
+    name = Path(recording.source).name
+    return [note if note in first.notes else f"{name}: {note}" for note in recording.notes]
 
 
 def _align(recordings: Sequence[Recording]) -> Alignment:
@@ -89,7 +92,8 @@ def _cut_common(recording: Recording, aligned: Alignment, k: int) -> Recording:
     if len(recording.segments) > 1:
         return recording
     (segment,) = recording.segments
-    first, late = segment.first + aligned.first[k], aligned.late[k]
+    first = segment.first + aligned.first[k]
+    late = aligned.late[k]
     gone = segment.start + (aligned.first[k] + late) / segment.rate
     part = slice(first, first + aligned.count)
     return replace(
@@ -122,7 +126,8 @@ def _name_channels(recordings: Sequence[Recording]) -> tuple[list[Channel], list
     for k, recording in enumerate(recordings):
         for channel in recording.channels:
             if any(j < k and _same(channel, one) for j, one in kept):
-                name, source = channel.name.strip(), Path(recording.source).name
+                name = channel.name.strip()
+                source = Path(recording.source).name
                 notes.append(f"channel '{name}' of {source} is that of an earlier file")
             else:
                 kept.append((k, channel))

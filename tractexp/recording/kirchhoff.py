@@ -25,9 +25,9 @@ def closed_sums(phasors: Snapshots, feeders: "list[Feeder]") -> "list[Feeder]":
 
     The whole station first, then the feeders of each bus.
     """
-    three = [k for k, f in enumerate(feeders) if len(f.currents) == 3]
-    level = max((phasors.size(feeders[k].currents) for k in three), default=0.0)
-    loaded = [k for k in three if phasors.size(feeders[k].currents) > UNLOADED * level]
+    sizes = {k: phasors.size(f.currents) for k, f in enumerate(feeders) if len(f.currents) == 3}
+    level = max(sizes.values(), default=0.0)
+    loaded = [k for k, size in sizes.items() if size > UNLOADED * level]
     if closed := _find_closed_sum(phasors, feeders, loaded):
         return _describe_closure(phasors, feeders, loaded, *closed)
     for bus in sorted({feeders[k].voltages for k in loaded}):
@@ -63,7 +63,8 @@ def _signs(count: int) -> np.ndarray:
     """Signs (T, count) that are tried: all as they are, one left out or turned round, and two left
     out of five.
     """
-    plain, each = np.ones(count), np.eye(count)
+    plain = np.ones(count)
+    each = np.eye(count)
     tried = [plain[None], *(plain - s * each[k : k + 1] for k in range(count) for s in (1, 2))]
     if count > 4:
         first, second = np.triu_indices(count, 1)
@@ -76,7 +77,8 @@ def _closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
     """Sums (T,) of currents (F, M) over the sums of their magnitudes, by signs (T, F), root mean
     square over time.
     """
-    total, magnitudes = np.real(X.conj() @ X.T), np.abs(X) @ np.abs(X).T
+    total = np.real(X.conj() @ X.T)
+    magnitudes = np.abs(X) @ np.abs(X).T
     sums = np.maximum(((signs @ total) * signs).sum(axis=1), 0.0)
     most = ((np.abs(signs) @ magnitudes) * np.abs(signs)).sum(axis=1)
     return np.sqrt(sums / np.maximum(most, 1e-300))

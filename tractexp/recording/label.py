@@ -259,7 +259,8 @@ def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: b
             worth[label] = max(
                 worth[label], score + 4 * agrees - 4 * (bool(own) and not agrees and len(own) == 1)
             )
-    result, used = [], set()
+    result = []
+    used = set()
     for label in sorted(buckets, key=lambda each: -worth[each]):
         places = buckets[label]
         if size == 2 and not _two_may_do(label, places, worth[label] >= SURE):
@@ -335,13 +336,15 @@ def _by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Group]:
             if two:
                 label = key.removesuffix("-"), letters
                 buckets[label][place].append(i)
-                down[label] |= {i} if key.endswith("-") else set()
-    result: list[Group] = []
+                if key.endswith("-"):
+                    down[label].add(i)
+    result = list[Group]()
+    taken = set[int]()
     for label, places in buckets.items():
         for have, missing in _sets(places, size):
-            backward = tuple(i for i in have if i in down[label])
-            used = any({*group.numbers} & {*have} for group in result)
-            if len(backward) == 1 and not used:
+            backward = tuple(down[label].intersection(have))
+            if len(backward) == 1 and taken.isdisjoint(have):
+                taken.update(have)
                 shared = shared_name([channels[n] for n in have])
                 result.append(Group(have, True, shared, True, BY_NAME, missing, backward))
     return result
@@ -351,7 +354,8 @@ def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
     """Groups by the file's phase column: in order, within a circuit; each channel in the first
     order that fits.
     """
-    result, used = [], set()
+    result = []
+    used = set()
     for letters in ORDERS:
         rows: dict[tuple[str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
         for i, channel in channels.items():
@@ -390,7 +394,8 @@ def shared_name(channels: list[Channel]) -> str:
     stop = 0
     while stop < min(map(len, names)) - start and len({n[-1 - stop] for n in names}) == 1:
         stop += 1
-    head, tail = names[0][:start], names[0][len(names[0]) - stop :]
+    head = names[0][:start]
+    tail = names[0][len(names[0]) - stop :]
     if len({*map(len, names)}) == 1:  # the mark may stand in several places
         tail = "".join(
             c for c, *others in zip(*(n[start:] for n in names), strict=True) if {c} == {*others}

@@ -98,6 +98,11 @@ class Sight:
         return self.feeder is None or self.feeder.loaded
 
     @property
+    def terminals(self) -> tuple[tuple[int, ...], Any] | None:
+        """The channels of its voltages and how they are connected; None of a record."""
+        return self.feeder and (self.feeder.voltages, self.feeder.connection)
+
+    @property
     def has_powers(self) -> bool:
         """Whether more than a voltage is known of it."""
         if self.record is not None:
@@ -136,7 +141,8 @@ class Sight:
                 base = event.record.base
                 return event.U0 * base.voltage, event.P0 * base.power, event.Q0 * base.power
         if self.record is not None:
-            first, base = slice(0, max(1, self.record.samples // 20)), self.record.base
+            first = slice(0, max(1, self.record.samples // 20))
+            base = self.record.base
             U, P, Q = (
                 float(np.median(v[first][np.isfinite(v[first])]))
                 if np.isfinite(v[first]).any()
@@ -189,7 +195,8 @@ class View:
         if recording is None:
             return []
         segment = max(recording.segments, key=lambda s: s.rate)
-        stamps, f = measure_stamp_jitter(recording, segment), network_frequency(recording)
+        stamps = measure_stamp_jitter(recording, segment)
+        f = network_frequency(recording)
         return [quality(recording, k, segment, stamps, f) for k in range(len(recording.channels))]
 
     @functools.cached_property
@@ -219,15 +226,10 @@ class View:
         own = shown.powers()
         if shown.feeder is None or own is None:
             return own
-        wired = (shown.feeder.voltages, shown.feeder.connection)
-        bus = [
-            s
-            for s in self.sights
-            if s.feeder is not None and (s.feeder.voltages, s.feeder.connection) == wired
-        ]
-        telling = next(
-            (s for s in bus if s.dips), next((s for s in bus if s.events), bus[0])
-        ).powers()
+        bus = [s for s in self.sights if s.terminals == shown.terminals]
+        fitted = [s for s in bus if s.dips]
+        eventful = [s for s in bus if s.events]
+        telling = [*fitted, *eventful, *bus][0].powers()
         return own if telling is None else (telling[0], *own[1:])
 
     @property
@@ -277,7 +279,8 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     if not feeders:
         return [sight(reader, recording, bus) for bus in buses_alone(recording)]
     loaded = any(feeder.loaded for feeder in feeders)
-    sights, buses = [], dict[str, _Bus]()
+    sights = []
+    buses = dict[str, _Bus]()
     for feeder in feeders:
         said = ()
         try:
@@ -331,7 +334,8 @@ def sight(
     except UserError as error:
         return replace(blank, unexamined=str(error), said=(*said, str(error)))
     for stretch in stretches:
-        parts, traces = [], []
+        parts = []
+        traces = []
         for segment in stretch:
             try:
                 measured = bus.measure(recording, feeder, segment)
@@ -350,7 +354,8 @@ def sight(
             changes += happenings_in(trace, next(within, None))
             dead = dead or find_dead_phases(trace)
             brief.append(len(trace.t) < FEWEST_HALF_CYCLES)
-    dips, refused = [], ""
+    dips = []
+    refused = ""
     try:
         streams = [(p, ()) for p in phasors]
         if changes and feeder.currents:

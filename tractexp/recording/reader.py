@@ -80,7 +80,8 @@ class WaveformReader(Reader):
             x: [recording.number(i, f"data.{key}") for i in getattr(self, key)]
             for x, key in keys.items()
         }
-        recording, chosen = in_units(recording, self.units, numbers), numbers["U"]
+        recording = in_units(recording, self.units, numbers)
+        chosen = numbers["U"]
         every = [
             i
             for i, c in enumerate(recording.channels)
@@ -150,10 +151,10 @@ class WaveformReader(Reader):
         if not file_dips:
             # raises, and says what there is instead
             detect(max(wholes, key=lambda whole: whole.samples))
-        first = next((dip.result for dip in file_dips if isinstance(dip.result, Record)), None)
-        if first is None:
+        records = [dip.result for dip in file_dips if isinstance(dip.result, Record)]
+        if not records:
             return file_dips
-        U, S = level(first)
+        U, S = level(records[0])
         if S < 1e-6:
             raise UserError(
                 f"{self.path}: {DATA.currents} carry no power before the first dip ({1e6 * S:.2g}"
@@ -191,9 +192,11 @@ class WaveformReader(Reader):
         if not (self.voltages or self.currents):
             return self._only(recording)
         name = self.connection or self._usual(recording)
-        connection, numbers = plugin.chosen("connection", name), {}
+        connection = plugin.chosen("connection", name)
+        numbers = {}
         for key, wanted in (("voltages", connection.voltages), ("currents", connection.currents)):
-            channels, where = getattr(self, key), setting(f"data.{key}")
+            channels = getattr(self, key)
+            where = setting(f"data.{key}")
             if len(channels) != wanted:
                 raise UserError(
                     f"{where}={[*channels]} must name {COUNT[wanted]} channels"
@@ -289,7 +292,8 @@ class WaveformReader(Reader):
         """
         settings, streams, short = (self.estimator, self.skew, self.harmonics), [], []
         for stretch in recording.stretches():
-            parts, several = [], []
+            parts = []
+            several = []
             for segment in stretch:
                 try:
                     parts.append(phasors_of(recording, feeder, segment, *settings))

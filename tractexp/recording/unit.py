@@ -117,15 +117,11 @@ def _mark_secondary(channels: Sequence[Channel]) -> list[Channel]:
     """The channels with S where their values are secondary: if a voltage has the size of one, and
     none is larger.
     """
-    if not any(c.side for c in channels):
-        return [*channels]
     low, high = SECONDARY
-    sizes = [
-        c.factor * _size(c)
-        for c in channels
-        if c.side and c.quantity == "voltage" and not in_doubt(c)
-    ]
-    larger, alike = any(size > high for size in sizes), any(low <= size <= high for size in sizes)
+    voltages = [c for c in channels if c.side and c.quantity == "voltage" and not in_doubt(c)]
+    sizes = np.array([c.factor * _size(c) for c in voltages])
+    larger = (sizes > high).any()
+    alike = ((low <= sizes) & (sizes <= high)).any()
     return [
         _set_secondary(c) if not larger and (alike or c.side == "S") else replace(c, side="")
         for c in channels
@@ -186,7 +182,8 @@ def _note(channels: Sequence[Channel], taken: Mapping[str, Sequence[int]]) -> li
 
 def _of_unit(channel: Channel, quantity: str, unit: str, number: float = 1.0) -> Channel:
     """A channel of another quantity and unit, of which its own is `number`."""
-    gain, offset = number * channel.gain, number * channel.offset
+    gain = number * channel.gain
+    offset = number * channel.offset
     return replace(channel, unit=unit, quantity=quantity, gain=gain, offset=offset, side="")
 
 
