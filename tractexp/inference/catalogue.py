@@ -136,16 +136,14 @@ def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -
             )
     here = {effect.name for effect in model.effects}
     testable, untestable, members = [], {}, []
-    for name in sorted(registered):
+    for name in sorted(registered.keys() - here):
         effect = get("effect", name)()
+        if not _is_wanted(effect, only):
+            continue
         if effect.family:
-            wanted = not only or name in only or effect.family in only
-            if wanted and not here & {name, effect.family} and not model.acceptance(effect).refusal:
+            if effect.family not in here and not model.acceptance(effect).refusal:
                 members.append(candidate(effect))
-            continue
-        if name in here or (only and name not in only and not isinstance(effect, Measurement)):
-            continue
-        if why := missing_channel(effect, events) or model.acceptance(effect).refusal:
+        elif why := missing_channel(effect, events) or model.acceptance(effect).refusal:
             untestable[name] = why
         else:
             testable.append(candidate(effect))
@@ -153,6 +151,15 @@ def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -
     return Catalogue(
         tuple(testable), untestable, tuple(m for m in members if m.effect.family in heads)
     )
+
+
+def _is_wanted(effect: Effect, only: Sequence[str]) -> bool:
+    """Whether an effect is among those that are asked for, all of them where none is named: with
+    the textbook's effect its family is, and faults of the measurement always are.
+    """
+    if not only or effect.name in only:
+        return True
+    return effect.family in only if effect.family else isinstance(effect, Measurement)
 
 
 def missing_channel(effect: Effect, events: Sequence[Event]) -> str:

@@ -65,7 +65,8 @@ class RecorderWindow(Measurement):
         """
         shown = np.empty_like(power)
         for e in range(drive.events):
-            part, weights = drive.part(e), self.weights(drive.event[e, -1])
+            part = drive.part(e)
+            weights = self.weights(drive.event[e, -1])
             u = drive.inputs[0, part]
             shown[:, :, part] = averaged_power(power[:, :, part], u, weights)
         return shown
@@ -81,14 +82,22 @@ def windows_of(events: Sequence[Event]) -> list[RecorderWindow]:
 
     None is longer than what came before the dip, or too short for the sampling to show.
     """
-    frequency, step = events[0].record.base.frequency, events[0].record.step
+    frequency = events[0].record.base.frequency
+    step = events[0].record.step
     before = min(e.start * e.record.step for e in events)
     said = {e.record.window.name if e.record.window else "": e.record.window for e in events}
     (recorded, *others) = said.values()
     if recorded and not others:
         windows = [RecorderWindow(recorded.length, recorded, said=True)]
     else:
-        shapes = [one.window(frequency) for one in estimators(frequency)]
-        uneven = [RecorderWindow(w.length, w) for w in shapes if np.ptp(w.weights) > 1e-9]
-        windows = [*(RecorderWindow(k / frequency) for k in CYCLES), *uneven]
+        windows = _usual_windows(frequency)
     return [w for w in sorted(windows, key=lambda w: w.window) if 2 * step <= w.window < before]
+
+
+def _usual_windows(frequency: float) -> list[RecorderWindow]:
+    """Averages over whole cycles of a nominal frequency [Hz], and the windows of the estimators
+    that weight their samples.
+    """
+    shapes = [one.window(frequency) for one in estimators(frequency)]
+    uneven = [RecorderWindow(w.length, w) for w in shapes if np.ptp(w.weights) > 1e-9]
+    return [*(RecorderWindow(k / frequency) for k in CYCLES), *uneven]

@@ -113,7 +113,8 @@ class _Emitter:
     def _rest(self) -> str:
         """What vanishes before the event, as `steady` calls it."""
         f, lanes, scalars = self._function()
-        lowered, phase = self.lowered, self.lowered.rest
+        lowered = self.lowered
+        phase = self.lowered.rest
         assert phase is not None
         scope = {
             _real(s): lanes.everywhere(scalars.load(f.offset_address("%event", k)))
@@ -138,9 +139,11 @@ class _Emitter:
     def _run(self) -> str:
         """The function that runs all events for all candidates."""
         self.f, self.lanes, self.scalars = self._function()
-        f, scalars = self.f, self.scalars
+        f = self.f
+        scalars = self.scalars
         self.reachable = f.room("i64", 8)
-        memories, states = len(self.lowered.memories), len(self.lowered.states)
+        memories = len(self.lowered.memories)
+        states = len(self.lowered.states)
         self.copied = f.room(f"[{(len(self.given) + memories) * self.width} x double]")
         self.solved = f.room(
             f"[{(steady.room(states) + len(self.lowered.starts) + 1) * self.width} x double]"
@@ -215,11 +218,13 @@ class _Emitter:
             f.loop(0, per_sample, always=True) as q,
             f.passage("points"),
         ):
-            here, there = self._samples(i), self._samples(i, 1)
+            here = self._samples(i)
+            there = self._samples(i, 1)
             share = scalars.divide(
                 f.value(f"sitofp i64 {q} to double"), f.value(f"sitofp i64 {per_sample} to double")
             )
-            x, scope = self.lanes.everywhere(share), dict(event)
+            x = self.lanes.everywhere(share)
+            scope = dict(event)
             for symbol in self.lowered.inputs:
                 scope[symbol] = self._between(symbol.name, here, there, x, step)
             values = Expressions(self.lanes, scope)
@@ -252,7 +257,8 @@ class _Emitter:
             row = f.integer("add", place, f.integer("mul", apart, k)) if k else place
             address = f.offset_address(array, f.integer("mul", row, count))
             for j, value in enumerate(values):
-                lane, there = self.lanes.lane(value, k), f.offset_address(address, j)
+                lane = self.lanes.lane(value, k)
+                there = f.offset_address(address, j)
                 f.do(f"store double {lane}, ptr {there}, align 8")
 
     def _between(self, name: str, here: Samples, there: Samples, x: str, step: str) -> str:
@@ -264,7 +270,8 @@ class _Emitter:
         smooth = rates.get(name, name)
         if smooth not in SMOOTH:
             return n.multiply_add(n.subtract(there(name), here(name)), x, here(name))
-        a, b = here(smooth), there(smooth)
+        a = here(smooth)
+        b = there(smooth)
         da, db = (n.multiply(step, end(SMOOTH[smooth])) for end in (here, there))
         rise = n.subtract(b, a)
         square = n.subtract(
@@ -292,7 +299,8 @@ class _Emitter:
             for k, s in enumerate(self.given)
         }
         values = Expressions(n, scope).evaluate_phase(lowered.start)
-        starts, miss = values[: len(lowered.starts)], self._emit_miss(values[len(lowered.starts) :])
+        starts = values[: len(lowered.starts)]
+        miss = self._emit_miss(values[len(lowered.starts) :])
         if self.solves:
             starts, miss = self._emit_steady_state(starts, miss)
         with f.when(f.value("icmp ne i64 %started, 0")):
@@ -320,7 +328,8 @@ class _Emitter:
         """Copy the parameters of as many candidates as there are lanes; the last one fills lanes
         that are over.
         """
-        f, count = self.f, len(self.given)
+        f = self.f
+        count = len(self.given)
         last = f.integer("sub", "%n", 1)
         source = f.offset_address("%candidates", f.integer("mul", f.integer("mul", e, count), "%n"))
         with f.loop(0, self.width, always=True) as lane:
@@ -337,7 +346,8 @@ class _Emitter:
     def _emit_miss(self, slacks: Sequence[str]) -> str:
         """By how much the requirements are missed in all; 0 where a steady state exists."""
         n = self.lanes
-        zero, most = n.constant(0.0), n.constant(steady.LARGEST_MISS)
+        zero = n.constant(0.0)
+        most = n.constant(steady.LARGEST_MISS)
         miss = zero
         for slack in slacks:
             short = n.larger(zero, n.negative(slack))
@@ -350,7 +360,8 @@ class _Emitter:
         f, n, states = self.f, self.lanes, len(self.lowered.states)
         for k, memory in enumerate(starts[states:], len(self.given)):
             n.store(memory, f.offset_address(self.copied, k * self.width))
-        x, left = self.solved, f.offset_address(self.solved, states * self.width)
+        x = self.solved
+        left = f.offset_address(self.solved, states * self.width)
         work = f.offset_address(self.solved, (states + 1) * self.width)
         for k, value in enumerate(starts[:states]):
             n.store(value, f.offset_address(x, k * self.width))
@@ -370,7 +381,8 @@ class _Emitter:
         """Outputs and errors at sample i, and the steps to the next; the last one's step is
         computed in vain.
         """
-        f, states = self.f, bool(self.lowered.states)
+        f = self.f
+        states = bool(self.lowered.states)
         self.i, local = i, f.integer("sub", i, self.begin)
         self.signal_at = f.offset_address("%signals", f.integer("mul", local, len(self.signals)))
         if not states:
@@ -458,6 +470,14 @@ class _Emitter:
         for symbol, state in zip(lowered.states, along(y, 1 / 6, total), strict=True):
             n.store(state, self._row(group, symbol))
 
+    def _renew_memories(self, group: str, scope: Mapping[Symbol, str]) -> dict[Symbol, str]:
+        """Write memories by their renewal, and give their new values."""
+        values = Expressions(self.lanes, scope).evaluate_phase(self.lowered.renewal)
+        renewed = dict(zip(self.lowered.memories, values, strict=True))
+        for symbol, value in renewed.items():
+            self.lanes.store(value, self._row(group, symbol))
+        return renewed
+
     def _outputs(self, group: str, scope: Mapping[Symbol, str]) -> None:
         """Memories renewed, outputs, and their errors added to the sums."""
         f, n, lowered = self.f, self.lanes, self.lowered
@@ -473,10 +493,7 @@ class _Emitter:
             if s in used
         }
         if lowered.memories:
-            renewed = Expressions(n, scope).evaluate_phase(lowered.renewal)
-            scope |= zip(lowered.memories, renewed, strict=True)
-            for symbol, value in zip(lowered.memories, renewed, strict=True):
-                n.store(value, self._row(group, symbol))
+            scope |= self._renew_memories(group, scope)
         for c, (name, value) in enumerate(
             zip(lowered.outputs, Expressions(n, scope).evaluate_phase(lowered.output), strict=True)
         ):
@@ -541,7 +558,8 @@ class _Emitter:
 
     def _store_starts(self, e: str, first: str, starts: Sequence[str]) -> None:
         """starts (E, K, n)."""
-        f, count = self.f, len(starts)
+        f = self.f
+        count = len(starts)
         for k, value in enumerate(starts):
             self.lanes.store(value, f.offset_address(self.solved, k * self.width))
         remaining = f.integer("sub", "%n", first)

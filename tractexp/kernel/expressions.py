@@ -80,7 +80,8 @@ class Expressions:
             return n.call(LLVMS[type(e)], self(e.args[0]))
         if isinstance(e, sympy.sign | sympy.Heaviside):
             above, below = (1.0, -1.0) if isinstance(e, sympy.sign) else (1.0, 0.0)
-            x, zero = self(e.args[0]), n.constant(0.0)
+            x = self(e.args[0])
+            zero = n.constant(0.0)
             at = zero if isinstance(e, sympy.sign) else self(e.args[1])
             rest = n.select(n.compare("olt", x, zero), n.constant(below), at)
             return n.select(n.compare("ogt", x, zero), n.constant(above), rest)
@@ -97,7 +98,8 @@ class Expressions:
         """Single terms first, then the products one by one: each a fused multiplication and
         addition.
         """
-        single, products = [], []
+        single = []
+        products = []
         for term in terms:
             coefficient, rest = term.as_coeff_Mul()  # type: ignore[attr-defined]
             item = bool(coefficient < 0), abs(coefficient), rest
@@ -108,33 +110,30 @@ class Expressions:
         items = sorted(single, key=itemgetter(0)) + sorted(products, key=itemgetter(0))
         first = next((k for k, item in enumerate(items) if not item[0]), 0)
         items.insert(0, items.pop(first))
-        n, total = self.numbers, None
-        for negative, coefficient, rest in items:
+        n = self.numbers
+        total = self._product(*items[0][1:])
+        if items[0][0]:
+            total = n.negative(total)
+        for negative, coefficient, rest in items[1:]:
             value = self._product(coefficient, rest)
-            if total is None:
-                total = n.negative(value) if negative else value
-            else:
-                total = n.subtract(total, value) if negative else n.add(total, value)
+            total = n.subtract(total, value) if negative else n.add(total, value)
         return total
 
     def _product(self, coefficient: sympy.Expr, rest: sympy.Expr) -> Any:
         """A coefficient times factors, over the product of those that divide."""
         n, above, below = self.numbers, [], []
         for factor in sympy.Mul.make_args(rest):
-            if (
-                isinstance(factor, sympy.Pow)
-                and isinstance(factor.exp, sympy.Number)
-                and factor.exp.is_negative
-            ):
+            if _divides(factor):
                 below.append((factor.base, -factor.exp))
             elif factor is not sympy.S.One:
                 above.append(factor)
         value = self._multiply_values(map(self, above))
-        if value is not None and coefficient == -1:
+        if value is None:
+            value = n.constant(float(coefficient))
+        elif coefficient == -1:
             value = n.negative(value)
-        elif value is None or coefficient != 1:
-            size = n.constant(float(coefficient))
-            value = size if value is None else n.multiply(size, value)
+        elif coefficient != 1:
+            value = n.multiply(n.constant(float(coefficient)), value)
         divisor = self._multiply_values(self._power(*factor) for factor in below)
         return value if divisor is None else n.divide(value, divisor)
 
@@ -156,7 +155,8 @@ class Expressions:
             return lanes.exp(n, n.multiply(self(exponent), lanes.log(n, self(base))))
         if exponent.is_negative:
             return n.divide(n.constant(1.0), self._power(base, -exponent))
-        x, whole = self(base), math.floor(exponent)
+        x = self(base)
+        whole = math.floor(exponent)
         if exponent == whole:
             return self._multiply_power(x, whole)
         if exponent - whole == HALF:
@@ -218,3 +218,10 @@ class Expressions:
             f"the equations contain the condition {condition}, which kernels cannot decide; compare"
             " numbers"
         )
+
+
+def _divides(factor: sympy.Basic) -> bool:
+    """Whether a factor is a power with a negative number as its exponent."""
+    if not isinstance(factor, sympy.Pow):
+        return False
+    return isinstance(factor.exp, sympy.Number) and bool(factor.exp.is_negative)

@@ -108,7 +108,8 @@ class WaveformDrive:
     @property
     def inputs(self) -> np.ndarray:
         """The kernel's rows (14, N)."""
-        n, smooth = len(self.v), (self.v.real, self.v.imag, self.v_zero)
+        n = len(self.v)
+        smooth = (self.v.real, self.v.imag, self.v_zero)
         rows = [
             self.U,
             np.full(n, self.omega_s0),
@@ -159,14 +160,12 @@ class Drive:
     @classmethod
     def from_events(cls, events: Sequence[Excitation | WaveformDrive]) -> "Drive":
         """Lay events end to end, all phasors or all waves."""
-        measured = np.concatenate([e.measurements for e in events], axis=1)
+        measured = _join(events, "measurements")
         lengths = [e.measurements.shape[1] for e in events]
         weights = np.repeat(np.array([e.weights for e in events]).T, lengths, axis=1)
         gaps = np.isnan(measured)
         return cls(
-            inputs=np.ascontiguousarray(
-                np.concatenate([e.inputs for e in events], axis=1), dtype=float
-            ),
+            inputs=np.ascontiguousarray(_join(events, "inputs"), dtype=float),
             measurements=np.where(gaps, 0.0, measured),
             weights=np.where(gaps, 0.0, weights),
             first=np.concatenate([[0], np.cumsum(lengths)]),
@@ -210,3 +209,8 @@ class Drive:
     def part(self, event: int) -> slice:
         """The samples of one event."""
         return slice(int(self.first[event]), int(self.first[event + 1]))
+
+
+def _join(events: Sequence[Excitation | WaveformDrive], name: str) -> np.ndarray:
+    """Rows (R, N) of all events end to end."""
+    return np.concatenate([getattr(e, name) for e in events], axis=1)

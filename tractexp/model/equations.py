@@ -469,13 +469,15 @@ class Equations:
         that vary slowly. A power that changes within a cycle does so as fast as `U` follows. Below
         a twentieth of the voltage before the event admittances grow no further.
         """
-        P, Q = sympy.sympify(P), sympy.sympify(Q)
+        P = sympy.sympify(P)
+        Q = sympy.sympify(Q)
         if not self.waves:
             for site, power in ((sites.P, P), (sites.Q, Q)):
                 self._drawn[site] += power
             return
         speed = 1 + self.omega_s / self.omega_n
-        G, B = P - Q * damping / speed, Q * (speed**2 + damping**2) / speed
+        G = P - Q * damping / speed
+        B = Q * (speed**2 + damping**2) / speed
         current = G * self.v + (B * self._flux_of(damping) if Q != 0 else 0)
         self.draw(current / sympy.Max(self.U, LOWEST * self.U0) ** 2)
 
@@ -519,8 +521,10 @@ class Equations:
         """
         if not self.waves:
             return (voltage - behind) / impedance
-        R, X = re(impedance), im(impedance)
-        psi, speed = self.lag_vector(name, latex), 1 + self.omega_s / self.omega_n
+        R = re(impedance)
+        X = im(impedance)
+        psi = self.lag_vector(name, latex)
+        speed = 1 + self.omega_s / self.omega_n
         current = (psi + I * behind) / X
         before = (voltage - speed * behind) / (R + I * X * speed)
         self.moves(
@@ -533,7 +537,8 @@ class Equations:
         """The current [pu] of a capacitor at the bus, b (dv/dt/omega_n + j (1 + omega_s/omega_n)
         v).
         """
-        rate, site = NOTHING, sites.bus_voltage_rate
+        rate = NOTHING
+        site = sites.bus_voltage_rate
         if self.waves:  # its slope is a site where a part reads it, which most do not
             rate = (
                 self[site]
@@ -584,28 +589,9 @@ class Equations:
         """Give the static load what the other parts leave before the event. Called once all parts
         have declared.
         """
-        for symbol, state in self.states.items():
-            if state.derivative is UNSAID:
-                raise UserError(
-                    f"nothing says how the state '{symbol}' moves; call eq.moves once for each"
-                    " state"
-                )
-        for symbol, memory in self.memories.items():
-            if memory.renewal is UNSAID:
-                raise UserError(
-                    f"nothing renews the memory '{symbol}'; call eq.renews once for each memory"
-                )
+        self._check_said()
         self._derive_starts()
-        without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
-        # space vectors first by their parts, which are short: products across names are long
-        if self.waves:
-            whole = self.parts(self.v * conjugate(self._drawn[sites.current]))
-            others = [replace_symbols(power, without_static | self._starts()) for power in whole]
-        else:
-            powers = (
-                replace_symbols(self.expand(power), without_static) for power in (self.P, self.Q)
-            )
-            others = [self.real(self.evaluate_before(power)) for power in powers]
+        others = self._powers_without_static()
         lost = [self.real(self.evaluate_before(power)) for power in self._lost]
         size = sum(part**2 for part in self.parts(self.evaluate_before(self.v)))
         # what admittances that stand for a power at U_0 draw of it before the event, where the bus
@@ -620,6 +606,30 @@ class Equations:
             self._check_still(
                 f"what must hold for a steady state ('{requirement.sentence}')", requirement.slack
             )
+
+    def _check_said(self) -> None:
+        """Raise `UserError` for a state that does not move, or a memory that is not renewed."""
+        for symbol, state in self.states.items():
+            if state.derivative is UNSAID:
+                raise UserError(
+                    f"nothing says how the state '{symbol}' moves; call eq.moves once for each"
+                    " state"
+                )
+        for symbol, memory in self.memories.items():
+            if memory.renewal is UNSAID:
+                raise UserError(
+                    f"nothing renews the memory '{symbol}'; call eq.renews once for each memory"
+                )
+
+    def _powers_without_static(self) -> list[sympy.Expr]:
+        """P and Q before the event of all but the static load."""
+        without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
+        if not self.waves:
+            powers = (replace_symbols(self.expand(p), without_static) for p in (self.P, self.Q))
+            return [self.real(self.evaluate_before(power)) for power in powers]
+        # space vectors first by their parts, which are short: products across names are long
+        whole = self.parts(self.v * conjugate(self._drawn[sites.current]))
+        return [replace_symbols(power, without_static | self._starts()) for power in whole]
 
     def _derive_starts(self) -> None:
         """Take the values before the event of states that are written in others' by these."""

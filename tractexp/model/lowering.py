@@ -98,9 +98,14 @@ class _Hoister:
 
     def _group_arguments(self, e: sympy.Expr) -> sympy.Expr:
         """A sum or product whose constant and whose sampled arguments are one symbol each."""
-        constant = [a for a in arguments(e) if self.is_constant(a)]
-        signal = [a for a in arguments(e) if a not in constant and self.is_signal(a)]
-        rest = [self(a) for a in arguments(e) if a not in constant and a not in signal]
+        constant, signal, rest = [], [], []
+        for argument in arguments(e):
+            if self.is_constant(argument):
+                constant.append(argument)
+            elif self.is_signal(argument):
+                signal.append(argument)
+            else:
+                rest.append(self(argument))
         if constant:
             rest.append(self.constant(e.func(*constant)))
         if signal:
@@ -113,7 +118,8 @@ def lower(eq: Equations) -> Lowered:
     declares.
     """
     rows = eq.real_states()
-    states, memories = tuple(symbol for symbol, _, _ in rows), tuple(eq.memories)
+    states = tuple(symbol for symbol, _, _ in rows)
+    memories = tuple(eq.memories)
     starts = tuple(eq.real_starts())
     parameters = tuple(map(_symbol, eq.parameters))
     lane = {*parameters, eq.P0, eq.Q0, *starts}
@@ -133,7 +139,8 @@ def lower(eq: Equations) -> Lowered:
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
     balances = _phase(None, [replace_symbols(b, at_rest) for b in eq.real_balances()])
     phases = (derivative, renewal, output)
-    used = tuple(s for s in inputs if s == eq.v or any(s in symbols(p) for p in phases))
+    read = {eq.v}.union(*map(symbols, phases))
+    used = tuple(s for s in inputs if s in read)
     lowered = Lowered(
         parameters,
         used,
@@ -149,11 +156,9 @@ def lower(eq: Equations) -> Lowered:
         tuple(outputs),
     )
     _check_closed(lowered, lane)
-    return (
-        replace(lowered, rest=None)
-        if not eq.edits and _is_steady_state_exact(eq, start, balances, starts)
-        else lowered
-    )
+    if not eq.edits and _is_steady_state_exact(eq, start, balances, starts):
+        return replace(lowered, rest=None)
+    return lowered
 
 
 def _is_steady_state_exact(
@@ -170,7 +175,8 @@ def _is_steady_state_exact(
     drawn = np.random.default_rng(0).uniform(low, high, (TRIES, len(ranges))).T
     given = {_symbol(name): values for name, values in zip(ranges, drawn, strict=True)}
     values = values_of(start, given, TRIES)
-    first, slacks = values[: len(starts)], values[len(starts) :]
+    first = values[: len(starts)]
+    slacks = values[len(starts) :]
     balances = values_of(rest, given | dict(zip(starts, first, strict=True)), TRIES)
     finite = np.isfinite(np.array([*first, *slacks, *balances])).all(axis=0)
     admissible = finite & (np.array([np.ones(TRIES), *slacks]) >= 0).all(axis=0)
@@ -189,7 +195,8 @@ def _phase(
     """
     signals = ()
     needed = _select_needed_steps(expressions, steps or {})
-    targets, expressions = list(needed), [*needed.values(), *expressions]
+    targets = list(needed)
+    expressions = [*needed.values(), *expressions]
     if hoist is not None:
         expressions = [hoist(e) for e in expressions]
         used = set().union(*map(symbols_of, expressions))
@@ -214,7 +221,8 @@ def _in_order(
     assignments: list[tuple[Symbol, sympy.Expr]],
 ) -> tuple[tuple[Symbol, sympy.Expr], ...]:
     """Assignments rearranged so that each comes after those it reads."""
-    waiting, ordered = list(assignments), []
+    waiting = list(assignments)
+    ordered = []
     while waiting:
         open_symbols = {s for s, _ in waiting}
         ready = [(s, e) for s, e in waiting if not symbols_of(e) & open_symbols]

@@ -8,7 +8,7 @@ checker. What `eq` offers is told in docs/plugins.md.
 
 import inspect
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -313,35 +313,20 @@ class Effect(Part):
         """
         super().check_class(where)
         check_signature(cls, "edit", "eq", where)
-        for place in cls.places:
-            if place not in sites.PLACES:
-                raise UserError(
-                    f"{where}: places names '{place}'{among(place, sites.PLACES, 'Places')}"
-                )
-        if cls.kind and cls.kind not in sites.KINDS:
-            raise UserError(f"{where}: kind is '{cls.kind}'{among(cls.kind, sites.KINDS, 'Kinds')}")
+        cls._check_place(where)
         own = {p.name: p for p in cls.parameters}
-        sizes = [p.name for p in cls.parameters if p.null is not None]
+        sizes = {name for name, p in own.items() if p.null is not None}
         if not sizes:
             raise UserError(
                 f"{where} has no size: give the parameter that says how large the effect is a"
                 " 'null', the value at"
                 " which the equations are as if it were absent"
             )
-        for label, table in (("grid", cls.grid), ("relevant", cls.relevant)):
-            for name in table:
-                if name not in own:
-                    raise UserError(
-                        f"{where}: {label} names '{name}', no parameter of"
-                        f" it{among(name, own, 'It has')}"
-                    )
-                if (name in sizes) == (label == "grid"):
-                    kind = (
-                        "is a size, looked for from its null"
-                        if label == "grid"
-                        else "has no null and is no size"
-                    )
-                    raise UserError(f"{where}: {label} names '{name}', which {kind}; take it out")
+        settings = own.keys() - sizes
+        _check_names(
+            f"{where}: grid", cls.grid, own, settings, "is a size, looked for from its null"
+        )
+        _check_names(f"{where}: relevant", cls.relevant, own, sizes, "has no null and is no size")
         for name, values in cls.grid.items():
             low, high = own[name].bounds
             if outside := [v for v in values if not low <= v <= high]:
@@ -349,6 +334,17 @@ class Effect(Part):
                     f"{where}: grid has {name} = {outside[0]:g}, outside its bounds [{low:g},"
                     f" {high:g}]"
                 )
+
+    @classmethod
+    def _check_place(cls, where: str) -> None:
+        """Raise `UserError` for a place or a kind that there is not."""
+        for place in cls.places:
+            if place not in sites.PLACES:
+                raise UserError(
+                    f"{where}: places names '{place}'{among(place, sites.PLACES, 'Places')}"
+                )
+        if cls.kind and cls.kind not in sites.KINDS:
+            raise UserError(f"{where}: kind is '{cls.kind}'{among(cls.kind, sites.KINDS, 'Kinds')}")
 
 
 class Measurement(Effect):
@@ -378,3 +374,16 @@ class Measurement(Effect):
         -------
         (2, n, N) array [pu]
         """
+
+
+def _check_names(
+    where: str, names: Iterable[str], own: Collection[str], allowed: Collection[str], why_not: str
+) -> None:
+    """Raise `UserError` for a name that is none of an effect's `own` parameters, or not allowed."""
+    for name in names:
+        if name not in own:
+            raise UserError(
+                f"{where} names '{name}', no parameter of it{among(name, own, 'It has')}"
+            )
+        if name not in allowed:
+            raise UserError(f"{where} names '{name}', which {why_not}; take it out")

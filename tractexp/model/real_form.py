@@ -110,13 +110,8 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
 
     Long ones stay as they are: they gain nothing, and expanding them takes seconds.
     """
-    if (
-        sum(
-            1
-            for _ in itertools.islice(sympy.preorder_traversal(expression), MOST_EXPANDED_NODES + 1)
-        )
-        > MOST_EXPANDED_NODES
-    ):
+    first = itertools.islice(sympy.preorder_traversal(expression), MOST_EXPANDED_NODES + 1)
+    if len(list(first)) > MOST_EXPANDED_NODES:
         return expression
     if not any(
         isinstance(part, sympy.Mul | sympy.Pow) and any(a.is_Add for a in part.args)

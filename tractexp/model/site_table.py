@@ -1,5 +1,6 @@
 """What stands at the sites of a model, which of its effects edit it, and which others could."""
 
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from tractexp.blocks import Table
@@ -37,17 +38,15 @@ def sites(model: Any) -> Table:
         raise UserError(
             f"sites() takes a model, as compose() makes one, not a {type(model).__name__}"
         )
-    eq, effects = model.equations, discover().get("effect", {})
+    eq = model.equations
+    effects = discover().get("effect", {})
     here = {effect.name for effect in model.effects}
     could = {
         name: model.acceptance(get("effect", name)()).edits for name in effects if name not in here
     }
     rows = []
     for s in (site for site in SITES.values() if site in eq):
-        by = (
-            ", ".join(sorted(n for n, edited in table.items() if s.name in edited))
-            for table in (eq.edits, could)
-        )
+        by = _name_editors(eq.edits, s.name), _name_editors(could, s.name)
         rows.append((s.name, s.owner, s.kind, s.unit, s.about, str(eq.expression(s)), *by))
     columns = (
         "site",
@@ -60,3 +59,8 @@ def sites(model: Any) -> Table:
         "could be edited by",
     )
     return Table(columns, rows, f"Sites of {model.title}")
+
+
+def _name_editors(edits: Mapping[str, Collection[str]], site: str) -> str:
+    """The effects that edit a site, by {effect: sites}, with commas."""
+    return ", ".join(sorted(name for name, edited in edits.items() if site in edited))
