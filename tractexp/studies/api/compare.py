@@ -1,7 +1,7 @@
 """Which optimizer is better: the runs of a sweep, or of any filter over MLflow, compared."""
 
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -100,7 +100,8 @@ class ComparisonResult(Written):
 
     def summary(self) -> Report:
         """The answer, the table, and what was tested."""
-        report, several = Report(), "problems" in self.content
+        report = Report()
+        several = "problems" in self.content
         if several:
             report.text(f"{self.source}: {', '.join(self.content['problems'])}").add(
                 *self._over_all()
@@ -401,13 +402,7 @@ def _track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
         return  # the page is sent with the run of the sweep
     parent = parent_of(result.folder) if result.folder is not None else None
     comparisons = result.comparisons
-    records = {
-        run.data
-        for c in comparisons.values()
-        for variant in c.gathered.variants
-        for run in variant.runs
-    }
-    data = records.pop() if len(records) == 1 else f"{len(records)} records"
+    data = _name_data(comparisons.values())
     try:
         if parent is not None and attach(parent, job.store, paths):
             say(f"logged on the run of the sweep; to see it: {job.look}")
@@ -419,13 +414,27 @@ def _track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
         experiment=job.config["tracking"]["experiment"] or f"compare {data}",
         name=f"comparison of {len(next(iter(comparisons.values())).summaries)} variants",
         parameters=tracking.flatten({"task": job.config["task"]}),
-        metrics={
-            tracking.metric_name(f"median {s.name} {label}".strip()): s.objective.median
-            for label, comparison in comparisons.items()
-            for s in comparison.summaries
-            if s.runs > s.failures
-        },
+        metrics=_collect_medians(comparisons),
         tags={"task": "compare", "data": data},
         artifacts=paths,
     )
     job.send(run)
+
+
+def _name_data(comparisons: "Iterable[Comparison]") -> str:
+    """The record that all runs are on, or how many they are on."""
+    variants = [variant for one in comparisons for variant in one.gathered.variants]
+    records = {run.data for variant in variants for run in variant.runs}
+    return records.pop() if len(records) == 1 else f"{len(records)} records"
+
+
+def _collect_medians(comparisons: "Mapping[str, Comparison]") -> dict[str, float]:
+    """The median objective of each variant of which a run finished, by the names of metrics."""
+    from tractexp import tracking
+
+    return {
+        tracking.metric_name(f"median {s.name} {label}".strip()): s.objective.median
+        for label, comparison in comparisons.items()
+        for s in comparison.summaries
+        if s.runs > s.failures
+    }

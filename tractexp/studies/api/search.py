@@ -147,19 +147,28 @@ def vary_switches(choices: Sequence[Choice], switches: Sequence[str]) -> list[Ch
     """
     if switches:
         check_distinct("switches", switches)
-    own = [[key for key, value in one.node.items() if isinstance(value, bool)] for one in choices]
+    there = set(itertools.chain.from_iterable(map(_list_switches, choices)))
     for switch in switches:
-        if not any(switch in keys for keys in own):
-            there = {key for keys in own for key in keys}
+        if switch not in there:
             names = ", ".join(one.name for one in choices)
             raise UserError(
                 f"switches names {switch}, which is no switch of"
                 f" {names}{among(switch, there, 'Switches')}"
             )
+    return [varied for one in choices for varied in _vary(one, switches)]
+
+
+def _list_switches(choice: Choice) -> list[str]:
+    """The settings of a choice that are on or off."""
+    return [key for key, value in choice.node.items() if isinstance(value, bool)]
+
+
+def _vary(choice: Choice, switches: Sequence[str]) -> list[Choice]:
+    """A choice with every combination of those switches that it has."""
+    own = _list_switches(choice)
+    varied = [key for key in switches if key in own]
     return [
-        dataclasses.replace(one, node={**one.node, **dict(zip(varied, values, strict=True))})
-        for one, keys in zip(choices, own, strict=True)
-        for varied in [[key for key in switches if key in keys]]
+        dataclasses.replace(choice, node={**choice.node, **dict(zip(varied, values, strict=True))})
         for values in itertools.product((True, False), repeat=len(varied))
     ]
 
@@ -172,7 +181,8 @@ def _run_searches(
 
     span = range(setup.seed, setup.seed + seeds)
     variants = {str(k): one.node for k, one in enumerate(choices)}
-    everything, counted = len(variants) * seeds, 0
+    everything = len(variants) * seeds
+    counted = 0
     with count_parts("searches", everything, progress) as count:
 
         def count_ended(done: int, total: int) -> None:

@@ -5,6 +5,7 @@ import numpy as np
 from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
 from tractexp.studies.comparison.comparison import Comparison, VariantPair, seeds_needed
 from tractexp.studies.comparison.floor import FLOOR_SHARE
+from tractexp.studies.comparison.runs import Variant
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
 from tractexp.studies.comparison.summary import Spread
 from tractexp.text.wording import join_words
@@ -93,12 +94,15 @@ def _verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], 
     """The variants that one is significantly better than, those it is worse than, and those it is
     not told from.
     """
-    own = [pair for pair in comparison.pairs if name in (pair.first, pair.second)]
-    beaten = [pair.second for pair in own if pair.significant and pair.first == name]
-    worse = [pair.first for pair in own if pair.significant and pair.second == name]
-    alike = [
-        pair.second if pair.first == name else pair.first for pair in own if not pair.significant
-    ]
+    beaten, worse, alike = [], [], []
+    for pair in comparison.pairs:
+        if name not in (pair.first, pair.second):
+            continue
+        other = pair.second if pair.first == name else pair.first
+        if not pair.significant:
+            alike.append(other)
+        else:
+            (beaten if pair.first == name else worse).append(other)
     return beaten, worse, alike
 
 
@@ -141,9 +145,7 @@ def _list_names(names: list[str]) -> str:
 def of_pair(comparison: Comparison, pair: VariantPair) -> str:
     """One pair of variants, as it may be quoted."""
     one, two = (comparison.gathered[name] for name in (pair.first, pair.second))
-    spent = [
-        Spread.from_values([run.simulations[-1] for run in v.finished_runs]) for v in (one, two)
-    ]
+    spent = [_spent_simulations(variant) for variant in (one, two)]
     first, second = (
         f"{number(median)} pu²" if np.isfinite(median) else "no result" for median in pair.medians
     )
@@ -167,6 +169,11 @@ def of_pair(comparison: Comparison, pair: VariantPair) -> str:
         f"{'pair' if tests == 1 else 'pairs'}, p = {p_value(pair.corrected)}; Vargha-Delaney A ="
         f" {pair.effect:.2f})."
     )
+
+
+def _spent_simulations(variant: Variant) -> Spread:
+    """The simulations that the finished runs of a variant made."""
+    return Spread.from_values([run.simulations[-1] for run in variant.finished_runs])
 
 
 def of_ranks(comparison: Comparison) -> str:
@@ -210,7 +217,8 @@ def of_speed(comparison: Comparison) -> str:
 def of_floor(comparison: Comparison) -> str:
     """How many runs of each variant reach the floor, in a sentence."""
     shares = _describe_shares([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
-    value, source = number(comparison.floor.value, 5), comparison.floor.source
+    value = number(comparison.floor.value, 5)
+    source = comparison.floor.source
     return f"Runs within {FLOOR_SHARE:.0%} of the floor of {value} pu² ({source}): {shares}."
 
 

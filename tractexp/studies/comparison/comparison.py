@@ -148,36 +148,50 @@ def _pairs(
         return (), [f"There is one variant only, {variants[0].name}: nothing to test it against."]
     chosen = [(a, b) for a, b in combinations(variants, 2) if reference in (None, a.name, b.name)]
     common = [sorted({*a.objectives} & {*b.objectives}) for a, b in chosen]
-    enough = [
-        (a, b, seeds)
+
+    notes = _describe_untested(chosen, common)
+    tested = [
+        _pair(a, b, seeds, least)
         for (a, b), seeds in zip(chosen, common, strict=True)
         if len(seeds) >= LEAST_SEEDS
     ]
-    notes = []
-    if len(enough) < len(chosen):
-        short = min(zip(common, chosen, strict=True), key=lambda row: len(row[0]))
-        names = " and ".join(variant.name for variant in short[1])
-        notes.append(
-            f"{len(chosen) - len(enough)} of {len(chosen)} pairs were not tested, for want of"
-            f" seeds: {names} have "
-            f"{len(short[0])} in common, and the Wilcoxon signed-rank test needs at least"
-            f" {LEAST_SEEDS} to reach "
-            f"{SIGNIFICANCE_LEVEL:.0%}; run more, such as 'seed=range(0,30)'."
-        )
-    tested = [_pair(*row, least) for row in enough]
     corrected = holm([pair.p for pair in tested])
     pairs = [
         VariantPair(**{**vars(pair), "corrected": float(p)})
         for pair, p in zip(tested, corrected, strict=True)
     ]
-    needed = seeds_needed(len(tested))
-    if tested and max(pair.seeds for pair in tested) < needed:
-        notes.append(
-            f"With {len(tested)} pairs corrected for, fewer than {needed} seeds can show no"
-            f" difference at {SIGNIFICANCE_LEVEL:.0%}, "
-            "however large: run more seeds, or test against one variant by task.reference=NAME."
-        )
+    notes += _describe_power(tested)
     return tuple(sorted(pairs, key=lambda pair: (pair.corrected, pair.first, pair.second))), notes
+
+
+def _describe_untested(
+    pairs: Sequence[tuple[Variant, Variant]], common: Sequence[Sequence[int]]
+) -> list[str]:
+    """A sentence on the pairs with too few seeds in `common`; [] where there are none."""
+    few = sum(len(seeds) < LEAST_SEEDS for seeds in common)
+    if not few:
+        return []
+    seeds, pair = min(zip(common, pairs, strict=True), key=lambda row: len(row[0]))
+    names = " and ".join(variant.name for variant in pair)
+    return [
+        f"{few} of {len(pairs)} pairs were not tested, for want of"
+        f" seeds: {names} have "
+        f"{len(seeds)} in common, and the Wilcoxon signed-rank test needs at least"
+        f" {LEAST_SEEDS} to reach "
+        f"{SIGNIFICANCE_LEVEL:.0%}; run more, such as 'seed=range(0,30)'."
+    ]
+
+
+def _describe_power(tested: Sequence[VariantPair]) -> list[str]:
+    """A sentence on pairs that are too many for their seeds; [] where a difference can show."""
+    needed = seeds_needed(len(tested))
+    if max((pair.seeds for pair in tested), default=needed) >= needed:
+        return []
+    return [
+        f"With {len(tested)} pairs corrected for, fewer than {needed} seeds can show no"
+        f" difference at {SIGNIFICANCE_LEVEL:.0%}, "
+        "however large: run more seeds, or test against one variant by task.reference=NAME."
+    ]
 
 
 def _pair(a: Variant, b: Variant, seeds: Sequence[int], least: float) -> VariantPair:

@@ -1,6 +1,7 @@
 """Runs judged: those of one problem, those of several, and the same variants on BBOB."""
 
 import contextlib
+import itertools
 from collections.abc import Mapping, Sequence
 from inspect import unwrap
 from pathlib import Path
@@ -95,12 +96,8 @@ def _on_bbob(
     """
     variants = [v for v in comparison.gathered.variants if not v.settings.get("polish")]
     optimizers = {v.name: nest_keys(v.runs[0].config)["optimizer"] for v in variants}
-    budgets = {
-        budget
-        for v in variants
-        for run in v.runs
-        if (budget := run.config.get("budget")) is not None
-    }
+    runs = itertools.chain.from_iterable(v.runs for v in variants)
+    budgets = {run.config.get("budget") for run in runs} - {None}
     multiplier = -(-int(budgets.pop() if len(budgets) == 1 else EVALUATIONS) // DIMENSION)
     settings = {
         "optimizers": optimizers,

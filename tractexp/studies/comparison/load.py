@@ -14,7 +14,6 @@ from tractexp.errors import TASK, UserError
 from tractexp.identification.result import by_event, parse_history
 from tractexp.storage import files
 from tractexp.studies.comparison.runs import SearchRun
-from tractexp.tracking.sweepfile import folder_of
 
 FITTING = "identify"  # the task whose runs are compared
 # what a job's status.json says
@@ -60,16 +59,9 @@ def from_sweep(folder: Path) -> list[SearchRun]:
 
 
 def _jobs(folder: Path) -> list[Path]:
-    """The folders of a sweep's own jobs, at any depth: `hydra.sweep.subdir` names them. Numbers are
-    in order.
-    """
-    found = (config.parents[1] for config in folder.rglob(".hydra/config.yaml"))
-    own = [job for job in found if job != folder and folder_of(job) == folder]
-    names = {job: job.relative_to(folder).parts for job in own}
-    return sorted(
-        (job for job in own if not any(name.startswith(".") for name in names[job])),
-        key=lambda job: [(int(n) if n.isdigit() else np.inf, n) for n in names[job]],
-    )
+    """Job folders, numbered ones in order of their number."""
+    jobs = [config.parents[1] for config in folder.glob("*/.hydra/config.yaml")]
+    return sorted(jobs, key=lambda job: (int(job.name) if job.name.isdigit() else np.inf, job.name))
 
 
 def _job(folder: Path) -> SearchRun | None:
@@ -95,7 +87,7 @@ def _read_job(folder: Path) -> SearchRun | None:
         "data": choices["data"],
         "seed": int(config["seed"]),
         "config": flat(config),
-        "where": folder.relative_to(folder_of(folder)).as_posix(),
+        "where": folder.name,
         "folder": runtime.get("cwd", ""),
     }
     if unfinished:
@@ -126,7 +118,8 @@ def code_of(result: Mapping[str, Any]) -> str:
     """The version and commit of the package, of a `result.json`: "0.4.0 at 1c2d3e4f"; "" in early
     ones.
     """
-    version, commit = result.get("tractexp_version", ""), result.get("commit", "")
+    version = result.get("tractexp_version", "")
+    commit = result.get("commit", "")
     dirty = "-dirty" if commit.endswith("-dirty") else ""
     return f"{version} at {commit[:8]}{dirty}" if version and commit else version
 
@@ -227,7 +220,8 @@ def _read_logged_run(one: Any) -> SearchRun:
         "config": {key: _value(text) for key, text in one.parameters.items()},
         "where": one.name,
     }
-    curve, ended = one.curves.get("fitness_by_simulations"), {}
+    curve = one.curves.get("fitness_by_simulations")
+    ended = {}
     if one.status in UNDER_WAY:
         return SearchRun(**fields, interruption=f"its status in MLflow is {one.status}")
     if one.status != "FINISHED" or "objective" not in one.metrics or curve is None:
@@ -237,7 +231,8 @@ def _read_logged_run(one: Any) -> SearchRun:
         ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
     result = files.parse_json(one.files.get("result.json", "{}"), f"the result.json of {one.name}")
     details = {"parameters": parameters_of(ended_search(result)), "code": code_of(result)}
-    total, seconds = ended.pop("simulations"), ended.pop("seconds")
+    total = ended.pop("simulations")
+    seconds = ended.pop("seconds")
     if "history.csv" in one.files:
         return SearchRun(**fields, **ended, **_history(one.files["history.csv"]), **details)
     simulations = np.fmin(curve[0], total)

@@ -75,10 +75,7 @@ def on_records(
     table = np.array([by_seed[seed] for by_seed in logs.values() for seed in sorted(by_seed)])
     ranks = _rank_optimizers(names, table)
     chosen = family(variants, plain)
-    whole = None
-    if chosen and seeds:
-        mean = np.mean([[by_seed[seed] for seed in seeds] for by_seed in logs.values()], axis=0)
-        whole = chosen.ablation(dict(zip(names, mean.T, strict=True)))
+    whole = _ablate_mean(chosen, names, logs, seeds) if chosen and seeds else None
     medians = {
         name: tuple(_median_over_floor(c, name) for c in comparisons.values())
         for name in _order_names(names, ranks)
@@ -99,6 +96,17 @@ def on_records(
         whole,
         _cost(chosen, comparisons.values()),
     )
+
+
+def _ablate_mean(
+    chosen: VariantFamily,
+    names: Sequence[str],
+    logs: Mapping[str, Mapping[int, list[float]]],
+    seeds: Sequence[int],
+) -> Ablation:
+    """What the switches do to the mean over all problems, seed by seed."""
+    mean = np.mean([[by_seed[seed] for seed in seeds] for by_seed in logs.values()], axis=0)
+    return chosen.ablation(dict(zip(names, mean.T, strict=True)))
 
 
 def _median_over_floor(comparison: Comparison, name: str) -> float:

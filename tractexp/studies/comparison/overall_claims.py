@@ -1,8 +1,9 @@
 """Sentences on several problems at once, each with its numbers and no more than the tests allow."""
 
-import numpy as np
+import itertools
+from collections.abc import Sequence
 
-from tractexp.studies.comparison.ablation import SwitchEffect
+from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.overall import Overall, Several
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
@@ -75,21 +76,20 @@ def of_agreement(several: Several) -> str:
     ablations = [overall.ablation for overall in several.overall if overall.ablation]
     if len(ablations) < 2:
         return ""
-    signs: dict[str, list[int]] = {}
-    for ablation in ablations:
-        for effect in ablation.effects:
-            signs.setdefault(effect.switches[0], []).append(
-                int(np.sign(1 - effect.factor)) * effect.is_significant
-            )
-    always = [
-        s
-        for s, each in signs.items()
-        if len(each) == len(ablations) and all(sign > 0 for sign in each)
-    ]
-    never = [s for s, each in signs.items() if all(sign <= 0 for sign in each)]
+    helps = _list_help(ablations)
+    always = [s for s, each in helps.items() if sum(each) == len(ablations)]
+    never = [s for s, each in helps.items() if not any(each)]
     parts = [f"{_help(always)} everywhere" if always else "no ingredient helps everywhere"]
     parts += [f"{_help(never)} nowhere"] if never else []
     return f"Over all terms together, {' and '.join(parts)}."
+
+
+def _list_help(ablations: Sequence[Ablation]) -> dict[str, list[bool]]:
+    """{switch: whether it helps, under each of the terms}."""
+    helps: dict[str, list[bool]] = {}
+    for effect in itertools.chain.from_iterable(ablation.effects for ablation in ablations):
+        helps.setdefault(effect.switches[0], []).append(effect.factor < 1 and effect.is_significant)
+    return helps
 
 
 def _help(names: list[str]) -> str:

@@ -2,6 +2,8 @@
 for machines.
 """
 
+import itertools
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,7 @@ from tractexp.storage import files
 from tractexp.studies.comparison import charts
 from tractexp.studies.comparison import overall_claims as claims
 from tractexp.studies.comparison import page as one
-from tractexp.studies.comparison.ablation import Ablation
+from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.overall import Overall, Several
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
@@ -91,27 +93,42 @@ def effects(overall: Overall) -> Chart:
         **(overall.each if len(overall.each) > 1 else {}),
         ALL: overall.ablation,
     }
-    rows = [
-        (effect, label, k)
-        for k, switch in enumerate(overall.ablation.switches)
+    by_switch = {switch: _list_effects(groups, switch) for switch in overall.ablation.switches}
+    rows = list(itertools.chain.from_iterable(by_switch.values()))
+    chart = Chart("factor", [""], log_x=True, pixels=110 + ROW * len(rows), hover="closest")
+    first = 0
+    for k, (switch, own) in enumerate(by_switch.items()):
+        if own:
+            _add_switch(chart, switch, own, first, style.PALETTE[k % len(style.PALETTE)])
+        first += len(own)
+    chart.ticks(0, range(len(rows)), [label for label, _ in rows])
+    ends = [bound for _, effect in rows for bound in (effect.low, effect.high)]
+    low = min(0.9, *ends) / 1.02
+    high = max(1.1, *ends) * 1.02
+    chart.ticks(None, charts.round_numbers(low, high))
+    return chart.limits(0, len(rows) - 0.4, -0.6).edge(1.0, dash="dash").limits(None, low, high)
+
+
+def _list_effects(groups: Mapping[str, Ablation], switch: str) -> list[tuple[str, SwitchEffect]]:
+    """(problem, what a switch does there by itself), of each problem that has it."""
+    return [
+        (label, effect)
         for label, ablation in groups.items()
         for effect in ablation.effects
         if effect.switches == (switch,)
     ]
-    chart = Chart("factor", [""], log_x=True, pixels=110 + ROW * len(rows), hover="closest")
-    for k, switch in enumerate(overall.ablation.switches):
-        own = [(row, effect, label) for row, (effect, label, n) in enumerate(rows) if n == k]
-        if not own:
-            continue
-        spans = np.array([(effect.low, effect.high) for _, effect, _ in own])
-        labels = [f"{label}: {claims.of_effect(effect)}" for _, effect, label in own]
-        x, y = [effect.factor for _, effect, _ in own], [row for row, *_ in own]
-        chart.points(switch, x, y, style.PALETTE[k % len(style.PALETTE)], hover=labels, spans=spans)
-    chart.ticks(0, range(len(rows)), [label for _, label, _ in rows])
-    ends = [bound for effect, *_ in rows for bound in (effect.low, effect.high)]
-    low, high = min(0.9, *ends) / 1.02, max(1.1, *ends) * 1.02
-    chart.ticks(None, charts.round_numbers(low, high))
-    return chart.limits(0, len(rows) - 0.4, -0.6).edge(1.0, dash="dash").limits(None, low, high)
+
+
+def _add_switch(
+    chart: Chart, switch: str, own: Sequence[tuple[str, SwitchEffect]], first: int, color: str
+) -> None:
+    """Draw what a switch does on each problem, in rows from the `first` on."""
+    effects = [effect for _, effect in own]
+    spans = np.array([(effect.low, effect.high) for effect in effects])
+    labels = [f"{label}: {claims.of_effect(effect)}" for label, effect in own]
+    factors = [effect.factor for effect in effects]
+    rows = list(range(first, first + len(own)))
+    chart.points(switch, factors, rows, color, hover=labels, spans=spans)
 
 
 def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
@@ -119,15 +136,7 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
     cost = overall.cost
     columns = ["switched on", "factor", "from", "to", "better in", "from", "to", "shown"]
     columns += ["simulations per iteration"] if cost else []
-    rows = [
-        [
-            *one.factor(effect),
-            *(f"{x:.0%}" for x in effect.better or ()),
-            "yes" if effect.is_significant else "no",
-        ]
-        + ([f"{cost[effect.switches[0]]:+.1f}"] if cost else [])
-        for effect in ablation.effects
-    ]
+    rows = [_describe_effect(effect, cost) for effect in ablation.effects]
     page.table(
         columns,
         rows,
@@ -140,16 +149,28 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
     )
     if not (ablation.interactions or ablation.company):
         return
+    columns = ["switched on", "factor", "from", "to", "shown"]
     with page.fold_blocks("interactions of pairs of ingredients"):
         for changes, caption in (
             (ablation.interactions, one.INTERACTIONS),
             (ablation.company, one.COMPANY),
         ):
-            rows = [
-                [*one.factor(effect), "yes" if effect.is_significant else "no"]
-                for effect in changes
-            ]
-            page.table(["switched on", "factor", "from", "to", "shown"], rows, caption)
+            page.table(columns, [_describe_interaction(effect) for effect in changes], caption)
+
+
+def _describe_effect(effect: SwitchEffect, cost: Mapping[str, float]) -> list[str]:
+    """A row of what a switch does by itself, and what it costs where that is known."""
+    return [
+        *one.factor(effect),
+        *(f"{x:.0%}" for x in effect.better or ()),
+        "yes" if effect.is_significant else "no",
+        *([f"{cost[effect.switches[0]]:+.1f}"] if cost else []),
+    ]
+
+
+def _describe_interaction(effect: SwitchEffect) -> list[str]:
+    """A row of what a switch does beside others, and whether that is shown."""
+    return [*one.factor(effect), "yes" if effect.is_significant else "no"]
 
 
 def _reading(page: Report) -> Report:

@@ -1,8 +1,9 @@
 """A comparison as one self-contained page for people, and as one JSON file for machines."""
 
-import math
 from dataclasses import asdict
 from typing import Any
+
+import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
@@ -142,9 +143,12 @@ def _speed(page: Report, comparison: Comparison) -> None:
         *(f"{g} [s]" for g in goals),
     ]
     rows = [
-        [s.name, number(s.simulations.median)]
-        + [number(float(round(x)) if math.isfinite(x) else x) for x in s.ert["simulations"]]
-        + [number(x) for x in s.ert["seconds"]]
+        [
+            s.name,
+            number(s.simulations.median),
+            *map(number, np.round(s.ert["simulations"]).tolist()),
+            *map(number, s.ert["seconds"]),
+        ]
         for s in comparison.summaries
     ]
     few = len(comparison.summaries) <= charts.TOGETHER

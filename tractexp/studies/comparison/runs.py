@@ -4,6 +4,7 @@ its seeds.
 What is compared is where each search ended, before the estimate was polished.
 """
 
+import itertools
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -152,29 +153,36 @@ def gather(runs: Sequence[SearchRun], source: str) -> Gathered:
     _check_any_finished(runs, source)
     ended = [run for run in runs if not run.interruption]
     unique = {_identity(run): run for run in ended}
-    left_out = len(ended) - len(unique)
-    notes = (
-        [f"Of runs made more than once, the newest count: {left_out} left out."] if left_out else []
-    )
-    if len(versions := {run.code for run in ended if run.code}) > 1:
-        notes.append(
-            f"The runs were made by different code ({', '.join(sorted(versions))}): a difference"
-            " between variants may"
-            " be one between versions."
-        )
+    notes = []
+    if left_out := len(ended) - len(unique):
+        notes.append(f"Of runs made more than once, the newest count: {left_out} left out.")
+    notes += _describe_versions(ended)
     names = _names(runs)
-    interrupted = {
-        _identity(run): run for run in runs if run.interruption and _identity(run) not in unique
-    }
-    unjudged = tuple((names[_settings(run)], run) for run in interrupted.values())
+    stopped = {_identity(run): run for run in runs if run.interruption}
+    unjudged = [run for key, run in stopped.items() if key not in unique]
     if unjudged:
         count = f"{len(unjudged)} runs were" if len(unjudged) > 1 else "One run was"
         notes.append(
             f"{count} interrupted, or still going on, and not judged: see the end of the page."
         )
     return Gathered(
-        _variants(list(unique.values()), names), _problem_name(runs[0]), tuple(notes), unjudged
+        _variants(list(unique.values()), names),
+        _problem_name(runs[0]),
+        tuple(notes),
+        tuple((names[_settings(run)], run) for run in unjudged),
     )
+
+
+def _describe_versions(runs: Sequence[SearchRun]) -> list[str]:
+    """A note on runs made by different code; [] where it is the same, or not known."""
+    versions = {run.code for run in runs} - {""}
+    if len(versions) < 2:
+        return []
+    return [
+        f"The runs were made by different code ({', '.join(sorted(versions))}): a difference"
+        " between variants may"
+        " be one between versions."
+    ]
 
 
 def _check_any_finished(runs: Sequence[SearchRun], source: str) -> None:
@@ -270,13 +278,11 @@ def _check_same_problem(runs: Sequence[SearchRun], source: str) -> None:
             " be compared; "
             f"choose one, such as {TASK.data}={chosen[0]}"
         )
+    keys = set(itertools.chain.from_iterable(run.config for run in runs))
+
     for part in PROBLEM:
-        contents = [
-            {k: repr(v) for k, v in run.config.items() if k.partition(".")[0] == part}
-            for run in runs
-        ]
-        for key in sorted({key for content in contents for key in content}):
-            values = sorted({_plain(content.get(key, "None")) for content in contents})
+        for key in sorted(key for key in keys if key.partition(".")[0] == part):
+            values = sorted({_plain(repr(run.config.get(key))) for run in runs})
             if len(values) > 1:
                 raise UserError(
                     f"{source} holds runs that differ in {key} ({', '.join(values)}), so their"

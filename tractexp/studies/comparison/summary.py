@@ -66,7 +66,7 @@ def summarize(
     }
     simulations = Spread.from_values([run.simulations[-1] for run in done])
     failures = len(variant.runs) - len(done)
-    inside = [there for run in done if polished and (there := polished.in_valley(run)) is not None]
+
     return Summary(
         variant.name,
         len(variant.runs),
@@ -74,9 +74,16 @@ def summarize(
         **spreads,
         simulations=simulations,
         at_floor=float(np.mean(reached)),
-        in_valley=float(np.mean(inside)) if inside else None,
+        in_valley=_share_in_valley(done, polished),
         ert=ert,
     )
+
+
+def _share_in_valley(runs: Sequence[SearchRun], polished: Polished | None) -> float | None:
+    """The share of runs that ended in the floor's valley; None where that is known of none."""
+    inside = [] if polished is None else list(map(polished.in_valley, runs))
+    known = [there for there in inside if there is not None]
+    return float(np.mean(known)) if known else None
 
 
 def running_time(variant: Variant, target: float, cost: str) -> float:
@@ -136,7 +143,8 @@ def band(variant: Variant, by: str, points: int = 300) -> Band:
     steps = [
         run.simulations if by == "simulations" else np.arange(len(run.history)) for run in done
     ]
-    first, last = max(step[0] for step in steps), max(step[-1] for step in steps)
+    first = max(step[0] for step in steps)
+    last = max(step[-1] for step in steps)
     spaced = np.geomspace if by == "simulations" else np.linspace  # as they are drawn
     x = np.unique(spaced(first, last, points).round())
     at = [

@@ -232,6 +232,12 @@ def _valleys(sheet: Report, study: Study) -> None:
         f" beyond the bounds of {TRADED}. Q_s0 is what is left of Q before the dip to the static"
         " load.",
     )
+    _add_ends(sheet, study)
+    _add_valleys_by_bounds(sheet, study, index[TRADED])
+
+
+def _add_ends(sheet: Report, study: Study) -> None:
+    """Add in which valley the searches ended."""
     names = study.problem.space.names
     every = {name: study.ends[name].group_valleys() for name in COMPARED}
     rows = []
@@ -245,23 +251,20 @@ def _valleys(sheet: Report, study: Study) -> None:
         " of the latter the"
         " lowest four.",
     )
+
+
+def _add_valleys_by_bounds(sheet: Report, study: Study, traded: int) -> None:
+    """Add how often random points lead to the right valley, by the bounds of the parameter that
+    trades, of that number.
+    """
     rows = []
     for (low, high), ends in study.ends_by_bounds.items():
         right = ends.objective <= FLOOR_FACTOR * study.floor
-        second = ends.group_valleys()[1:2]
-        at = (
-            f"{number(second[0][0])} at {TRADED} = {number(float(second[0][2][index[TRADED]]))}"
-            if second
-            else "-"
-        )
-        rows.append(
-            [
-                f"{low:g} .. {high:g}",
-                f"{np.mean(right):.0%}",
-                at,
-                str(second[0][1]) if second else "0",
-            ]
-        )
+        at, count = "-", 0
+        for f, n, values in ends.group_valleys()[1:2]:
+            at = f"{number(f)} at {TRADED} = {number(float(values[traded]))}"
+            count = n
+        rows.append([f"{low:g} .. {high:g}", f"{np.mean(right):.0%}", at, str(count)])
     sheet.table(
         [
             f"bounds of {TRADED}",
