@@ -95,7 +95,8 @@ class AllEvents:
         """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from
         every setting.
         """
-        by_name, effort = {fit.names: fit for fit in alone}, self.context.effort
+        by_name = {fit.names: fit for fit in alone}
+        effort = self.context.effort
         _ = self.plain  # once, before processes are forked
         refitted = each_apart(lambda fit: self._refit(fit, anew=anew), alone, effort)
         fits = best_of(itertools.chain(*refitted))
@@ -118,20 +119,14 @@ class AllEvents:
         """A set of several effects as it fits the fitted events without each of them, by the one
         left out; from where the set fits, and from where it was found.
         """
-        rest = {
-            name: tuple(n for n in fit.names if n != name)
-            for name in fit.names
-            if len(fit.names) > 1
-        }
+        if len(fit.names) < 2:
+            return {}
+        rest = {name: tuple(n for n in fit.names if n != name) for name in fit.names}
         at = self.fitted.coordinates
         wanted = [(names, at.remove_effects(fit.unit, [left])) for left, names in rest.items()]
-        there = [self.refits[names] for names, _ in wanted if names in self.refits]
+        there = [self.refits[names] for names in rest.values() if names in self.refits]
         wanted += [(f.names, at.without_faults(f.unit, self.faults)) for f in there]
-        fits = (
-            {f.names: f for f in refit(self.fitted, self.noise, wanted, self.faults)}
-            if wanted
-            else {}
-        )
+        fits = {f.names: f for f in refit(self.fitted, self.noise, wanted, self.faults)}
         return {left: fits[names] for left, names in rest.items()}
 
     def fit_to_all(self, fits: Mapping[str, Refit]) -> dict[str, Refit]:
@@ -157,7 +152,8 @@ class AllEvents:
         """A set fitted to all events, from where it was fitted alone; `anew` from every setting of
         its scanned parameters, too.
         """
-        at, settings = self.context.coordinates, list[Mapping[str, float]]([{}])
+        at = self.context.coordinates
+        settings = list[Mapping[str, float]]([{}])
         if anew:  # from every setting of the scanned parameters of one of the effects, too
             settings += itertools.chain.from_iterable(
                 self.context.catalogue[name].settings for name in alone.names

@@ -85,34 +85,43 @@ def recommendation(investigation: Findings) -> str:
         sentence = f"ask what on site acts like {proposal.term.words}; {PLUGIN} adds it to a model"
         return sentence if chosen is None else f"{sentence}; {chosen.sentence()}"
     if investigation.verdict.word == UNEXPLAINED:
-        if investigation.by_likelihood.is_mild:
-            return "hold out a deeper dip, one of those fitted or a new one"
-        if shows_more(investigation.by_likelihood, investigation.context.criteria):
-            return f"fit the held-out events, too ({DATA.train})"
-        return "look at what is left (unexplained.csv) and at what switched at that time"
+        return _recommend_for_rest(investigation)
     grade = investigation.final_grade.adequacy.grade
     if investigation.verdict.word == CANDIDATE and grade is not Grade.WRONG_MODEL:
         return recommend_confirmation(investigation)
     if investigation.verdict.word in (NAMED, CANDIDATE):
-        if grade is not Grade.ADEQUATE:
-            return (
-                "find what is missing still: by further events, or with the extended model as the"
-                " base model"
-            )
-        held = investigation.undetermined_values
-        rest = (
-            f"; these events cannot tell {join_words(list(held))}, which it holds" if held else ""
-        )
-        return f"use the extended model{rest}; judge it on further events as they come"
+        return _recommend_use(investigation)
     return (
         "use the base model; what is missing, if anything, is below the limits given for each"
         " effect"
     )
 
 
+def _recommend_use(investigation: Findings) -> str:
+    """What to do next with the extended model."""
+    if investigation.final_grade.adequacy.grade is not Grade.ADEQUATE:
+        return (
+            "find what is missing still: by further events, or with the extended model as the"
+            " base model"
+        )
+    held = investigation.undetermined_values
+    rest = f"; these events cannot tell {join_words(list(held))}, which it holds" if held else ""
+    return f"use the extended model{rest}; judge it on further events as they come"
+
+
+def _recommend_for_rest(investigation: Findings) -> str:
+    """What to do next where something is missing that no effect and no term explains."""
+    if investigation.by_likelihood.is_mild:
+        return "hold out a deeper dip, one of those fitted or a new one"
+    if shows_more(investigation.by_likelihood, investigation.context.criteria):
+        return f"fit the held-out events, too ({DATA.train})"
+    return "look at what is left (unexplained.csv) and at what switched at that time"
+
+
 def recommend_confirmation(findings: Findings) -> str:
     """Which event would confirm a candidate, as a sentence."""
-    names, evidence = join_words(findings.names), findings.evidence
+    names = join_words(findings.names)
+    evidence = findings.evidence
     if evidence.is_predicted:
         every = [*findings.context.events, *findings.withheld]
         deepest = max(every, key=lambda event: event.depth).record.name
@@ -121,7 +130,8 @@ def recommend_confirmation(findings: Findings) -> str:
             f" part in choosing {names}"
         )
     expected = np.array(findings.train.by_event)
-    most, shown = float(expected.max()), findings.context.criteria.shown
+    most = float(expected.max())
+    shown = findings.context.criteria.shown
     deepest = findings.context.events[int(expected.argmax())].record.name
     if most - SPREAD * most**0.5 < shown:
         return (
@@ -226,7 +236,9 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     """
     if investigation.verdict.complete:
         return None
-    near, tests = investigation.nearest, investigation.tests
+    near = investigation.nearest
+    tests = investigation.tests
+    shapes = list(map(asdict, investigation.remainder))
     nearest = near and (near.carried or near.curves)[1].error
     before, after = (
         investigation.select_misfit(one)
@@ -241,9 +253,9 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
         "where": tests.loudest,
         "sentence": investigation.headline,
         "best_term": _best_term(investigation),
-        "of_names": [asdict(shape) for shape in investigation.remainder if investigation.names],
-        "of_nearest": [asdict(shape) for shape in investigation.remainder if near],
-        "of_base": [asdict(shape) for shape in investigation.remainder_of_base],
+        "of_names": shapes if investigation.names else [],
+        "of_nearest": shapes if near else [],
+        "of_base": list(map(asdict, investigation.remainder_of_base)),
     }
 
 
@@ -267,7 +279,8 @@ def write_left(investigation: Findings, path: Path) -> Path:
     """Write what the best model leaves, measured less calculated [pu], as CSV: event, t [s], each
     channel.
     """
-    drive, nearest = investigation.context.drive, investigation.nearest
+    drive = investigation.context.drive
+    nearest = investigation.nearest
     near = (investigation.train.after if nearest is None else nearest.curves[1]).calculated
     lines = [",".join(["event", "t", *drive.names])]
     for e, event in enumerate(investigation.context.events):
@@ -302,7 +315,8 @@ def sets(investigation: Findings) -> list[dict[str, Any]]:
     """The refitted sets that were compared, with the model's error on held-out events where that
     decided.
     """
-    rows, at = [], investigation.context.coordinates
+    rows = []
+    at = investigation.context.coordinates
     for set_evidence in investigation.evidence.rows:
         names = set_evidence.fit.names
         if not names:
@@ -397,10 +411,8 @@ def write_model(
     the path by which its first line names the file, by default where it is written.
     """
     effects = sorted({*node.get("effects", ()), *investigation.names})
-    settings = {
-        part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")
-    }
-    held, window = investigation.undetermined_values, recorder_window(investigation)
+    held = investigation.undetermined_values
+    window = recorder_window(investigation)
     extended: dict[str, Any] = {
         "defaults": [
             {"motor": node["motor"]["name"]},
@@ -411,7 +423,7 @@ def write_model(
         "bounds": {n: list(b) for n, b in node["bounds"].items()},
         "fixed": {**node["fixed"], **held},
     }
-    extended |= {part: chosen for part, chosen in settings.items() if chosen}
+    extended |= _list_part_settings(node)
     extended |= {
         key: node[key] for key in ("integration", "domain", "substeps", "priors") if node.get(key)
     }
@@ -427,6 +439,14 @@ def write_model(
     lines = [command, *_explain_model(investigation, node, held)]
     comments = "".join(f"# {quoting.comment(line)}\n" for line in lines)
     return files.write(path, comments + quoting.yaml(extended))
+
+
+def _list_part_settings(node: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """{motor and static: their settings}, where they have some beside the name."""
+    parts = {
+        part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")
+    }
+    return {part: settings for part, settings in parts.items() if settings}
 
 
 def _explain_model(

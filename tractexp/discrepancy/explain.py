@@ -33,6 +33,7 @@ from tractexp.discrepancy.ranking import (
 )
 from tractexp.inference.chance import by_draws
 from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit
 from tractexp.inference.model_error import describe_stall, in_percent
 from tractexp.inference.recorder_window import RecorderWindow
 from tractexp.noise import Noise
@@ -77,23 +78,30 @@ def find_nearest_sets(
     """
     assert evidence.last is not None
     assert evidence.base.tests is not None
-    context, rows = evidence.base.tests.context, evidence.rows[:MOST_NEAR]
+    context = evidence.base.tests.context
+    rows = evidence.rows[:MOST_NEAR]
     is_base = evidence.there is not None and not find_nearest(evidence, context.criteria).fit.names
     if verdict.word != UNEXPLAINED or not rows or not rows[0].fit.names or is_base:
         return None
     fits = [evidence.base.fit, *(row.fit for row in rows)]
     before, *after = (curves(context, fit.unit, evidence.last.noise, fit.names) for fit in fits)
-    there = None
-    if validate:
-        other, units, noise = carry_fits(context, validate, fits[:2])
-        pair = curves(other, units[0], noise), curves(other, units[1], noise, fits[1].names)
-        # else no steady state there
-        there = pair if np.isfinite([one.deviance for one in pair]).all() else None
+    there = _carry_curves(context, validate, fits[:2]) if validate else None
     others = [
         (row.fit.names, measure_closed_share(before, one))
         for row, one in zip(rows[1:], after[1:], strict=True)
     ]
     return Nearest(rows[0], others, (before, after[0]), there)
+
+
+def _carry_curves(
+    context: Context, validate: Sequence[Event], fits: Sequence[Refit]
+) -> tuple[Curves, Curves] | None:
+    """What two fits leave of held-out events, the base model's first; None where one has no steady
+    state there.
+    """
+    other, units, noise = carry_fits(context, validate, fits)
+    pair = curves(other, units[0], noise), curves(other, units[1], noise, fits[1].names)
+    return pair if np.isfinite([one.deviance for one in pair]).all() else None
 
 
 def choose_next_event(verdict: Verdict, evidence: Evidence, context: Context) -> NextEvent | None:
@@ -136,14 +144,7 @@ def explain(
     held out.
     """
     clauses = [_explain_word(verdict, evidence, nearest, context)]
-    gaps = [row.gap for row in verdict.kept if row.gap is not None]
-    is_open = verdict.word == CANDIDATE and bool(verdict.kept[0].open_sizes)
-    if gaps and all(gap.is_mild for gap in gaps) and not is_open:
-        clauses.append("the held-out events are too mild to show it")
-    elif verdict.word == NAMED and chose_by_all(verdict.kept[0], evidence):
-        clauses.append(CONFIRMED_IN_TURN)
-    elif verdict.word == CANDIDATE:
-        clauses.append(_explain_doubt(verdict.kept[0], evidence, all_fitted=all_fitted))
+    clauses += _explain_confirmation(verdict, evidence, all_fitted=all_fitted)
     if any(row.is_fitted_to_all for row in verdict.kept):
         clauses.append(
             "what the fitted events leave open of it was fitted to the held-out ones, too"
@@ -156,6 +157,19 @@ def explain(
     return "; ".join(clauses)
 
 
+def _explain_confirmation(verdict: Verdict, evidence: Evidence, *, all_fitted: bool) -> list[str]:
+    """What the held-out events say of what is kept, one clause; [] where that is nothing more."""
+    mild = [row.gap.is_mild for row in verdict.kept if row.gap is not None]
+    is_open = verdict.word == CANDIDATE and bool(verdict.kept[0].open_sizes)
+    if mild and all(mild) and not is_open:
+        return ["the held-out events are too mild to show it"]
+    if verdict.word == NAMED and chose_by_all(verdict.kept[0], evidence):
+        return [CONFIRMED_IN_TURN]
+    if verdict.word == CANDIDATE:
+        return [_explain_doubt(verdict.kept[0], evidence, all_fitted=all_fitted)]
+    return []
+
+
 def _doubt_window(window: RecorderWindow) -> str:
     """What is to be asked of a window that no record names, as the end of a sentence."""
     return "" if window.said else ", though no record says so: ask whether it does"
@@ -166,18 +180,23 @@ def _explain_word(
 ) -> str:
     """Why the verdict is what it is, in a sentence."""
     sets = verdict.sets
+    if evidence.there is not None and sets:
+        return describe_prediction(verdict, evidence, context)
     if evidence.there is not None:
-        return (
-            describe_prediction(verdict, evidence, context)
-            if sets
-            else explain_distance(evidence, context)
-        )
+        return explain_distance(evidence, context)
     if evidence.is_predicted:
         return describe_deviance(verdict, evidence, context)
     if verdict.word in (NAMED, CANDIDATE):
         return _describe_name(sets[0], evidence, context)
     if verdict.word == TIED:
         return _describe_tie([label_effects(names, context) for names in sets])
+    return _explain_none(verdict, evidence, nearest, context)
+
+
+def _explain_none(
+    verdict: Verdict, evidence: Evidence, nearest: Nearest | None, context: Context
+) -> str:
+    """Why nothing is named where sets go by their likelihood, in a sentence."""
     adequate = find_adequate(evidence, context.criteria)
     if verdict.word == UNEXPLAINED and not adequate:
         return explain_rest(evidence, nearest, context)
@@ -243,7 +262,8 @@ def _describe_name(names: Sequence[str], evidence: Evidence, context: Context) -
             if fitted
             else sentence
         )
-    tested, comma = len(context.catalogue.candidates), "," if ", " in labels[0] else ""
+    tested = len(context.catalogue.candidates)
+    comma = "," if ", " in labels[0] else ""
     rest = (
         f"none of the {tested - 1} other effects tested does"
         if tested > 1
@@ -285,7 +305,8 @@ def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) 
     """
     chosen = verdict.kept
     first = chosen[0]
-    size, most = len(first.fit.names), first.held_out_prediction.excess
+    size = len(first.fit.names)
+    most = first.held_out_prediction.excess
     rest = [
         row
         for row in rank_sets(evidence, context.criteria)
@@ -341,7 +362,8 @@ def explain_rest(evidence: Evidence, nearest: Nearest | None, context: Context) 
             f"{_deny_all(context)} helps more than chance does: what the base model leaves"
             f" {chance}; {loudest}"
         )
-    names, faults = label_effects(best.fit.names, context), label_effects(evidence.faults, context)
+    names = label_effects(best.fit.names, context)
+    faults = label_effects(evidence.faults, context)
     sentence = (
         f"{join_words(names)} beside {join_words(faults)}"
         if names and faults
@@ -359,7 +381,8 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
     """How far the set that predicts the held-out events best is from dividing what the base model
     leaves of them.
     """
-    criteria, bare = context.criteria, _size(evidence.base)
+    criteria = context.criteria
+    bare = _size(evidence.base)
     near = find_nearest(evidence, criteria)
     if not near.fit.names:
         better = "predicts the held-out events better than the base model"

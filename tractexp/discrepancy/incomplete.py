@@ -53,7 +53,8 @@ def _predict_by_deviance(
     None beside faults of the measurement, which what is missing looks like.
     """
     noise, context, bare = explained.last.noise, explained.base.context, evidence.base.fit
-    criteria, at = context.criteria, context.coordinates
+    criteria = context.criteria
+    at = context.coordinates
     known = {row.fit.names: row for row in evidence.rows}
     rejected = {names for names, row in known.items() if criteria.rejects(row.behind)}
     fits = {
@@ -76,10 +77,12 @@ def _predict_by_deviance(
     )
     rows = []
     for fit in fitted:
-        gap, is_rejected = gaps[fit.names], fit.names in rejected
+        gap = gaps[fit.names]
+        is_rejected = fit.names in rejected
         one = PredictedDeviance(gap.left, gap.after, is_rejected, criteria.shown)
         behind = known[fit.names].behind if fit.names in known else 0.0
-        lowered, family = bare.deviance - fit.deviance, context.catalogue.textbook(fit.names)
+        lowered = bare.deviance - fit.deviance
+        family = context.catalogue.textbook(fit.names)
         rows.append(SetEvidence(fit, fit.names, family, lowered, behind, gap=gap, prediction=one))
     kept = find_predicting(replace(evidence, base=base, rows=tuple(rows)), criteria)
     if not kept:
@@ -120,9 +123,10 @@ def _predict_by_error(explained: Explanations, events: Sequence[Event], seed: in
         tests = least_squares_tests(quiet, row.fit, noise, seed)
         return replace(row, tests=tests, p_left=tests.p_left)
 
-    base, tested = test(table.base), [test(row) for row in leading]
+    base = test(table.base)
+    tested = [test(row) for row in leading]
     rest = [row for row in rank_sets(table, criteria) if row not in leading]
-    others = [row for row in table.rows if row not in leading and row not in rest]
+    others = [row for row in table.rows if row not in (*leading, *rest)]
     first = tested[0] if leading[0].fit.names else base
     rows = (*(row for row in tested if row.fit.names), *rest)
     return replace(table, base=base, rows=rows, others=tuple(others), last=first.tests)

@@ -176,7 +176,8 @@ class Findings:
     @functools.cached_property
     def validate(self) -> GapTest | None:
         """The gap on the held-out events; None without any, or where nothing is named."""
-        chosen, there = self.verdict.chosen, self.evidence.there
+        chosen = self.verdict.chosen
+        there = self.evidence.there
         if chosen is None or there is None:
             return chosen and chosen.gap
         predictions = [row.prediction for row in (self.evidence.base, chosen)]
@@ -244,11 +245,7 @@ class Findings:
             return self.grader.grade((), self.window) if self.verdict.complete else self.base_grade
         if not names:
             return self.base_grade
-        own = {
-            p.name
-            for p in self.catalogue.parameters([name for name in self.names if name not in names])
-        }
-        held = {name: value for name, value in self.undetermined_values.items() if name not in own}
+        held = self._select_held(names)
         at = self.context.coordinates
         found = (
             {name: at.value(name, self.extended_fit.unit) for name in at.names}
@@ -257,12 +254,19 @@ class Findings:
         )
         return self.grader.grade(names, self.window, held, found, fit_all=self.fitted_to_both)
 
+    def _select_held(self, names: Sequence[str]) -> dict[str, float]:
+        """The values that the extended model holds, but those of effects other than `names`."""
+        others = self.catalogue.parameters([name for name in self.names if name not in names])
+        own = {p.name for p in others}
+        return {name: value for name, value in self.undetermined_values.items() if name not in own}
+
     def misfits(self, graded: GradedModel) -> tuple[Misfit, Misfit | None]:
         """How far off a graded model is on the events that were to be fitted, and on those that
         were to be held out.
         """
         split = len(self.grader.train)
-        fitted, held_out = graded.fits[:split], graded.fits[split:]
+        fitted = graded.fits[:split]
+        held_out = graded.fits[split:]
         return Misfit.from_fits(fitted), Misfit.from_fits(held_out) if held_out else None
 
     def select_misfit(self, graded: GradedModel) -> Misfit:
@@ -283,7 +287,8 @@ class Findings:
     @functools.cached_property
     def overlays(self) -> list[Overlay]:
         """Measured, before and after of every event, the fitted ones first."""
-        near, extended = self.nearest, bool(self.names)
+        near = self.nearest
+        extended = bool(self.names)
         return [
             *on_fitted(self.context, self.train, near, self.places, extended=extended),
             *on_held_out(self.context, self.withheld, self.validate, self.bare, near),
@@ -360,7 +365,8 @@ class Findings:
 
     def _find_remainder(self, overlays: Sequence[Overlay]) -> list[Remainder]:
         """The shapes in what is left of the fitted events, else of those held out."""
-        noise, level = self.last.noise, self.context.criteria.false_alarms
+        noise = self.last.noise
+        level = self.context.criteria.false_alarms
         fitted, beyond = ([o for o in overlays if o.held_out == there] for there in (False, True))
         return find_remainder(fitted, noise, level) or find_remainder(
             beyond, replace(noise, input_modes=None), level
@@ -426,7 +432,8 @@ def investigate(
 
     def findings_of(train: Sequence[Event], validate: Sequence[Event]) -> Findings:
         missing = catalogue(model, train, only)
-        some, others = len(missing.candidates), len(missing.untestable)
+        some = len(missing.candidates)
+        others = len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
 
         given = (
@@ -504,7 +511,8 @@ def _complete_row(findings: Findings, validate: Sequence[Event]) -> Findings:
     """The findings decided anew with the grade of the model that has the one set kept, and with
     what each event says of it that is left out, where all took part in choosing it.
     """
-    evidence, chosen = findings.evidence, findings.verdict.kept[0]
+    evidence = findings.evidence
+    chosen = findings.verdict.kept[0]
     grade = str(findings.final_grade.adequacy.grade)
     row = replace(chosen, grade=grade, open_sizes=findings.open_sizes)
     if chose_by_all(chosen, evidence):

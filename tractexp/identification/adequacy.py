@@ -102,7 +102,8 @@ def surprise(
     drawn = likelihood.noise.draw(rng, FIT_DRAWS, np.diff(observed.drive.first).tolist())
     drawn *= likelihood.valid
     drawn /= _level(likelihood, observed, rng)[:, None, None]
-    basis, split = J.basis(), of_each_event(J, steady)
+    basis = J.basis()
+    split = of_each_event(J, steady)
 
     def compute_statistics(rest: np.ndarray) -> dict[str, np.ndarray]:
         by_test = goodness_of_fit.statistics(
@@ -163,13 +164,15 @@ class Excess:
         """Of the fit at coordinates (D,), where `least` is the least sum of squares."""
         likelihood = squares.with_initial_power
         rows, plain = likelihood.jacobian(unit)
-        inside, of_records = off_walls(unit), np.array([rows @ rows / max(least, 1e-300)])
+        inside = off_walls(unit)
+        of_records = np.array([rows @ rows / max(least, 1e-300)])
         free = plain.only(inside & (np.arange(len(inside)) < plain.k))
         return cls(of_records, likelihood, J, plain, plain.only(inside), free.basis())
 
     def of_draws(self, white: np.ndarray, drawn: np.ndarray) -> np.ndarray:
         """Of draws (b, C, N), whitened (b, R): (b,)."""
-        raw, k = self.likelihood.whiten(drawn), self.plain.k
+        raw = self.likelihood.whiten(drawn)
+        k = self.plain.k
         likely = raw - self.inside.times(self.J.fit(white))
         shifted = raw + self.plain.times(np.pad(_means(self.likelihood, drawn), ((0, 0), (k, 0))))
         rest = self.squares.project_out(shifted)
@@ -231,30 +234,40 @@ def grade_errors(
 
     `active_bounds` say which bounds hold a parameter.
     """
-    errors = [fitted, *([held_out] if held_out else [])]
+    errors = [error for error in (fitted, held_out) if error]
     noise = surprise.adequate
     sure = max(e.interval[0] if noise else e.value for e in errors)
     held = "".join(f"; a bound holds {bound}" for bound in active_bounds)
     if sure >= WRONG:
-        size = f"it leaves {fitted}" + (
-            f", and of the held-out dips {held_out}" if held_out else ""
-        )
-        if stalls := [name for e in errors for name in e.stalls]:
-            size = describe_stall(stalls)
+        size = _describe_misfit(fitted, held_out)
         return Adequacy(
             Grade.WRONG_MODEL, f"this model does not describe this load: {size}{held}", surprise.p
         )
-    size = f"within {fitted}" + (f", the held-out dips within {held_out}" if held_out else "")
-    said = f"the model describes this load {size}"
+    said = f"the model describes this load within {fitted}"
+    if held_out:
+        said += f", the held-out dips within {held_out}"
     if noise:
         return Adequacy(Grade.ADEQUATE, f"{said}: noise alone leaves as much{held}", surprise.p)
+    return Adequacy(Grade.EFFECT_MISSING, f"{said}; {_describe_rest(surprise)}{held}", surprise.p)
+
+
+def _describe_misfit(fitted: ModelError, held_out: ModelError | None) -> str:
+    """What a model leaves that does not describe the load, and where it stalls."""
+    if stalls := [*fitted.stalls, *(held_out.stalls if held_out else ())]:
+        return describe_stall(stalls)
+    beside = f", and of the held-out dips {held_out}" if held_out else ""
+    return f"it leaves {fitted}{beside}"
+
+
+def _describe_rest(surprise: Surprise) -> str:
+    """What is said of a fit that leaves more than noise, as far as that is known."""
     if surprise.p is None:
-        why = (
+        return (
             "too few samples before and after the dips are quiet to tell whether an effect is"
             " missing"
         )
-    else:
-        why = "an effect is missing"
-        if surprise.ratio is not None and surprise.loudest != APART:
-            why += f", {surprise.where} is {surprise.ratio:.2g} times as loud as the noise"
-    return Adequacy(Grade.EFFECT_MISSING, f"{said}; {why}{held}", surprise.p)
+    if surprise.ratio is None or surprise.loudest == APART:
+        return "an effect is missing"
+    return (
+        f"an effect is missing, {surprise.where} is {surprise.ratio:.2g} times as loud as the noise"
+    )

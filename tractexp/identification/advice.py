@@ -86,15 +86,11 @@ def better_domain(problem: Problem) -> list[str]:
 
 def _deeper(uncertainty: Uncertainty) -> list[str]:
     """Which further dip would identify what is open but not structurally so."""
-    identifiable = uncertainty.information.identifiable
-    poor = [
-        name
-        for name, fine in zip(uncertainty.names, identifiable, strict=True)
-        if fine and uncertainty.verdicts[name].word in (WEAK, UNIDENTIFIED)
-    ]
-    problem = uncertainty.likelihood.problem
-    if not poor or not identifiable.all():
+    verdicts = uncertainty.verdicts
+    poor = [n for n in uncertainty.names if verdicts[n].word in (WEAK, UNIDENTIFIED)]
+    if not poor or not uncertainty.information.identifiable.all():
         return []
+    problem = uncertainty.likelihood.problem
     named = ", ".join(poor)
     without_figures = (
         f"for {named}: record a dip of another depth and fit it together, or fix what stays open by"
@@ -166,7 +162,8 @@ def _goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
     narrow enough already, it is the profile that does not, and half of what curvature says is asked
     for.
     """
-    low, high = uncertainty.lower[j], uncertainty.upper[j]
+    low = uncertainty.lower[j]
+    high = uncertainty.upper[j]
     (a, b), enough = (
         uncertainty.intervals[j],
         IDENTIFIED_SHARE * size(uncertainty.values[j], low, high),

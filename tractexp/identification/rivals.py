@@ -71,7 +71,8 @@ def _find_moved_parameters(
     that is wide.
     """
     for j, (name, (low, high)) in enumerate(zip(own.names, own.intervals.tolist(), strict=True)):
-        value, verdict = float(own.values[j]), own.verdicts[name]
+        value = float(own.values[j])
+        verdict = own.verdicts[name]
         there = [
             (rival.values[name], rival.name) for rival in beside.rivals if name in rival.values
         ]
@@ -83,35 +84,20 @@ def _find_moved_parameters(
 
 
 def _structures(model: Model) -> Iterator[tuple[str, Model]]:
-    """Names of rivals and the models with them."""
+    """Names of rivals and the models with them: another static load, or one effect more."""
     registered = discover()
+    beside = model.integration, model.domain, model.window
     for name in sorted(registered.get("model/static", {})):
         cls = get("model/static", name)
         if cls.rival and type(model.static).rival and name != model.static.name:
-            other = compose(
-                model.motor, cls(), model.effects, model.integration, model.domain, model.window
-            )
+            other = compose(model.motor, cls(), model.effects, *beside)
             if _composes(other):
                 yield name, other
-    for name in sorted(registered.get("effect", {})):
+    there = {effect.name for effect in model.effects}
+    for name in sorted(registered.get("effect", {}).keys() - there):
         cls = get("effect", name)
-        if (
-            cls.rival
-            and name not in {e.name for e in model.effects}
-            and model.acceptance(cls()).refusal is None
-        ):
-            effects = [*model.effects, cls()]
-            yield (
-                name,
-                compose(
-                    model.motor,
-                    model.static,
-                    effects,
-                    model.integration,
-                    model.domain,
-                    model.window,
-                ),
-            )
+        if cls.rival and model.acceptance(cls()).refusal is None:
+            yield name, compose(model.motor, model.static, [*model.effects, cls()], *beside)
 
 
 def _composes(model: Model) -> bool:
@@ -157,7 +143,8 @@ def _starts(uncertainty: Uncertainty, other: Problem) -> np.ndarray:
     """Points (n, free) of a rival's box: the shared parameters as estimated, its own as usual and
     all over.
     """
-    names, parameters = other.space.names, {p.name: p for p in other.parameters}
+    names = other.space.names
+    parameters = {p.name: p for p in other.parameters}
     shared = dict(zip(uncertainty.names, uncertainty.values, strict=True))
     alone = [k for k, n in enumerate(names) if n not in shared]
     usual = np.array([shared.get(n, parameters[n.partition("[")[0]].default) for n in names])

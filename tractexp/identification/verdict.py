@@ -80,36 +80,43 @@ def judge(
     """A verdict for each parameter: `half` (d,) is half of its 95 % interval, `factors` (d,) that
     over its error.
     """
-    width = upper - lower
-    unseen, identifiable = information.unseen, information.identifiable
-    verdicts = {}
-    for j, name in enumerate(information.names):
-        value = information.values[j]
-        low, high = value - half[j], value + half[j]
-        at = [f"{b:g}" for b in (lower[j], upper[j]) if abs(value - b) < BOUND_DISTANCE * width[j]]
-        if not identifiable[j]:
-            verdicts[name] = ParameterVerdict(UNIDENTIFIED, _structural(information, unseen, j))
-        elif low <= lower[j] and high >= upper[j]:
-            span = f"its 95 % interval holds its whole range {lower[j]:g} .. {upper[j]:g}"
-            verdicts[name] = ParameterVerdict(
-                UNIDENTIFIED, "; ".join([span, *_trade(information, j, factors[j])])
-            )
-        elif half[j] > IDENTIFIED_SHARE * size(value, lower[j], upper[j]):
-            why = _trade(information, j, factors[j]) or ["the record hardly changes with it"]
-            edge = [f"the estimate is at its bound {at[0]}"] if at else []
-            verdicts[name] = ParameterVerdict(WEAK, "; ".join([*why, *edge]))
-        elif at:
-            verdicts[name] = ParameterVerdict(
-                BOUND, f"{at[0]}; the record asks for a value beyond it: widen model.bounds.{name}"
-            )
-        else:
-            tight = (
-                ""
-                if lower[j] <= low and high <= upper[j]
-                else "the interval reaches past its bounds"
-            )
-            verdicts[name] = ParameterVerdict(IDENTIFIED, tight)
-    return verdicts
+    return {
+        name: _judge_parameter(information, j, (lower[j], upper[j]), half[j], factors[j])
+        for j, name in enumerate(information.names)
+    }
+
+
+def _judge_parameter(
+    information: Information, j: int, bounds: tuple[float, float], half: float, factor: float
+) -> ParameterVerdict:
+    """The verdict of the j-th parameter, of which `half` is half of the 95 % interval."""
+    (lower, upper), value = bounds, information.values[j]
+    low = value - half
+    high = value + half
+    at = _list_near(value, lower, upper)[:1]
+    if not information.identifiable[j]:
+        return ParameterVerdict(UNIDENTIFIED, _structural(information, information.unseen, j))
+    if low <= lower and high >= upper:
+        span = f"its 95 % interval holds its whole range {lower:g} .. {upper:g}"
+        return ParameterVerdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factor)]))
+    if half > IDENTIFIED_SHARE * size(value, lower, upper):
+        why = _trade(information, j, factor) or ["the record hardly changes with it"]
+        edge = [f"the estimate is at its bound {bound}" for bound in at]
+        return ParameterVerdict(WEAK, "; ".join([*why, *edge]))
+    if at:
+        name = information.names[j]
+        return ParameterVerdict(
+            BOUND, f"{at[0]}; the record asks for a value beyond it: widen model.bounds.{name}"
+        )
+    if lower <= low and high <= upper:
+        return ParameterVerdict(IDENTIFIED, "")
+    return ParameterVerdict(IDENTIFIED, "the interval reaches past its bounds")
+
+
+def _list_near(value: float, lower: float, upper: float) -> list[str]:
+    """The bounds that a value is at, as texts."""
+    near = BOUND_DISTANCE * (upper - lower)
+    return [f"{bound:g}" for bound in (lower, upper) if abs(value - bound) < near]
 
 
 def _trade(information: Information, j: int, factor: float) -> list[str]:
@@ -125,8 +132,10 @@ def _trade(information: Information, j: int, factor: float) -> list[str]:
     named = " and ".join(
         f"{information.names[k]} (correlation {_number(correlation[k])})" for k in partners
     )
-    sentence, k = [f"trades against {named}"], partners[0]
-    covariance, values = information.covariance, information.values
+    sentence = [f"trades against {named}"]
+    k = partners[0]
+    covariance = information.covariance
+    values = information.values
     if values[j] > 0 and values[k] > 0:
         exponents = np.zeros(len(values))
         exponents[j], exponents[k] = (
@@ -177,7 +186,8 @@ def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
 
 def combination(names: Sequence[str], exponents: np.ndarray) -> str:
     """A product of powers as text: 'X_prime^2/M'."""
-    above, below = [], []
+    above = []
+    below = []
     for name, exponent in zip(names, exponents, strict=True):
         size = abs(exponent)
         if size < 0.005:

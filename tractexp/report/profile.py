@@ -41,7 +41,8 @@ def report(scan: Profiles, grade: str = "") -> Report:
 
     `grade` is the sentence that grades the identification.
     """
-    uncertainty, verdicts = scan.uncertainty, scan.verdicts
+    uncertainty = scan.uncertainty
+    verdicts = scan.verdicts
     names = title_of(e.record for e in uncertainty.likelihood.problem.events)
     page = Report(
         f"Profile likelihood: {names}",
@@ -103,9 +104,8 @@ def _row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[str]:
 
 def meaning(scan: Profiles, profile: LikelihoodProfile) -> str:
     """What a profile says beside the interval of the curvature, in a sentence."""
-    names = ("downwards", "upwards")
-    open_sides = [side for end, side in zip(profile.ends, names, strict=True) if end is End.BOUND]
-    short = [side for end, side in zip(profile.ends, names, strict=True) if end is End.POINTS]
+    open_sides = _name_sides(profile, End.BOUND)
+    short = _name_sides(profile, End.POINTS)
     low, high = profile.interval
     said = []
     if len(open_sides) == 2:
@@ -124,6 +124,12 @@ def meaning(scan: Profiles, profile: LikelihoodProfile) -> str:
     return as_sentence("; ".join(said))
 
 
+def _name_sides(profile: LikelihoodProfile, how: End) -> list[str]:
+    """The sides on which a profile ends so."""
+    sides = zip(profile.ends, ("downwards", "upwards"), strict=True)
+    return [side for end, side in sides if end is how]
+
+
 def _compare_half_widths(scan: Profiles, profile: LikelihoodProfile) -> str:
     """Both sides closed, one minimum: whether ± half is enough."""
     (low, high), (value, half) = profile.interval, _curvature(scan, profile.name)
@@ -137,7 +143,8 @@ def _compare_half_widths(scan: Profiles, profile: LikelihoodProfile) -> str:
         return "narrower than by curvature"
     if off[0] < -LARGEST_END_DIFFERENCE and off[1] > LARGEST_END_DIFFERENCE:
         return "wider than by curvature"
-    up, down = high - value, value - low
+    up = high - value
+    down = value - low
     reach, side = (up / down, "up") if up > down else (down / up, "down")
     return f"lopsided: {reach:.1f} times as far {side}"
 

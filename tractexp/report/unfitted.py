@@ -8,6 +8,7 @@ a motor has settled, and a load that changes by itself meanwhile is in them.
 Source: IEEE Task Force on Load Representation, 1993 (exponents from staged steps of the voltage).
 """
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from math import log
 from typing import Any
@@ -34,9 +35,10 @@ def sentences(files: Sequence[Mapping[str, Any]]) -> list[str]:
     """For files of `look.json`; [] where something is worth fitting, or no load was recognised."""
     feeders = [feeder for entry in files for feeder in entry["feeders"]]
     loads = [feeder for feeder in feeders if feeder["loaded"]]
-    if not loads or any(event["worth"] for feeder in feeders for event in feeder["events"]):
+    events = itertools.chain.from_iterable(feeder["events"] for feeder in feeders)
+    if not loads or any(event["worth"] for event in events):
         return []
-    return [*(said for feeder in loads for said in _exponents(feeder)), DIPS, AMBIENT]
+    return [*itertools.chain.from_iterable(map(_exponents, loads)), DIPS, AMBIENT]
 
 
 def _exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
