@@ -77,15 +77,7 @@ def _run_with_refusals(arguments: list[str]) -> int:
     except (UserError, OSError, MemoryError) as error:
         if traceback:
             raise
-        if isinstance(error, MemoryError):
-            return _print_refusal(
-                "this takes more memory than there is; ask for less, such as a smaller population"
-            )
-        if isinstance(error, OSError):
-            return _print_refusal(
-                f"{error.filename or 'a file'} cannot be used: {error.strerror or error}"
-            )
-        return _print_refusal(str(error))
+        return _print_refusal(_describe_refusal(error))
     except Exception as error:
         if traceback:
             raise
@@ -102,6 +94,15 @@ def _run_with_refusals(arguments: list[str]) -> int:
         )
 
 
+def _describe_refusal(error: UserError | OSError | MemoryError) -> str:
+    """The sentence of an error that the user or the machine is the cause of."""
+    if isinstance(error, MemoryError):
+        return "this takes more memory than there is; ask for less, such as a smaller population"
+    if isinstance(error, OSError):
+        return f"{error.filename or 'a file'} cannot be used: {error.strerror or error}"
+    return str(error)
+
+
 def _print_refusal(sentence: str, code: int = 2) -> int:
     """Print why a command was refused; its exit code."""
     print(f"tractexp: {one_line(sentence)}", file=sys.stderr)
@@ -110,12 +111,10 @@ def _print_refusal(sentence: str, code: int = 2) -> int:
 
 def _dispatch_command(arguments: list[str]) -> int:
     """Run a command beside the tasks, or a task; the exit code."""
-    for argument in arguments:
-        key, equals, _ = argument.partition("://")[0].rpartition("=")
-        credentials.check(key if equals else "what is given", argument)
-    if arguments[:1] and (place := COMMANDS.get(arguments[0])):
-        return _command(place, arguments[1:])
-    if arguments[:1] and _is_file(arguments[0]):
+    _refuse_credentials(arguments)
+    if arguments and arguments[0] in COMMANDS:
+        return _command(COMMANDS[arguments[0]], arguments[1:])
+    if arguments and _is_file(arguments[0]):
         return _command(COMMANDS["look"], arguments)
     arguments = ask_for(arguments)
     if arguments[:1] == ["again"]:
@@ -133,6 +132,13 @@ def _dispatch_command(arguments: list[str]) -> int:
         print(usage())
         return 0
     return _run(arguments)
+
+
+def _refuse_credentials(arguments: list[str]) -> None:
+    """Raise `UserError` for an argument with a user's name or password in it."""
+    for argument in arguments:
+        key, equals, _ = argument.partition("://")[0].rpartition("=")
+        credentials.check(key if equals else "what is given", argument)
 
 
 def _command(place: str, arguments: list[str]) -> int:

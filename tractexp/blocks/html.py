@@ -7,7 +7,7 @@ figures are inline SVG, equations are typeset into SVG; nothing is loaded from e
 import functools
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
@@ -18,15 +18,13 @@ from tractexp.storage import files
 from tractexp.text import quoting
 
 LONGEST_UNBROKEN_WORD = 14  # letters of a word that never needs a second line
-# of equations: a letter's outline in one of them, and where it is drawn
-OUTLINE = re.compile(r'<path id="f\d+-(Cm\w+-[0-9a-f]+)"( d="[^"]*"[^>]*/>)')
-DRAWN = re.compile(r'href="#f\d+-(Cm\w+-[0-9a-f]+)"')
 
 
 def page(report: Report) -> str:
     """A whole page that needs nothing else."""
     figures = itertools.count(1)
-    title, lead = quoting.html(report.title), quoting.html(report.lead)
+    title = quoting.html(report.title)
+    lead = quoting.html(report.lead)
     head = (
         '<meta charset="utf-8"><meta name="viewport"'
         f' content="width=device-width"><title>{title}</title>'
@@ -36,28 +34,11 @@ def page(report: Report) -> str:
     style = files.read_packaged_text("blocks/page.css")
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
     draws = f"<script>{script()}</script>" if any(map(_draws, report.blocks)) else ""
-    elements = "\n".join(_element(block, figures) for block in report.blocks)
-    body = "\n".join([top, _share_outlines(elements), draws])
+    body = "\n".join([top, *(_element(block, figures) for block in report.blocks), draws])
     return (
         "<!DOCTYPE html>\n<html"
         f' lang="en"><head>{head}<style>{style}</style></head>\n<body>\n{body}\n</body></html>\n'
     )
-
-
-def _share_outlines(elements: str) -> str:
-    """Elements whose equations hold the outline of each letter once: a page of forty is half as
-    long.
-    """
-    known = set[str]()
-
-    def keep_first(outline: re.Match[str]) -> str:
-        name, rest = outline.groups()
-        if name in known:
-            return ""
-        known.add(name)
-        return f'<path id="{name}"{rest}'
-
-    return DRAWN.sub(r'href="#\1"', OUTLINE.sub(keep_first, elements))
 
 
 def frame(report: Report) -> str:
@@ -160,11 +141,7 @@ def _table(table: Table) -> str:
     """A table; the first column is to the left, the others are figures but for those that hold
     words.
     """
-    long = [
-        any(len(row[i]) > LONGEST_UNBROKEN_WORD for row in table.cells)
-        for i in range(len(table.columns))
-    ]
-    kinds = {i: "words" if long[i] else "short" for i in table.words}
+    kinds = {i: _describe_words(row[i] for row in table.cells) for i in table.words}
     marks = [
         f'<{{0}} class="{kinds[i]}">' if i in kinds else "<{0}>" for i in range(len(table.columns))
     ]
@@ -182,6 +159,11 @@ def _table(table: Table) -> str:
     grid = f'<div class="wide"><table>{above}{head}<tbody>\n{body}\n</tbody></table></div>'
     # the caption stays where a table scrolls
     return f'<figure class="table">{grid}{_below(table.caption)}</figure>'
+
+
+def _describe_words(cells: Iterable[str]) -> str:
+    """The class of a column of words: "words" of long ones, which may break, or "short"."""
+    return "words" if any(len(cell) > LONGEST_UNBROKEN_WORD for cell in cells) else "short"
 
 
 def _inline(drawing: str, prefix: str, label: str) -> str:

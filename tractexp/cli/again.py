@@ -4,7 +4,7 @@ settings on top.
 
 import argparse
 import os
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import fields
 from pathlib import Path
 
@@ -67,25 +67,38 @@ def merge_settings(arguments: Iterable[str], settings: Iterable[str], folder: Pa
     not taken over.
     """
     settings = list(settings)
-    keys = {_key(text) for text in settings}
-    groups = {key for key in keys if key == group_of(key)}
-    stay = [
-        text for text in arguments if _key(text) not in keys and group_of(_key(text)) not in groups
-    ]
+    keys = set(map(_key, settings))
+    stay = _select_kept(arguments, keys)
     for text in stay:
-        if why := refusal(text):
-            key = text.partition("=")[0]
-            raise UserError(
-                f"{folder}: {key:.80} is not taken over from the folder of a run ({why}); where it"
-                " is meant, say so:"
-                f" {quoting.shell('tractexp', 'again', str(folder), f'{_key(text):.80}=VALUE')}"
-            )
-    names = [text.partition("=")[2] for text in (*stay, *settings) if _key(text) == "task"]
-    task = get("task", names[-1] if names else "identify")
+        _check_taken_over(text, folder)
+    tasks = [text.partition("=")[2] for text in (*stay, *settings) if _key(text) == "task"]
+    task = get("task", ["identify", *tasks][-1])
     stay = [text for text in stay if reads(task, _key(text).replace("/", "."))]
-    if "parameters" in {field.name for field in fields(task)} and "task.parameters" not in keys:
+    own = {field.name for field in fields(task)}
+    if "parameters" in own and "task.parameters" not in keys:
         settings.append(f"task.parameters={folder / RESULT}")
     return [*stay, *settings]
+
+
+def _select_kept(arguments: Iterable[str], keys: Collection[str]) -> list[str]:
+    """Earlier settings whose key is not among the newer ones', and whose group is not chosen
+    anew.
+    """
+    groups = {key for key in keys if key == group_of(key)}
+    return [
+        text for text in arguments if _key(text) not in keys and group_of(_key(text)) not in groups
+    ]
+
+
+def _check_taken_over(text: str, folder: Path) -> None:
+    """Raise `UserError` for a setting of a run that says more than what is computed."""
+    if why := refusal(text):
+        key = text.partition("=")[0]
+        raise UserError(
+            f"{folder}: {key:.80} is not taken over from the folder of a run ({why}); where it"
+            " is meant, say so:"
+            f" {quoting.shell('tractexp', 'again', str(folder), f'{_key(text):.80}=VALUE')}"
+        )
 
 
 def _key(text: str) -> str:

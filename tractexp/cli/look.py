@@ -39,10 +39,14 @@ def look(arguments: list[str]) -> int:
         "Settings of the reader are given as KEY=VALUE, such as 'voltages=[4,5,6]' or encoding=gbk."
     )
     chosen = parser.parse_args(arguments)
-    settings = [
-        s for each in chosen.file if not files.exists(each) and (s := SETTING.fullmatch(each))
-    ]
-    paths = [each for each in chosen.file if files.exists(each) or not SETTING.fullmatch(each)]
+    settings = {}
+    paths = []
+    for each in chosen.file:
+        setting = None if files.exists(each) else SETTING.fullmatch(each)
+        if setting:
+            settings[setting[1]] = _value(setting[2])
+        else:
+            paths.append(each)
     if not paths:
         raise UserError(
             "tractexp look: give a file beside the settings, e.g. tractexp look station.cfg"
@@ -51,7 +55,7 @@ def look(arguments: list[str]) -> int:
     from tractexp.api.task import call, print_written
     from tractexp.blocks.terminal import show
 
-    view = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
+    view = call(looked, *paths, **settings)
     show(
         view.build_full_report() if chosen.all else view.screen().text(EVERYTHING),
         console(),

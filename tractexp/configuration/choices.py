@@ -244,16 +244,19 @@ def _class(name: str, module: str, visited: set[str]) -> tuple[ast.ClassDef | No
         if isinstance(node, ast.ClassDef) and node.name == name:
             return node, module
         if isinstance(node, ast.ImportFrom):
-            package = (
-                module.split(".")[: -node.level + bool(_folders(module)) or None]
-                if node.level
-                else []
-            )
-            there = ".".join([*package, *([node.module] if node.module else [])])
+            there = _imported_module(node, module)
             for alias in node.names:
                 if (alias.asname or alias.name) == name and there not in visited:
                     return _class(alias.name, there, visited | {there})
     return None, module
+
+
+def _imported_module(node: ast.ImportFrom, module: str) -> str:
+    """The whole name of what a module imports from, relative or not."""
+    if not node.level:
+        return node.module or ""
+    package = module.split(".")[: -node.level + bool(_folders(module)) or None]
+    return ".".join([*package, *([node.module] if node.module else [])])
 
 
 def _last(node: ast.expr) -> str:

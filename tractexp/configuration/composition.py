@@ -45,10 +45,16 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
             composed |= read_choice(
                 place.removeprefix("/").removeprefix("schema/") or group, chosen
             )
+    return _merge(composed, content)
+
+
+def _merge(composed: Mapping[str, Any], content: Mapping[str, Any]) -> dict[str, Any]:
+    """What a choice says over what its parts do; the settings of one part are merged by key."""
+    merged = {**composed}
     for key, value in content.items():
         nested = isinstance(value, dict) and isinstance(composed.get(key), dict)
-        composed[key] = {**composed[key], **value} if nested else value
-    return composed
+        merged[key] = {**composed[key], **value} if nested else value
+    return merged
 
 
 def set_by_experiment(name: str, places: Sequence[Path]) -> dict[str, str]:

@@ -58,22 +58,24 @@ def _check_defaults(path: Path | str, defaults: Any) -> list[Any]:
     """The list as it stands: a choice to begin with, the names of a motor and of a static load, and
     `_self_`.
     """
-    for item in defaults if isinstance(defaults, list) else [defaults]:
-        (group, name) = (
-            next(iter(item.items())) if isinstance(item, Mapping) and len(item) == 1 else ("", item)
-        )
-        named = (
-            isinstance(name, str)
-            and len(name) <= LONGEST_CHOICE_NAME
-            and (name == SELF or NAME.fullmatch(name))
-        )
-        if not named or (isinstance(item, Mapping) and group not in PARTS):
+    items = list(defaults) if isinstance(defaults, list) else [defaults]
+    for item in items:
+        is_part = isinstance(item, Mapping)
+        group, name = next(iter(item.items())) if is_part and len(item) == 1 else ("", item)
+        if not _is_choice_name(name) or (is_part and group not in PARTS):
             raise UserError(
                 f"{path}: its defaults have {item!s:.80}; they may name a choice of a model,"
                 f" {SELF},"
                 " or a part: motor: NAME, static: NAME"
             )
-    return list(defaults) if isinstance(defaults, list) else [defaults]
+    return items
+
+
+def _is_choice_name(name: Any) -> bool:
+    """Whether what stands in a list of defaults is the name of a choice, or `_self_`."""
+    if not isinstance(name, str) or len(name) > LONGEST_CHOICE_NAME:
+        return False
+    return name == SELF or NAME.fullmatch(name) is not None
 
 
 def _check_values(path: Path | str, key: str, value: Any) -> None:

@@ -112,13 +112,7 @@ def plugin(cls: Class) -> Class:
             f"{where} must subclass one of the framework's bases (Motor, Static, Optimizer, Reader,"
             " ...)"
         )
-    if cls.sourced and "Source:" not in (cls.__doc__ or ""):
-        if sys.flags.optimize > 1:
-            raise UserError(
-                "python -OO takes away the docstrings in which plugins name their sources; run"
-                " without -OO"
-            )
-        raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
+    _check_source(cls, where)
     for old, new in RENAMED_METHODS.get(group, {}).items():
         if old in vars(cls):
             setattr(cls, new, vars(cls)[old])
@@ -128,19 +122,36 @@ def plugin(cls: Class) -> Class:
             f"{where}: the name '{name}' in group '{group}' is taken by {others[name].__module__};"
             " rename the file"
         )
-    if missing := sorted(
-        n for n in dir(cls) if getattr(getattr(cls, n), "__isabstractmethod__", False)
-    ):
-        raise UserError(
-            f"{where} lacks what every plugin of group '{group}' must do: define"
-            f" {' and '.join(missing)}"
-        )
+    _check_complete(cls, where)
     plugin_class = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     plugin_class.name = name
     plugin_class.parameters = _parameters(plugin_class, where)
     plugin_class.check_class(where)
     others[name] = plugin_class
     return plugin_class
+
+
+def _check_source(cls: type[Any], where: str) -> None:
+    """Raise `UserError` for a class whose equations come from nowhere."""
+    if not cls.sourced or "Source:" in (cls.__doc__ or ""):
+        return
+    if sys.flags.optimize > 1:
+        raise UserError(
+            "python -OO takes away the docstrings in which plugins name their sources; run"
+            " without -OO"
+        )
+    raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
+
+
+def _check_complete(cls: type[Any], where: str) -> None:
+    """Raise `UserError` for a class that leaves a method of its base undefined."""
+    methods = ((name, getattr(cls, name)) for name in dir(cls))
+    missing = sorted(n for n, method in methods if getattr(method, "__isabstractmethod__", False))
+    if missing:
+        raise UserError(
+            f"{where} lacks what every plugin of group '{cls.group}' must do: define"
+            f" {' and '.join(missing)}"
+        )
 
 
 def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:

@@ -119,23 +119,28 @@ def _describe_missing_choice(error: Any) -> str:
 
 def _sentence(error: BaseException) -> str:
     """The sentence of an error, by what caused it."""
-    chain = [error]
-    while (
-        cause := chain[-1].__cause__ or chain[-1].__context__
-    ) is not None and cause not in chain:
-        chain.append(cause)
-    for link in chain:
+    for link in _list_causes(error):
         key = getattr(link, "full_key", None)
-        text = _first_line(link)
+        text = first_line(link)
         if key and ("not in" in text or "is not in struct" in text):
             return _unknown_key(key, link)
         if sentence := _wrong_value(key or _key_of(error), text):
             return sentence
-    group = re.search(r"Could not override '([^']*)'", _first_line(error))
+    group = re.search(r"Could not override '([^']*)'", first_line(error))
     if group and "No match in the defaults list" in str(error):
         groups = _groups()
         return f"there is no group '{group[1]}'{among(group[1], groups, 'Groups')}"
     return _plain(error)
+
+
+def _list_causes(error: BaseException) -> list[BaseException]:
+    """An error, what it was raised from, and so on, each once."""
+    chain = [error]
+    cause = error.__cause__ or error.__context__
+    while cause is not None and cause not in chain:
+        chain.append(cause)
+        cause = cause.__cause__ or cause.__context__
+    return chain
 
 
 def _key_of(error: BaseException) -> str:
@@ -187,7 +192,7 @@ def _plain(error: BaseException) -> str:
     """The first line of an exception where it is in plain words, else what can be said in its
     place.
     """
-    text = _first_line(error)
+    text = first_line(error)
     for pattern, sentence in SENTENCES.items():
         if match := re.match(pattern, text):
             return sentence.format(*map(_short, match.groups()))
@@ -223,6 +228,6 @@ def _groups() -> list[str]:
     return sorted({*discover(), "model", "experiment"})
 
 
-def _first_line(error: BaseException) -> str:
+def first_line(error: BaseException) -> str:
     """The first line of an error, or its class."""
     return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__

@@ -35,15 +35,18 @@ def refusal(setting: str) -> str:
         return "it says more than what is computed"
     if "${" in value:
         return "its value refers to something else"
-    if (
-        match[1] in CHOICES
-        and not NAMES.fullmatch(value)
-        and not (match[1] == "model" and MODEL.fullmatch(value))
-    ):
+    if match[1] in CHOICES and not _is_choice(match[1], value):
         return "what is chosen there has a name"
     if key.startswith("task.") and key not in READ and set(value) & set("/\\"):
         return "it names a folder"
     return ""
+
+
+def _is_choice(group: str, value: str) -> bool:
+    """Whether a value is the name of a choice, or names of some, or of a model's file."""
+    if NAMES.fullmatch(value):
+        return True
+    return group == "model" and MODEL.fullmatch(value) is not None
 
 
 def _is_listed(key: str) -> bool:

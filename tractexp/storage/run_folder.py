@@ -199,9 +199,7 @@ def _settle(folder: Path) -> bool:
     whole = folder / WHOLE
     if whole.is_symlink() or not whole.is_dir():
         return False
-    order = {name: k for k, name in enumerate((CONFIGURATION, *RESULTS))}
-    paths = [path for path in whole.rglob("*") if not path.is_dir() and path.name != GOES]
-    for path in sorted(paths, key=lambda path: order.get(path.relative_to(whole).parts[0], -1)):
+    for path in _sort_files(whole):
         target = folder / path.relative_to(whole)
         if not (
             files.inside(path, whole) and target.parent.resolve().is_relative_to(folder.resolve())
@@ -209,13 +207,22 @@ def _settle(folder: Path) -> bool:
             raise UserError(f"{target} would be moved by a link out of {folder}; remove {whole}")
         target.parent.mkdir(parents=True, exist_ok=True)
         files.move(path, target)
-    goes = (
-        files.read_text(whole / GOES, files.CONFIGURATION).split("\n")
-        if (whole / GOES).is_file()
-        else []
-    )
-    for name in goes:
-        if name in RESULTS:
-            (folder / name).unlink(missing_ok=True)
+    for name in _list_removed(whole):
+        (folder / name).unlink(missing_ok=True)
     shutil.rmtree(whole, ignore_errors=True)
     return True
+
+
+def _sort_files(whole: Path) -> list[Path]:
+    """The files of a run in the order in which they are moved: what says that it is whole last."""
+    order = {name: k for k, name in enumerate((CONFIGURATION, *RESULTS))}
+    paths = [path for path in whole.rglob("*") if not path.is_dir() and path.name != GOES]
+    return sorted(paths, key=lambda path: order.get(path.relative_to(whole).parts[0], -1))
+
+
+def _list_removed(whole: Path) -> list[str]:
+    """The results of an earlier run that the one in `whole` has none of."""
+    if not (whole / GOES).is_file():
+        return []
+    names = files.read_text(whole / GOES, files.CONFIGURATION).split("\n")
+    return [name for name in names if name in RESULTS]

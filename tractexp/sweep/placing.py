@@ -22,7 +22,7 @@ def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
     """
     folders = {s.configuration: p for p in _of_jobs(folder) if (s := status.read(p)) is not None}
     taken = set(folders.values())
-    above = {parent for own in taken for parent in own.parents}
+    above = set(itertools.chain.from_iterable(own.parents for own in taken))
     free = (k for k in itertools.count() if not _holds_something(folder / str(k)))
     placed = []
     for job in jobs:
@@ -91,7 +91,8 @@ def settle(job: SweepJob, end: str, problem: str) -> None:
     """Write the end of a job that has not written its own; where it is interrupted, an earlier end
     stands.
     """
-    newest, earlier = status.read_newest(job.folder), status.read(job.folder)
+    newest = status.read_newest(job.folder)
+    earlier = status.read(job.folder)
     if newest is not None and newest.status in ENDED:
         return
     if end == INTERRUPTED and earlier is not None and earlier.status != RUNNING:

@@ -21,6 +21,7 @@ from tractexp.blocks import Table
 from tractexp.cli.chosen import refuse_unread
 from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.configuration.plugin import build, get
+from tractexp.configuration.refusal import first_line
 from tractexp.errors import Stopped, UserError
 from tractexp.storage import files
 from tractexp.storage.run_folder import hold
@@ -157,7 +158,8 @@ class Grid(Sweeper):
         """Run the jobs by the launcher; each has an end, whatever happens to its worker."""
         for job in jobs:
             await_end(job)
-        end, problem = FAILED, "it ended without a word: its worker was killed or never started"
+        end = FAILED
+        problem = "it ended without a word: its worker was killed or never started"
         try:
             if isinstance(self.launcher, Cores):
                 self.launcher.run(jobs, recorder)
@@ -166,17 +168,15 @@ class Grid(Sweeper):
                 batch = [[*job.overrides, *placement(job)] for job in jobs]
                 self.launcher.launch(batch, initial_job_idx=0)
         except KeyboardInterrupt as stop:
-            end, problem = INTERRUPTED, ""
+            end = INTERRUPTED
+            problem = ""
             raise Stopped(
                 f"the sweep is interrupted; {REPEAT}", getattr(stop, "code", 130)
             ) from None
         except UserError:
             raise
         except Exception as error:
-            problem = (
-                "the launcher gave up:"
-                f" {str(error).strip().partition(chr(10))[0] or type(error).__name__}"
-            )
+            problem = f"the launcher gave up: {first_line(error)}"
         finally:
             for job in jobs:
                 if end != INTERRUPTED or job.folder.exists():  # a job that has not begun has no end
@@ -246,7 +246,8 @@ def summary(jobs: Sequence[SweepJob]) -> None:
 
 def failures(jobs: Sequence[SweepJob]) -> str:
     """Print which jobs failed and why; returns the sentence of the error, "" where none did."""
-    common, ends = find_shared_overrides(jobs), [(job, status.read(job.folder)) for job in jobs]
+    common = find_shared_overrides(jobs)
+    ends = [(job, status.read(job.folder)) for job in jobs]
     failed = [(job, end.message) for job, end in ends if end is not None and end.status == FAILED]
     if not failed:
         return ""

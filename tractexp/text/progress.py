@@ -84,6 +84,8 @@ def report_search(
     """Yield the search loop's progress callback: a live line, or a line now and then in a log file;
     None for False.
     """
+    from rich.progress import BarColumn, TextColumn
+
     if progress is False:
         yield None
         return
@@ -102,8 +104,6 @@ def report_search(
 
         yield line
         return
-    from rich.progress import BarColumn, TextColumn
-
     columns = [
         TextColumn("  searching"),
         BarColumn(bar_width=24),
@@ -112,7 +112,8 @@ def report_search(
             " {task.fields[best]}{task.fields[rest]}"
         ),
     ]
-    started, total = time.perf_counter(), 1.0 if iterations or budget else None
+    started = time.perf_counter()
+    total = 1.0 if iterations or budget else None
     with _live(columns, total, simulations=0, best="", rest="") as update:
 
         def callback(iteration: int, best: float, simulations: int) -> None:
@@ -130,6 +131,8 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
 
     A callable gets a line for each.
     """
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+
     if progress is False:
         yield lambda: None
         return
@@ -138,8 +141,6 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
         yield lambda: progress(f"{next(ended)} of {total} {what}")
         return
     if _lively():
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-
         columns = [
             TextColumn(f"  {what}"),
             BarColumn(bar_width=30),
@@ -149,13 +150,15 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
         with _live(columns, total) as update:
             yield lambda: update(advance=1)
         return
-    pace, done = Pace(), 0
+    pace = Pace()
+    done = 0
 
     def count() -> None:
         nonlocal done
         done += 1
         if (spent := pace()) and done < total:
-            rate, rest = done / spent, spent * (total - done) / done
+            rate = done / spent
+            rest = spent * (total - done) / done
             log(f"  {done} of {total} {what}, {rate:.2g} a second, about {rest:.0f} s left")
 
     yield count

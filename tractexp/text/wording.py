@@ -80,14 +80,18 @@ def alternatives(sets: Sequence[Sequence[str]]) -> str:
     if not sets:
         return ""
     common = Counter(itertools.chain(*sets)).most_common(1)[0][0]
-    sharing = [names for names in sets if common in names and len(names) > 1]
-    if len(sharing) < FEWEST_GROUPED:
-        return join_words([join_words(names) for names in sets], "or")
-    beside = join_words(
-        [join_words([name for name in names if name != common]) for names in sharing], "or"
-    )
-    others = [join_words(names) for names in sets if names not in sharing]
-    return join_words([f"{common} beside one more effect ({beside})", *others], "or")
+    beside = []
+    others = []
+    for names in sets:
+        rest = [name for name in names if name != common]
+        if rest and len(rest) < len(names):
+            beside.append(join_words(rest))
+        else:
+            others.append(join_words(names))
+    if len(beside) < FEWEST_GROUPED:
+        return join_words(list(map(join_words, sets)), "or")
+    shared = f"{common} beside one more effect ({join_words(beside, 'or')})"
+    return join_words([shared, *others], "or")
 
 
 def list_figures(values: Sequence[float], shown: Callable[[float], str]) -> str:

@@ -90,7 +90,8 @@ def save(
     """Write down what is to be logged, with a key that identifies it, and the time at which the run
     ended; into another `place` where the folder is still to get it.
     """
-    key, ended = run.key or uuid.uuid4().hex, run.ended or time.time()
+    key = run.key or uuid.uuid4().hex
+    ended = run.ended or time.time()
     return RunFile(folder, replace(run, key=key, ended=ended), uri, sweep=sweep).write(place)
 
 
@@ -164,13 +165,7 @@ def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
     key, *_ = _texts(content, "key", "experiment", "name", "status", "description")
     if not KEY.fullmatch(key):
         raise ValueError(f"its key is {key!r:.60}")
-    for name, kinds in SHAPES.items():
-        if not isinstance(content[name], kinds):
-            raise TypeError(f"its {name} is {content[name]!r:.60}")
-    for name, kinds in INNER.items():
-        each = content[name].values() if isinstance(content[name], dict) else content[name]
-        if not all(isinstance(value, kinds) for value in each):
-            raise TypeError(f"its {name} hold what they cannot: {content[name]!r:.60}")
+    _check_shapes(content)
     if len(content["children"]) > MOST_CHILDREN:
         raise ValueError(
             f"it has {len(content['children'])} runs below it, and at most {MOST_CHILDREN} can be"
@@ -182,3 +177,14 @@ def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
         "children": [_run(child, folder) for child in content["children"]],
     }
     return TrackedRun(**{**content, **there})
+
+
+def _check_shapes(content: Mapping[str, Any]) -> None:
+    """Raise TypeError for a field of another form than runs have."""
+    for name, kinds in SHAPES.items():
+        if not isinstance(content[name], kinds):
+            raise TypeError(f"its {name} is {content[name]!r:.60}")
+    for name, kinds in INNER.items():
+        each = content[name].values() if isinstance(content[name], dict) else content[name]
+        if not all(isinstance(value, kinds) for value in each):
+            raise TypeError(f"its {name} hold what they cannot: {content[name]!r:.60}")

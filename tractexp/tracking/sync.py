@@ -66,13 +66,13 @@ def sync(
             continue
         if one is None:
             continue
-        if find_holder(folder) or (not one.sweep and find_holder(folder_of(folder))):
+        if any(map(find_holder, (folder,) if one.sweep else (folder, folder_of(folder)))):
             counts[WORKS] += 1  # which logs it itself
             continue
         where = uri or one.uri
         try:
             where = address(where)
-            if own is not None and uri is None and where != own:
+            if uri is None and own not in (None, where):
                 raise UserError(
                     f"the MLflow store {where} is named in {root} alone, not by you:"
                     f" {_describe_store(where)}"
@@ -102,39 +102,48 @@ def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> Track
     Nothing goes along that MLflow would obey: a model that it loads, a tag of its own, Markdown of
     others.
     """
-
-    def lies(path: Path) -> bool:
-        if not os.path.exists(path):
-            return False
-        if not files.inside(path, folder):
-            tell(f"{path} is not sent: it does not lie in the folder {folder} of its run")
-        elif any(one.name.lower() == MODEL for one in (path, *path.rglob("*"))):
-            tell(
-                f"{path} is not sent: MLflow would load it as a model, and run what its maker put"
-                " into it"
-            )
-        else:
-            return True
-        return False
-
-    def reads(path: Path) -> bool:
-        from tractexp.identification.result import load
-
-        try:
-            load(path)
-        except UserError as error:
-            tell(f"no model is made of {path}: {error}")
-            return False
-        return True
-
-    children = [_within(child, folder, tell) for child in run.children]
-    artifacts = [path for path in run.artifacts if lies(path)]
-    model = run.model if run.model and lies(run.model) and reads(run.model) else None
-    tags = {name: text for name, text in run.tags.items() if not name.startswith(RESERVED)}
-    told = quoting.markdown_again(run.description)
+    artifacts = [path for path in run.artifacts if _may_go(path, folder, tell)]
+    model = run.model
+    if model and not (_may_go(model, folder, tell) and _can_be_loaded(model, tell)):
+        model = None
     return replace(
-        run, artifacts=artifacts, model=model, children=children, tags=tags, description=told
+        run,
+        artifacts=artifacts,
+        model=model,
+        children=[_within(child, folder, tell) for child in run.children],
+        tags={name: text for name, text in run.tags.items() if not name.startswith(RESERVED)},
+        description=quoting.markdown_again(run.description),
     )
+
+
+def _may_go(path: Path, folder: Path, tell: Callable[[str], None]) -> bool:
+    """Whether a file of a run is there, lies in its folder and is no model of MLflow's; `tell`
+    hears why not.
+    """
+    if not os.path.exists(path):
+        return False
+    if not files.inside(path, folder):
+        tell(f"{path} is not sent: it does not lie in the folder {folder} of its run")
+        return False
+    if any(one.name.lower() == MODEL for one in (path, *path.rglob("*"))):
+        tell(
+            f"{path} is not sent: MLflow would load it as a model, and run what its maker put"
+            " into it"
+        )
+        return False
+    return True
+
+
+def _can_be_loaded(path: Path, tell: Callable[[str], None]) -> bool:
+    """Whether a file holds a result that a model can be made of; `tell` hears why not."""
+    from tractexp.identification.result import load
+
+    try:
+        load(path)
+    except UserError as error:
+        tell(f"no model is made of {path}: {error}")
+        return False
+    return True
 
 
 def _sent(one: RunFile, uri: str) -> str:
