@@ -13,15 +13,15 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 LIMITS = {
-    "nodes a line of code": 6.12,
+    "nodes a line of code": 6.11,
     "lines over 100 columns": 2,  # two of regular expressions and formats
     "lines that the formatter skips": 2,
     "functions called by a participle or a preposition": 2,
     "texts and lists multiplied by a condition": 0,
     "numbers' names with several homes": 0,
-    "functions of complexity over 10, in percent": 5.8,
+    "functions of complexity over 10, in percent": 3.1,
 }
-LEAST_DOCSTRINGS = 17.6  # percent of all lines
+LEAST_DOCSTRINGS = 17.7  # percent of all lines
 
 PARTICIPLE = re.compile(r"[a-z]+(ed|ing)")
 PREPOSITIONS = re.compile(
