@@ -117,15 +117,20 @@ def _mark_secondary(channels: Sequence[Channel]) -> list[Channel]:
     """The channels with S where their values are secondary: if a voltage has the size of one, and
     none is larger.
     """
+    if not any(c.side for c in channels):
+        return [*channels]
     low, high = SECONDARY
-    voltages = [c for c in channels if c.side and c.quantity == "voltage" and not in_doubt(c)]
-    sizes = np.array([c.factor * _size(c) for c in voltages])
-    larger = (sizes > high).any()
-    alike = ((low <= sizes) & (sizes <= high)).any()
+    sizes = np.array([c.factor * _size(c) for c in channels if _is_sided_voltage(c)])
+    larger, alike = (sizes > high).any(), ((low <= sizes) & (sizes <= high)).any()
     return [
         _set_secondary(c) if not larger and (alike or c.side == "S") else replace(c, side="")
         for c in channels
     ]
+
+
+def _is_sided_voltage(channel: Channel) -> bool:
+    """Whether a voltage's file says, or leaves open, on which side of the transformer it is."""
+    return bool(channel.side) and channel.quantity == "voltage" and not in_doubt(channel)
 
 
 def _set_secondary(channel: Channel) -> Channel:
