@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,9 @@ class JoinedTable(TableFile):
     def __init__(self, parts: Sequence[TableFile], paths: Sequence[str]) -> None:
         """Raises `UserError` for other rates, and for times that do not overlap."""
         self.parts, self.source = parts, parts[0].source
-        every, used = zip(*map(_times, parts), strict=True)
+        read = list(map(_times, parts))
+        every = list(map(itemgetter(0), read))
+        used = list(map(itemgetter(1), read))
         self.aligned = align(list(map(_describe_samples, parts, every)))
         first = self.aligned.first[0]
         count = self.aligned.count

@@ -10,6 +10,7 @@ import io
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -200,7 +201,8 @@ class TextTable(TableFile):
         parts: dict[int, list[np.ndarray]] = {n: [np.empty(0)] for n in kinds}
         self._lines, rows = np.empty(0, int), self._rows(max(wanted))
         while block := list(itertools.islice(rows, BLOCK)):
-            lines, block_rows = zip(*block, strict=True)
+            lines = list(map(itemgetter(0), block))
+            block_rows = list(map(itemgetter(1), block))
             before, self._lines = len(self._lines), np.append(self._lines, lines)
             for n, values in self._read_block(block_rows, kinds, before).items():
                 parts[n].append(values)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from operator import itemgetter
-from typing import Any
+from typing import Any, TypeGuard
 
 import sympy
 from sympy.logic.boolalg import Boolean, BooleanFalse, BooleanTrue
@@ -220,7 +220,7 @@ class Expressions:
         )
 
 
-def _divides(factor: sympy.Basic) -> bool:
+def _divides(factor: sympy.Basic) -> TypeGuard[sympy.Pow]:
     """Whether a factor is a power with a negative number as its exponent."""
     if not isinstance(factor, sympy.Pow):
         return False
