@@ -2,6 +2,7 @@
 motors in each, and each dip predicted by those before it.
 """
 
+import copy
 import json
 import shutil
 
@@ -15,6 +16,7 @@ from tractexp.api import station_load
 from tractexp.errors import UserError
 from tractexp.identification.station import Dip, LoadSpec, fit_dips, predict_in_turn
 from tractexp.record import OwnBase
+from tractexp.report import station
 
 DIPS, FAULTY = 12, 5
 
@@ -226,4 +228,28 @@ def test_the_answer_is_one_screen(fitted):
     assert len(lines) <= 25
     assert all(len(line) <= 80 for line in lines[:5])
     for load in fitted.loads:
-        assert any(line.startswith(f"{load['load']}: motors") for line in lines)
+        assert any(line.startswith(f"{load['load']}: doubtful: the model") for line in lines)
+
+
+def test_a_load_that_no_dip_predicts_is_told(fitted):
+    content = copy.deepcopy(dict(fitted.content))
+    load = content["loads"][0]
+    load |= {"next_dip": {}, "curves": [], "usability": "unusable", "reason": "it stalls"}
+    load["predicted"] = {"dips": 0, "first_half": None, "last_half": None}
+    load["error"] = {"value": None, "interval": [None, None], "of_S": None, "stalls": ["a dip"]}
+    for event in load["events"]:
+        event |= {"predicted": None, "expected": None, "error": None}
+    for text in (station.report(content).html, str(station.screen(content))):
+        assert "the motor stalls" in text
+        assert "unusable" in text
+
+
+def test_a_load_whose_dips_are_missed_is_unusable(tmp_path):
+    """Two loads of one name, of quite other machines."""
+    for k in (0, 5):
+        frame = draw_frame(k)
+        frame["Q"] = 0.35 + (-1) ** k * (frame["Q"] - 0.35)
+        frame.to_csv(tmp_path / f"dip{k}.csv", index=False)
+    (load,) = tractexp.fit_station(tmp_path, cores=1, progress=False).content["loads"]
+    assert load["usability"] == "unusable"
+    assert "does not describe this load" in load["reason"]

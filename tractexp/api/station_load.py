@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.api.compose import LoadModel, Portable
+from tractexp.api.identify import Identification
 from tractexp.api.read import record_from_dict, record_to_dict
 from tractexp.cache.store import Store
 from tractexp.errors import UserError
@@ -29,6 +30,7 @@ from tractexp.identification.station import (
     Predicted,
     SharedFit,
     find_band,
+    find_later,
     fit_dips,
     predict_in_turn,
 )
@@ -125,7 +127,20 @@ def _fit(job: LoadJob) -> dict[str, Any]:
     predicted = predict_in_turn(spec, dips, fit.odd)
     share = _tell_share(fit, composition)
     next_dip = _forecast(fit, composition, predicted)
+    ahead = find_later(predicted, fit.odd)
+    result = build_result(
+        spec,
+        fit,
+        constants,
+        share["value"],
+        next_dip,
+        load.node,
+        ahead,
+    )
+    identified = Identification(result)
     return {
+        "usability": identified.usability,
+        "reason": identified.usability_reason,
         "dips": len(dips),
         "model": load.node,
         "race": [*load.race],
@@ -138,7 +153,7 @@ def _fit(job: LoadJob) -> dict[str, Any]:
         "error": model_error([fit.fits[k] for k in fit.regular]).to_dict(),
         "predicted": _tell_predicted(predicted, fit),
         "next_dip": next_dip,
-        "result": build_result(spec, fit, constants, share["value"], next_dip, load.node).to_dict(),
+        "result": result.to_dict(),
         "curves": [*_draw(names, predicted, fit)],
     }
 
@@ -305,7 +320,7 @@ def _draw(
     """The last dips that were predicted: U, P and Q [pu of S before] as recorded and as
     predicted.
     """
-    drawn = [one for one in predicted if one.fit is not None and one.position not in fit.odd]
+    drawn = [one for one in predicted if np.isfinite(one.error) and one.position not in fit.odd]
     for one in drawn[-MOST_CURVES:]:
         assert one.fit is not None
         record = one.fit.event.record

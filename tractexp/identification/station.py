@@ -382,7 +382,14 @@ def find_band(predicted: Sequence[Predicted], odd: Mapping[int, str]) -> Predict
     """The band of the next dip, by what was missed of those that were predicted; None where none
     was.
     """
+    fits = find_later(predicted, odd)
+    return measure_band(fits) if fits else None
+
+
+def find_later(predicted: Sequence[Predicted], odd: Mapping[int, str]) -> list[Fit]:
+    """The later half of the dips that were predicted, by the most dips: odd ones, and those without
+    a steady state, apart.
+    """
     regular = [one for one in predicted if one.position not in odd]
     fits = [one.fit for one in regular if one.fit is not None]
-    half = len(fits) // 2
-    return measure_band(fits[half:]) if fits else None
+    return fits[len(fits) // 2 :]

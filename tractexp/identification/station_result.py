@@ -3,23 +3,28 @@ share of motors that is expected, so that it predicts and exports as any other r
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from tractexp.cache import provenance
+from tractexp.identification.adequacy import Adequacy, Grade, Surprise, grade_errors
 from tractexp.identification.result import (
     Fit,
     Result,
+    active_bounds,
     at_bound,
     model_errors,
     relative_errors,
 )
 from tractexp.identification.station import LoadSpec, SharedFit
 from tractexp.identification.station_constants import Constants
+from tractexp.inference.model_error import model_error
 from tractexp.record import OwnBase
 from tractexp.record.identity import Identity
+
+NOT_JUDGED = Surprise(None, "", None, "")  # of noise nothing is said
 
 
 def build_result(
@@ -29,9 +34,10 @@ def build_result(
     share: float,
     next_dip: Mapping[str, Any],
     node: Mapping[str, Any],
+    predicted: Sequence[Fit],
 ) -> Result:
     """The result of a load, of which the motors draw a `share` of P; on the base of its median
-    apparent power.
+    apparent power. It is graded by the dips fitted and those `predicted` by others before them.
     """
     problem = fit.problem
     usual = _find_usual(fit)
@@ -64,6 +70,7 @@ def build_result(
             "frequency": event.record.base.frequency,
         },
         model_error=model_errors(played),
+        adequacy=_grade(fit, played, predicted).to_dict(),
         next_dip=dict(next_dip),
         intervals=_scale_intervals(fit, constants, torque),
         notes=["the motors' share is that expected over all dips; constants are those of all"],
@@ -72,6 +79,21 @@ def build_result(
         tractexp_version=provenance.version(),
         commit=provenance.commit(),
     )
+
+
+def _grade(fit: SharedFit, played: Sequence[Fit], predicted: Sequence[Fit]) -> Adequacy:
+    """What the model is good for, by what it leaves: noise is not asked."""
+    fitted = model_error(played)
+    ahead = model_error(predicted) if predicted else None
+    torques = [fit.problem.space.names[k] for k in fit.problem.shares]
+    bounds = active_bounds(fit.problem, fit.values, torques)
+    graded = grade_errors(NOT_JUDGED, fitted, ahead, bounds)
+    if graded.grade is Grade.WRONG_MODEL:
+        return graded
+    sentence = f"the model describes this load within {fitted}"
+    if ahead is not None:
+        sentence += f", dips that it did not know within {ahead}"
+    return replace(graded, sentence=sentence)
 
 
 def _find_usual(fit: SharedFit) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
 from tractexp.identification.composition import DAYS_A_YEAR, HOUR
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.text.wording import count_noun, list_first, shorten
 
 MOST_SCREEN_ROWS, MOST_SCREEN_LOADS = 8, 4  # loads of the first screen, and those it describes
@@ -25,6 +25,7 @@ TERM_NAMES = {
     "season": "month",
     "year": "year, from the first dip on",
 }
+VERDICTS = {"usable": "good", "unusable": "bad"}
 ON_OWN = "per unit of what the motors draw"
 CONSTANTS_CAPTION = (
     f"Impedances and inertia are {ON_OWN} before the dip, so that they are the same however many of"
@@ -45,6 +46,7 @@ def tell_load(load: Mapping[str, Any]) -> dict[str, Any]:
         "station": load["station"],
         "load": load["load"],
         "dips": load["dips"],
+        "usability": load["usability"],
         "left_out": len(load["odd"]),
         **{name: constants[name]["value"] for name in TOLD_CONSTANTS if name in constants},
         "share": share["value"],
@@ -63,22 +65,16 @@ def tabulate_loads(content: Mapping[str, Any]) -> Table:
         [
             load["load"] or load["station"],
             load["dips"],
-            *(_find_constant(load, name) for name in TOLD_CONSTANTS),
+            load["usability"],
             _tell_share(load["share"]),
-            _percent(load["error"]["value"]),
+            tell_error(load["error"]),
             _percent(load["predicted"]["last_half"]),
         ]
         for load in content["loads"]
         if "why" not in load
     ]
-    columns = ["load", "dips", "T' [s]", "X' [pu]", "H [s]", "motors, of P", "error", "predicted"]
-    return Table(columns, rows, f"loads of {content['folder']}", words=(5, 6, 7))
-
-
-def _find_constant(load: Mapping[str, Any], name: str) -> float | None:
-    """A constant of a load, as its row shows it; None where its model has none of this name."""
-    values = [row["value"] for row in load["constants"] if row["name"] == name]
-    return float(f"{values[0]:.3g}") if values else None
+    columns = ["load", "dips", "use", "motors, of P", "error", "predicted"]
+    return Table(columns, rows, f"loads of {content['folder']}", words=(2, 3, 4, 5))
 
 
 def _tell_share(share: Mapping[str, Any]) -> str:
@@ -138,14 +134,12 @@ def _tell_unfitted(content: Mapping[str, Any]) -> list[str]:
 
 def describe_load(load: Mapping[str, Any]) -> str:
     """What differs from dip to dip, what is predicted, and what was left out, in a line."""
-    told = [_tell_variation(load)]
+    told = [f"{load['usability']}: {load['reason']}", _tell_variation(load)]
     differs = {r["name"]: r["spread"] for r in load["constants"] if r["spread"]}
     differs.pop("H", None)
     if differs:
         own = ", ".join(f"{name} by {spread:.0%}" for name, spread in differs.items())
         told.append(f"no constants: {own} from dip to dip")
-    if load["next_dip"]:
-        told.append(load["next_dip"]["sentence"])
     if odd := load["odd"]:
         told.append(f"left out: {list_first([o['event'] for o in odd], MOST_TOLD_ODD)}")
     return "; ".join(told)
@@ -178,7 +172,8 @@ def report(content: Mapping[str, Any]) -> Report:
 def _show_load(page: Report, load: Mapping[str, Any]) -> None:
     """A load's section."""
     page.heading(", ".join(filter(None, (load["station"], load["load"]))))
-    page.verdict(describe_load(load) + ".")
+    kind = VERDICTS.get(load["usability"], "plain")
+    page.verdict(describe_load(load) + ".", kind=kind)
     page.add(_tabulate_constants(load))
     page.chart(_draw_years(load), TIME_CAPTION)
     for term, rows in load["composition"]["terms"].items():
