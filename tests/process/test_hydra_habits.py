@@ -113,6 +113,7 @@ def test_a_job_may_be_seeded_by_its_number_and_returns_what_is_named(tmp_path):
     )
     done = run_command(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+    assert f"to watch it: {(tmp_path / 'sweep' / 'sweep.html').as_uri()}" in done.stdout
     found = ends(tmp_path / "sweep")
     assert [found[number]["seed"] for number in "01"] == [0, 1]
     refused = run_command(*asked, "sweep.returns=[objectiv]", "hydra.sweep.dir=other", cwd=tmp_path)

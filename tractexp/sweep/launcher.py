@@ -111,6 +111,7 @@ class Cores(Launcher):
         """
         if self.page is None:
             self.page = LivePage(folder)
+            self.page.print_address()
             atexit.register(self.page.write, "ended")
         self.page.add(jobs, remaining)
         return self.page

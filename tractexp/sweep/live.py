@@ -26,6 +26,7 @@ from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.progress import Tally
 from tractexp.sweep.status import FAILED, FINISHED, SEARCHED, Status
 from tractexp.text import quoting
+from tractexp.text.progress import say
 
 PAGE = "sweep.html"
 LEADS_TO = "comparison.html"
@@ -59,6 +60,10 @@ class LivePage:
         self.ends: dict[Path, Status] = {}
         self.waiting: dict[Path, int | None] = {}  # when an earlier attempt ended
         self.curves: dict[Path, Curve | None] = {}
+
+    def print_address(self) -> None:
+        """Print where it is."""
+        say(f"  to watch it: {(self.folder / PAGE).absolute().as_uri()}")
 
     def add(self, jobs: Sequence[SweepJob], remaining: Sequence[SweepJob]) -> None:
         """Show these jobs, of which the `remaining` are run now."""

@@ -29,7 +29,7 @@ from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.launcher import Cores
-from tractexp.sweep.live import PAGE, LivePage, keep_live
+from tractexp.sweep.live import LivePage, keep_live
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.placing import await_end, is_finished, place, placement, settle
 from tractexp.sweep.recorder import Recorder
@@ -104,8 +104,8 @@ class Grid(Sweeper):
                 for name in PAGES:
                     (folder / name).unlink(missing_ok=True)
             files.write(folder / MULTIRUN, OmegaConf.to_yaml(self.config))
-            say(f"  to watch it: {(folder / PAGE).absolute().as_uri()}")
             self.page = LivePage(folder)
+            self.page.print_address()
             self.page.add(jobs, remaining)
             with (
                 parent_run(folder, jobs, arguments, afresh=self.redo) as recorder,
