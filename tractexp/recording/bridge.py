@@ -39,10 +39,9 @@ def bridge_recording(recording: Recording) -> Recording:
 
 def _part_recording(recording: Recording) -> Recording:
     """The recording without samples of which no channel has a value, more than are bridged."""
-    waves = [channel for channel in recording.channels if channel.form == "waveform"]
-    if not waves or not all(map(_may_lack, waves)):
+    empty = _find_empty_samples(recording)
+    if not empty.any():
         return recording
-    empty = np.logical_and.reduce([np.isnan(channel.read_values()) for channel in waves])
     parts = []
     for segment in recording.segments:
         lacking = empty[segment.first : segment.stop]
@@ -66,6 +65,23 @@ def _part_recording(recording: Recording) -> Recording:
         f" channel: parts that begin at {told} are looked at by themselves"
     )
     return replace(recording, segments=parts, notes=(*recording.notes, note))
+
+
+def _find_empty_samples(recording: Recording) -> np.ndarray:
+    """Which samples (N,) have no value in any channel of waves; it ends at the first that lacks
+    none.
+    """
+    empty = np.zeros(1, dtype=bool)
+    stop = max((segment.stop for segment in recording.segments), default=0)
+    waves = (channel for channel in recording.channels if channel.form == "waveform")
+    for number, channel in enumerate(waves):
+        if not _may_lack(channel):
+            return np.zeros(1, dtype=bool)
+        lacking = np.isnan(channel.read_values(0, stop))
+        empty = empty & lacking if number else lacking
+        if not empty.any():
+            break
+    return empty
 
 
 def _bridge_channel(channel: Channel, recording: Recording) -> Channel:
