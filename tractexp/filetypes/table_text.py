@@ -199,11 +199,13 @@ class TextTable(TableFile):
         texts: dict[int, list[str]] = {n: [] for n in clocks}
         kinds = {n: wanted[n] for n in wanted.keys() - texts.keys()}
         parts: dict[int, list[np.ndarray]] = {n: [np.empty(0)] for n in kinds}
-        self._lines, rows = np.empty(0, int), self._rows(max(wanted))
+        numbered = self._lines = np.empty(0, int)
+        rows = self._rows(max(wanted))
         while block := list(itertools.islice(rows, BLOCK)):
             lines = list(map(itemgetter(0), block))
             block_rows = list(map(itemgetter(1), block))
-            before, self._lines = len(self._lines), np.append(self._lines, lines)
+            before = len(numbered)
+            numbered = self._lines = np.append(numbered, lines)
             for n, values in self._read_block(block_rows, kinds, before).items():
                 parts[n].append(values)
             for n, cells in texts.items():

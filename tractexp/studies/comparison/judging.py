@@ -97,7 +97,7 @@ def _on_bbob(
     variants = [v for v in comparison.gathered.variants if not v.settings.get("polish")]
     optimizers = {v.name: nest_keys(v.runs[0].config)["optimizer"] for v in variants}
     runs = itertools.chain.from_iterable(v.runs for v in variants)
-    budgets = {run.config.get("budget") for run in runs} - {None}
+    budgets: set[Any] = {run.config.get("budget") for run in runs} - {None}
     multiplier = -(-int(budgets.pop() if len(budgets) == 1 else EVALUATIONS) // DIMENSION)
     settings = {
         "optimizers": optimizers,

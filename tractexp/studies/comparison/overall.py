@@ -103,8 +103,10 @@ def _ablate_mean(
     names: Sequence[str],
     logs: Mapping[str, Mapping[int, list[float]]],
     seeds: Sequence[int],
-) -> Ablation:
-    """What the switches do to the mean over all problems, seed by seed."""
+) -> Ablation | None:
+    """What the switches do to the mean over all problems, seed by seed; None where no contrast
+    can be made.
+    """
     mean = np.mean([[by_seed[seed] for seed in seeds] for by_seed in logs.values()], axis=0)
     return chosen.ablation(dict(zip(names, mean.T, strict=True)))
 
