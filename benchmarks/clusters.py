@@ -35,11 +35,12 @@ LONGEST_WAIT = 50  # looks at processes that are about to end
 COMMANDS = {
     "sbatch": """
 script = pathlib.Path(sys.argv[-1])
-last = int(re.search(r"--array=0-([0-9]+)", script.read_text())[1])
+array = re.search(r"--array=0-([0-9]+)", script.read_text())
 one = dict.fromkeys(("NODEID", "PROCID", "LOCALID"), "0")
-one |= {"JOB_NUM_NODES": "1", "NTASKS": "1", "JOB_NODELIST": "here", "ARRAY_JOB_ID": "9"}
-for k in range(last + 1):
-    own = {**one, "ARRAY_TASK_ID": str(k), "JOB_ID": str(9 + k)}
+one |= {"JOB_NUM_NODES": "1", "NTASKS": "1", "JOB_NODELIST": "here"}
+for k in range(int(array[1]) + 1 if array else 1):
+    own = {**one, "JOB_ID": str(9 + k)}
+    own |= {"ARRAY_JOB_ID": "9", "ARRAY_TASK_ID": str(k)} if array else {}
     names = {f"SLURM_{name}": text for name, text in own.items()}
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     subprocess.Popen(["bash", script], env={**os.environ, **names}, **silent)
