@@ -202,11 +202,10 @@ class TextTable(TableFile):
         numbered = self._lines = np.empty(0, int)
         rows = self._rows(max(wanted))
         while block := list(itertools.islice(rows, BLOCK)):
-            lines = list(map(itemgetter(0), block))
             block_rows = list(map(itemgetter(1), block))
-            before = len(numbered)
-            numbered = self._lines = np.append(numbered, lines)
-            for n, values in self._read_block(block_rows, kinds, before).items():
+            first = len(numbered)
+            numbered = self._lines = np.append(numbered, list(map(itemgetter(0), block)))
+            for n, values in self._read_block(block_rows, kinds, first).items():
                 parts[n].append(values)
             for n, cells in texts.items():
                 cells += [row[n] for row in block_rows]
