@@ -158,7 +158,8 @@ def test_a_window_that_the_records_say_is_theirs():
     [
         (0.0, "is no window: give its length"),
         (-0.02, "is no window: give its length"),
-        (20.0, "at most 10 s"),
+        (20.0, "at most 2 s"),
+        (10.0, "at most 2 s"),
         (float("nan"), "is no window"),
         ("two_cycles", "there is no such window"),
     ],

@@ -1083,3 +1083,8 @@ def test_a_mutated_file_is_read_or_refused_in_a_sentence(seed):
             said = ""
         assert not [leak for leak in LEAKS if leak in said], said
         assert time.process_time() - begin < 2
+
+
+def test_a_column_is_chosen_by_a_name_or_a_number():
+    with pytest.raises(UserError, match=r"P must be the name of a column of .*, or its number"):
+        read(text(dip()), columns={"P": {"a": None}})

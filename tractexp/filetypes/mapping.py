@@ -219,6 +219,10 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
     """
     names = [name.strip() for name in table.heading.names]
     units = table.heading.units
+    if not isinstance(choice, int | str):
+        raise UserError(
+            f"{DATA.columns}: {key} must be the name of a column of {table.source}, or its number"
+        )
     if isinstance(choice, int) or (str(choice).isdigit() and str(choice) not in names):
         if 0 <= int(choice) < len(names):
             return int(choice)

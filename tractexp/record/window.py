@@ -19,7 +19,7 @@ import numpy as np
 if TYPE_CHECKING:
     from tractexp.record.event import Event
 
-LONGEST_WINDOW = 10.0  # s about a time stamp: far more than any recorder averages over
+LONGEST_WINDOW = 2.0  # s about a time stamp: far more than any recorder averages over
 BEND_SECONDS = 0.05  # s on either side of a window around an edge, in which the voltage may bend
 BENT, CALM = 0.01, 3e-4  # pu: second differences of the voltage there, and elsewhere
 ERROR = 2e-4  # pu: how exactly the average voltage must be the recorded one, if its noise allows
