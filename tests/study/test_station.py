@@ -5,6 +5,7 @@ motors in each, and each dip predicted by those before it.
 import copy
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -253,3 +254,15 @@ def test_a_load_whose_dips_are_missed_is_unusable(tmp_path):
     (load,) = tractexp.fit_station(tmp_path, cores=1, progress=False).content["loads"]
     assert load["usability"] == "unusable"
     assert "does not describe this load" in load["reason"]
+
+
+def test_the_page_tells_the_stored_run():
+    root = Path(__file__).parents[2]
+    rows = json.loads((root / "benchmarks" / "station.json").read_text(encoding="utf-8"))
+    (row,) = [one for one in rows if (one["loads"], one["dips"]) == (4, 50)]
+    page = " ".join((root / "docs" / "archives.md").read_text(encoding="utf-8").split())
+    assert f"two cores): {row['seconds']:.0f} s; the worst constant {row['constants']:.1%}" in (
+        page.replace(" %", "%")
+    )
+    assert f"the share by hour {row['by_hour']:.1%} of P" in page.replace(" %", "%")
+    assert row["left_out"] == [2, 2, 2, 2]

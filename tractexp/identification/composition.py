@@ -95,9 +95,9 @@ def _harmonics(turn: float, count: int) -> np.ndarray:
 COLUMNS = {HOUR: slice(1, 5), WEEKDAY: slice(5, 12), SEASON: slice(12, 14), YEAR: slice(14, 15)}
 
 
-def _describe_grid(term: str) -> tuple[list[str], np.ndarray]:
+def _describe_grid(term: str) -> tuple[Sequence[str], np.ndarray]:
     """Labels and columns (n, 15) at which a term is told."""
-    labels: list[str]
+    labels: Sequence[str]
     if term == HOUR:
         labels = [f"{hour:02d}:30" for hour in range(24)]
         points = [_harmonics((hour + 0.5) / 24, 2) for hour in range(24)]
