@@ -259,10 +259,10 @@ def test_a_load_whose_dips_are_missed_is_unusable(tmp_path):
 def test_the_page_tells_the_stored_run():
     root = Path(__file__).parents[2]
     rows = json.loads((root / "benchmarks" / "station.json").read_text(encoding="utf-8"))
-    (row,) = [one for one in rows if (one["loads"], one["dips"]) == (4, 50)]
-    page = " ".join((root / "docs" / "archives.md").read_text(encoding="utf-8").split())
-    assert f"two cores): {row['seconds']:.0f} s; the worst constant {row['constants']:.1%}" in (
-        page.replace(" %", "%")
-    )
-    assert f"the share by hour {row['by_hour']:.1%} of P" in page.replace(" %", "%")
-    assert row["left_out"] == [2, 2, 2, 2]
+    (few, row) = sorted((one for one in rows if one["loads"] == 4), key=lambda one: one["dips"])
+    page = (root / "docs" / "archives.md").read_text(encoding="utf-8")
+    page = " ".join(page.split()).replace(" %", "%")
+    assert f"two cores): {row['seconds']:.0f} s, 50 dips {few['seconds']:.0f} s" in page
+    assert f"the worst constant {row['constants']:.1%}" in page
+    assert f"the share by hour {row['by_hour']:.1%} of P" in page
+    assert [few["left_out"], row["left_out"]] == [[2, 2, 2, 2], [2, 2, 2, 1]]
