@@ -156,7 +156,7 @@ def _list_cells(column: Any) -> Any:
 # each gives what a file says it holds, and what reads a part of it; they raise ValueError, OSError
 OPENERS: dict[str, Callable[[bytes], tuple[Any, Callable[[str], Any]]]] = {
     "workbook": _open_workbook,
-    "parquet": _open_parquet,
+    "columns": _open_parquet,
 }
 
 

@@ -257,7 +257,7 @@ def _describe_missing(path: str, file: Path) -> str:
 def _parquet(path: str, data: bytes) -> TableFile:
     """A Parquet file as a table. Raises `UserError` for one that is damaged or too large."""
     try:
-        with ReadingProcess("parquet", data) as file:
+        with ReadingProcess("columns", data) as file:
             width, rows = file.content
             check_column_count(width, path)
             if (values := rows * width) > MOST_TABLE_VALUES:
