@@ -22,7 +22,7 @@ class HarmonicsSource(Measurement):
     the frame. Rectifiers draw such currents; h = 1: they go on as they were. At h = 0 the base
     model.
 
-    Source: Arrillaga, Watson 2003, Power System Harmonics, ch. 3: converters as sources of current.
+    Source: Arrillaga, Watson 2003, Power System Harmonics: converters as sources of current.
     Departures: a converter's harmonics follow its current and voltage; here they do not change with
     the event.
     """

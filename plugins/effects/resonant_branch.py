@@ -2,7 +2,7 @@
 
 from tractexp.extend import Effect, Parameter, plugin
 
-SOURCE = "Arrillaga, Watson 2003, Power System Harmonics, ch. 6: single-tuned filters"
+SOURCE = "Arrillaga, Watson 2003, Power System Harmonics: single-tuned filters"
 
 
 @plugin
@@ -28,7 +28,7 @@ class ResonantBranch(Effect):
     Not to be confused with `shunt_capacitor`, which has no reactance before it: it draws a peak at
     each edge of the voltage and rings with nothing.
 
-    Source: Arrillaga, Watson 2003, ch. 6; Kundur 1994, section 11.2.2 (shunt capacitors).
+    Source: Arrillaga, Watson 2003; Kundur 1994, section 11.2.2 (shunt capacitors).
     Departures: none.
     """
 

@@ -22,8 +22,8 @@ SOURCE = (
     " types of induction motor, from small industrial to air conditioners"
 )
 NOMINAL_SPEED = 2 * pi * 60  # rad/s, of the types
-# R_s, X_s, X_m, R_1, X_1 [pu of the rating], H [s]. Of these rows that of the water pump was found
-# again elsewhere, as the default of a public library's motor; the article itself was not at hand.
+# R_s, X_s, X_m, R_1, X_1 [pu of the rating], H [s]. The article itself was not at hand: R_s, X_s
+# and R_1 of the water pump were found again elsewhere, as defaults of a public library's motor.
 TYPES = (
     (0.031, 0.100, 3.20, 0.018, 0.180, 0.70),  # small industrial motor
     (0.013, 0.067, 3.80, 0.009, 0.170, 1.50),  # large industrial motor
