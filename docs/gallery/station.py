@@ -1,15 +1,13 @@
 """The dips of a station
 
-A folder of records: each dip with its depth and whether it is worth fitting; then those that are,
-fitted together, one held out to judge. In a terminal: tractexp survey records
+All dips of a folder, load by load: the constants of the machines, which all dips share, the share
+of the motors in each, and how well each dip was predicted by those before it. In a terminal:
+tractexp task=station data.path=records
 """
 
 import tractexp
 
-dips = tractexp.examples("records")
-table = tractexp.survey("records").to_frame()
-print(table[["file", "depth", "duration", "worth"]].to_string(index=False))
-search = {"name": "multistart_least_squares", "starts": 2}
-fit = tractexp.identify(dips[:2], validate=dips[2], optimizer=search, check_intervals=False)
-print(fit.screen())
-page = fit.report()
+tractexp.examples("records")
+station = tractexp.fit_station("records")
+print(station)
+page = station.report()

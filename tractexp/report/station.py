@@ -32,6 +32,7 @@ CONSTANTS_CAPTION = (
     " them run. Intervals: 95 %, by leaving out one dip at a time. Differs: by how much a constant"
     " varies from dip to dip beyond chance, of those that do."
 )
+MOST_NUMBERED = 20  # dips, each with a tick of its own
 TIME_CAPTION = (
     "Above: the model's error on each dip, of its response, as those before it predict it. Below:"
     " the motors' share of P in each dip, and what was expected of it. Crosses: left out."
@@ -256,16 +257,19 @@ def _draw_years(load: Mapping[str, Any]) -> Chart:
     numbered = enumerate(events, 1)
     x = np.array([_year(each["when"]) if dated else k for k, each in numbered])
     label = "year" if dated else "dip, by its number"
-    chart = Chart(label, ["error, as predicted [%]", "motors, of P [%]"], pixels=460)
+    chart = Chart(label, ["error [%]", "motors, of P [%]"], pixels=460)
+    if len(x) <= MOST_NUMBERED and not dated:
+        chart.ticks(None, x.tolist())
     odd = np.array([bool(event["odd"]) for event in events])
     told = [f"{event['event']}, {event['known']} dips before it" for event in events]
 
-    def add(name: str, key: str, some: np.ndarray, panel: int, symbol: str) -> None:
+    def add(
+        name: str, key: str, some: np.ndarray, panel: int, color: str, symbol: str = "circle"
+    ) -> None:
         values = np.array([event[key] for event in events], dtype=float)
         values = 100 * values
         here = np.flatnonzero(some & np.isfinite(values))
         hover = [f"{told[k]}: {values[k]:.3g} %" for k in here]
-        color = style.FAINT if key == "expected" else style.ACTIVE
         chart.points(
             name,
             x[here],
@@ -276,11 +280,11 @@ def _draw_years(load: Mapping[str, Any]) -> Chart:
             hover=hover,
         )
 
-    add("predicted", "predicted", ~odd, 0, "circle")
+    add("error as predicted", "predicted", ~odd, 0, style.ACTIVE)
     if odd.any():
-        add("left out", "predicted", odd, 0, "x")
-    add("of each dip", "share", ~odd, 1, "circle")
-    add("expected", "expected", ~odd, 1, "diamond-open")
+        add("left out", "predicted", odd, 0, style.ACTIVE, "x")
+    add("motors of each dip", "share", ~odd, 1, style.REACTIVE)
+    add("motors expected", "expected", ~odd, 1, style.FAINT, "diamond-open")
     return chart
 
 
