@@ -10,7 +10,7 @@ import pytest
 import tractexp
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.filetypes.cells import find_group_mark, numbers
+from tractexp.filetypes.cells import BadCell, find_group_mark, numbers
 from tractexp.filetypes.clock import times
 from tractexp.record import detect
 
@@ -304,3 +304,26 @@ def test_a_zone_is_told_where_times_are_turned_into_utc(read, zone, hours):
     is_the_dip(record, START - dt.timedelta(hours=hours))
     told = [note for note in record.notes if "told in UTC" in note]
     assert [f"those of UTC{zone}" in note for note in told] == [True] * (hours != 0)
+
+
+@pytest.mark.parametrize(
+    ("cell", "second"),
+    [
+        ("20240301T101530", 30.0),
+        ("20240301T101530.25", 30.25),
+        ("20240301T111530,5+01:00", 30.5),
+        ("20240301T101530Z", 30.0),
+        ("Fri Mar  1 10:15:30 2024", 30.0),
+        ("Fri Mar 1 10:15:30.75 2024", 30.75),
+    ],
+)
+def test_times_in_the_basic_form_and_of_asctime(cell, second):
+    found = times([cell])
+    assert found.start == START + dt.timedelta(seconds=second - 30)
+    assert found.begin == pytest.approx(10 * 3600 + 15 * 60 + second)
+
+
+@pytest.mark.parametrize("cell", ["20241301T101530", "20240301T1015", "Fri Foo 1 10:15:30 2024"])
+def test_what_only_looks_like_them_is_refused(cell):
+    with pytest.raises(BadCell):
+        times([cell])

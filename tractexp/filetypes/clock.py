@@ -1,7 +1,7 @@
 """Cells of a table as times by a clock, whatever way they are written.
 
 2024-03-31T01:59:59.900+01:00 31.03.2024 14:00:07,250 03/01/2024 10:15:30.25 PM 23:59:60.5
-14:00:07.25
+14:00:07.25 20240331T015959.9 Sun Mar 31 01:59:59 2024
 
 Clocks are set back and forth, in autumn and spring and otherwise, and have leap seconds; dates are
 written day before month, and month before day. What one cell leaves open, the column decides.
@@ -43,6 +43,12 @@ CLOCK = re.compile(
     r"(?P<s>\d{1,2}(?:[.,]\d*|(?<=:\d\d:\d\d):\d{3})?)"
     r"(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2}|[+-]\d{2})?\s*"
 )
+# times that are written otherwise, and how `CLOCK` knows them: the basic form of ISO 8601, and that
+# of C's asctime
+REWRITTEN = (
+    (re.compile(r"\s*(\d{8}T\d\d)(\d\d)(\d\d(?:[.,]\d+)?\S*)\s*"), r"\1:\2:\3"),
+    (re.compile(r"\s*[A-Z][a-z]{2} ([A-Z][a-z]{2}) +(\d+) ([\d:.]+) (\d{4})\s*"), r"\1 \2, \4 \3"),
+)
 DAY, HOUR = 86400.0, 3600.0  # s
 SWAPPED = 3.0  # steps: rows that go back by no more may have been exchanged
 # s: by more no clock is set back; rows that go farther back are of another record
@@ -80,7 +86,7 @@ class _Moment:
 def is_time(cell: Any) -> bool:
     """Whether a cell is a time of day or a date with one."""
     return isinstance(cell, dt.datetime | dt.time) or (
-        isinstance(cell, str) and CLOCK.fullmatch(cell) is not None
+        isinstance(cell, str) and _match_clock(cell) is not None
     )
 
 
@@ -205,9 +211,19 @@ def _read_object(cell: Any) -> _Moment | None:
     return _Moment(cell, 0.0) if isinstance(cell, dt.date) else None
 
 
+def _match_clock(cell: str) -> re.Match[str] | None:
+    """The parts of a text that is a time; None of one that is none."""
+    if (match := CLOCK.fullmatch(cell)) is not None:
+        return match
+    for pattern, usual in REWRITTEN:
+        if pattern.fullmatch(cell):
+            return CLOCK.fullmatch(pattern.sub(usual, cell))
+    return None
+
+
 def _read_text(cell: str, row: int) -> _Moment | None:
     """What a text says; None where it is no time. Raises `BadCell` for one with a wrong part."""
-    match = CLOCK.fullmatch(cell)
+    match = _match_clock(cell)
     if match is None:
         return None
     hours = int(match["h"] or 0)
