@@ -302,7 +302,7 @@ def test_an_interval_that_reaches_past_the_bounds_says_so():
     )
     half = np.array([0.02])
     inside, past = (
-        judge(information, np.array([0.0]), np.array([upper]), half, 1.96)["T_m"]
+        judge(information, np.array([0.0]), np.array([upper]), half, np.array([1.96]))["T_m"]
         for upper in (1.0, 0.51)
     )
     assert str(inside) == IDENTIFIED

@@ -153,6 +153,8 @@ def test_a_job_composes_and_its_records_are_read(arguments, desk, monkeypatch):
         pytest.importorskip(
             "hydra_plugins.hydra_optuna_sweeper", reason="the extra optuna is not installed"
         )
+    if "experiment=benchmark" in arguments:
+        pytest.importorskip("tractexp_suite", reason="benchmarks/suite is not installed")
     monkeypatch.chdir(desk)
     built = composed(arguments)
     words = " ".join(arguments)

@@ -9,13 +9,13 @@ if os.name == "nt":
     pytest.skip("forks", allow_module_level=True)
 
 
-@pytest.mark.parametrize("task", ["investigation", "export"])
+@pytest.mark.parametrize("task", ["discrepancy", "export"])
 def test_who_kills_a_command_leaves_the_earlier_files_or_the_new_ones(task, tmp_path, monkeypatch):
     import kills
 
     monkeypatch.chdir(tmp_path)
     with as_it_was({}):  # a command that runs in this process sets Hydra's switches
-        counts = getattr(kills, f"kill_{task}")(every=20)
+        counts = kills.KILLS[task](every=20)
     assert counts.keys() <= {kills.EARLIER, kills.NEWER}
     assert counts.total() > 3
     assert counts[kills.EARLIER] > 0

@@ -62,7 +62,6 @@ Tasks, chosen by task=NAME; {task} by default
 
 What else can be chosen, by GROUP=NAME (effects by model.effects=[NAME,...])
 {groups}
-
   tractexp list GROUP        every name of a group with a line on each; without GROUP, of all
 
 Values are changed by KEY=VALUE
