@@ -6,6 +6,7 @@ Files that a reader has are stood in for by shipped and made ones of the same na
 """
 
 import functools
+import importlib.metadata
 import re
 import shutil
 import subprocess
@@ -153,8 +154,9 @@ def test_a_job_composes_and_its_records_are_read(arguments, desk, monkeypatch):
         pytest.importorskip(
             "hydra_plugins.hydra_optuna_sweeper", reason="the extra optuna is not installed"
         )
-    if "experiment=benchmark" in arguments:
-        pytest.importorskip("tractexp_suite", reason="benchmarks/suite is not installed")
+    suite = list(importlib.metadata.distributions(name="tractexp-suite"))
+    if "experiment=benchmark" in arguments and not suite:
+        pytest.skip("benchmarks/suite is not installed")
     monkeypatch.chdir(desk)
     built = composed(arguments)
     words = " ".join(arguments)

@@ -8,8 +8,6 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-from tractexp.configuration import plugin
-
 PACKAGE = Path(__file__).parents[1]
 
 
@@ -62,6 +60,8 @@ def code() -> str:
 
 def folders() -> set[Path]:
     """The folders of this package and of those with plugins."""
+    from tractexp.configuration import plugin  # which imports NumPy
+
     return {PACKAGE, *(Path(path) for package in plugin.packages() for path in package.__path__)}
 
 

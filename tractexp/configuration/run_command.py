@@ -117,6 +117,11 @@ def group_of(key: str) -> str:
     return re.split(r"[./@]", key.lstrip("+~"), maxsplit=1)[0]
 
 
+def list_arguments() -> tuple[str, ...]:
+    """The arguments of the command line that this process was started by."""
+    return tuple(_started[1:])
+
+
 def command() -> str:
     """The command line of this run, to be typed again; "" where there was none, as from Python."""
     return quoting.shell(*_started)

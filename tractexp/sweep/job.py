@@ -13,6 +13,7 @@ from typing import Any
 from tractexp.api.task import Job, read_events, variant
 from tractexp.cli.chosen import collect_chosen_settings
 from tractexp.cli.configuration import list_named_files
+from tractexp.configuration import run_command
 from tractexp.errors import UserError
 from tractexp.storage import credentials, files
 from tractexp.storage.run_folder import RunFolder, find_holder, run_folder
@@ -58,6 +59,7 @@ class SweepJob:
     hydra: Any = None
     callbacks: Any = None  # of Hydra's, where there is `hydra`
     events: Any = None  # its records (`Events`), for a worker that cannot read them
+    command: tuple[str, ...] = ()  # the arguments of the sweep's command, for other processes
 
     @classmethod
     def from_composed(
@@ -83,6 +85,7 @@ class SweepJob:
             collect_chosen_settings(overrides, choices),
             composed.subdir,
             hydra=composed.hydra,
+            command=run_command.list_arguments(),
         )
 
     @property
@@ -214,6 +217,8 @@ def _run(job: SweepJob, place: RunFolder, measured: dict[str, float], logs: bool
     """Run the task, which notes what it measures; returns what went wrong, in one line, or ""."""
     from tractexp.cli.run import perform
 
+    if not run_command.command():  # in a process that no command started
+        run_command.remember_command([*job.command])
     try:
         parent, of_many = parent_of(folder_of(job.folder)), not job.alone
         about: Any = {
