@@ -4,7 +4,8 @@ For each interpreter an environment of its own, by uv, of the wheel of this clon
 sets of versions below; in an empty folder of it the main job, a sweep of two jobs on two workers
 and an investigation, each logged. A row is stored in versions.json, in the place of an earlier one
 of the same Python and set: the versions that were installed, and of each command "runs" or its last
-line. A set that this Python has no wheels of is "not installable", with why.
+line. A set that this Python has no wheels of is "not installable", with why. `--tables` writes
+docs/faq.md from the rows; that all commands ran in each is tested.
 """
 
 import argparse
@@ -17,8 +18,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import marked
+
 ROOT = Path(__file__).resolve().parents[1]
 ROWS = Path(__file__).with_suffix(".json")
+PAGE = ROOT / "docs" / "faq.md"
 TOLD = ("hydra-core", "omegaconf", "numpy", "scipy", "mlflow", "joblib")
 SETS: dict[str, Sequence[str]] = {  # arguments of `uv pip install` beside the wheel
     "oldest": ("-r", str(ROOT / ".ci" / "oldest.txt")),
@@ -88,13 +92,26 @@ def store(row: dict[str, Any]) -> None:
     ROWS.write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
+def text() -> str:
+    """The table of the page."""
+    rows = [row for row in json.loads(ROWS.read_text(encoding="utf-8")) if "versions" in row]
+    shown = TOLD[:-1]
+    return marked.table(
+        ["Python", *shown], [[row["python"], *map(row["versions"].get, shown)] for row in rows]
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--python", nargs="+", default=[sys.executable], metavar="PATH")
     parser.add_argument("--set", nargs="+", default=list(SETS), choices=SETS, metavar="NAME")
+    parser.add_argument("--tables", action="store_true", help="write the page, and run nothing")
     options = parser.parse_args()
+    if options.tables:
+        print(marked.replace(PAGE, "benchmarks/versions.py", text()))
+        return
     with tempfile.TemporaryDirectory() as there:
         wheel = build_wheel(Path(there))
         for python in options.python:

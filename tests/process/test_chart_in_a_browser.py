@@ -182,3 +182,22 @@ def test_a_button_goes_from_megawatts_to_per_unit_and_back(tmp_path):
     assert per_unit[3:5] == pytest.approx([10 / 49, 2], abs=1e-4)
     assert megawatts[3:5] == pytest.approx([27.5 * 10 / 49, 80], abs=1e-2)
     assert megawatts[5:] == per_unit[5:] == [True, "legendonly"]
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_a_click_is_answered_below_the_chart(tmp_path):
+    x = np.linspace(0, 1, 50)
+    chart = Chart("t [s]", ["P [pu]"]).line("P", x, x, BLUE)
+    chart.answers([(0.0, 0.5, "P: <b>early</b>"), (0.4, 1.0, "Q: late")])
+    script = """
+    const told = [], box = document.querySelector(".answer");
+    [0.2, 0.45, 0.9, 3].forEach(x => {
+      charts[0].emit("plotly_click", {points: [{x}]}); told.push(box.textContent); });
+    document.getElementById("told").textContent = JSON.stringify(told);"""
+    dom, complaints = drawn(Worked(Report("clicks").chart(chart, "one"), script), tmp_path)
+    assert complaints == []
+    told = json.loads(
+        re.search(r'id="told">(.*?)</p>', dom)[1].replace("&lt;", "<").replace("&gt;", ">")
+    )
+    early, late = "P: <b>early</b>", "Q: late"
+    assert told == [early, early + late, late, ""]

@@ -88,11 +88,19 @@ def test_options_may_stand_between_and_behind_settings(tmp_path):
 
 def test_folders_of_jobs_are_named_as_asked_and_found_again(tmp_path):
     named = ("-m", *QUICK, ONE, HERE, "hydra.sweep.subdir=${optimizer.name}/seed_${seed}")
-    assert run_command(*named, "seed=3,4", cwd=tmp_path).returncode == 0
+    variants = "optimizer=pso,ssa"
+    assert run_command(*named, variants, "seed=3,4", cwd=tmp_path).returncode == 0
     assert {p.parent.name for p in (tmp_path / "sweep" / "pso").glob("*/status.json")} == {
         "seed_3",
         "seed_4",
     }
+    compared = json.loads((tmp_path / "sweep" / "comparison.json").read_text())
+    assert sorted((run["variant"], run["seed"]) for run in compared["runs"]) == [
+        ("pso", 3),
+        ("pso", 4),
+        ("ssa", 3),
+        ("ssa", 4),
+    ]
     again = run_command(*named, "seed=3,4,5", cwd=tmp_path)
     assert "2 of them are finished and kept" in again.stdout
     one = run_command("-m", *QUICK, ONE, HERE, "hydra.sweep.subdir=all", "seed=6,7", cwd=tmp_path)

@@ -1,5 +1,6 @@
 """A page is one file that needs nothing else, whatever is written into it."""
 
+import re
 import warnings
 from xml.etree import ElementTree
 
@@ -97,6 +98,18 @@ def test_every_equation_of_the_model_is_typeset(tmp_path):
     reader = read(page.save(tmp_path / "page.html"))
     assert reader.tags.count("svg") == len(model.latex()) > 5
     assert "code" not in reader.tags
+
+
+def test_equations_of_a_page_share_the_outlines_of_letters(tmp_path):
+    page = Report("equations").equation("a + b").equation("b + c").equation("a + b")
+    text = page.save(tmp_path / "page.html").read_text(encoding="utf-8")
+    outlines, drawn = (
+        re.findall(rf'{mark}(Cm\w+-[0-9a-f]+)"', text) for mark in ('path id="', 'href="#')
+    )
+    assert len(outlines) == len({*outlines}) == 4  # a, b, c and the plus
+    assert {*drawn} == {*outlines}
+    assert len(drawn) == 9
+    read(tmp_path / "page.html")
 
 
 def test_latex_beyond_mathtext_is_shown_as_it_is(tmp_path):

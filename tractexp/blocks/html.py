@@ -18,6 +18,9 @@ from tractexp.storage import files
 from tractexp.text import quoting
 
 LONGEST_UNBROKEN_WORD = 14  # letters of a word that never needs a second line
+# of equations: a letter's outline in one of them, and where it is drawn
+OUTLINE = re.compile(r'<path id="f\d+-(Cm\w+-[0-9a-f]+)"( d="[^"]*"[^>]*/>)')
+DRAWN = re.compile(r'href="#f\d+-(Cm\w+-[0-9a-f]+)"')
 
 
 def page(report: Report) -> str:
@@ -34,11 +37,28 @@ def page(report: Report) -> str:
     style = files.read_packaged_text("blocks/page.css")
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
     draws = f"<script>{script()}</script>" if any(map(_draws, report.blocks)) else ""
-    body = "\n".join([top, *(_element(block, figures) for block in report.blocks), draws])
+    elements = "\n".join(_element(block, figures) for block in report.blocks)
+    body = "\n".join([top, _share_outlines(elements), draws])
     return (
         "<!DOCTYPE html>\n<html"
         f' lang="en"><head>{head}<style>{style}</style></head>\n<body>\n{body}\n</body></html>\n'
     )
+
+
+def _share_outlines(elements: str) -> str:
+    """Elements whose equations hold the outline of each letter once: a page of forty is half as
+    long.
+    """
+    known = set[str]()
+
+    def keep_first(outline: re.Match[str]) -> str:
+        name, rest = outline.groups()
+        if name in known:
+            return ""
+        known.add(name)
+        return f'<path id="{name}"{rest}'
+
+    return DRAWN.sub(r'href="#\1"', OUTLINE.sub(keep_first, elements))
 
 
 def frame(report: Report) -> str:

@@ -29,8 +29,8 @@ def answer_clicks(findings: Findings) -> list[list[Answer]]:
     drive, problem = context.drive, context.problem
     rows = [findings.evidence.base, *_choose_rows(findings)]
     names = [join_words(row.fit.names) for row in rows]
-    deviation = noise.deviation(drive)
-    left = [context.residuals(row.fit.unit[None], row.fit.names)[0] / deviation for row in rows]
+    deviation, fits = noise.deviation(drive), [row.reported_fit for row in rows]
+    left = [context.residuals(fit.unit[None], fit.names)[0] / deviation for fit in fits]
     answers: list[list[Answer]] = [[] for _ in problem.events]
     for window in residual_windows(problem):
         c = drive.labels.index(window.channel)

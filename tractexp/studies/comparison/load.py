@@ -14,6 +14,7 @@ from tractexp.errors import TASK, UserError
 from tractexp.identification.result import by_event, parse_history
 from tractexp.storage import files
 from tractexp.studies.comparison.runs import SearchRun
+from tractexp.tracking.sweepfile import folder_of
 
 FITTING = "identify"  # the task whose runs are compared
 # what a job's status.json says
@@ -59,9 +60,16 @@ def from_sweep(folder: Path) -> list[SearchRun]:
 
 
 def _jobs(folder: Path) -> list[Path]:
-    """Job folders, numbered ones in order of their number."""
-    jobs = [config.parents[1] for config in folder.glob("*/.hydra/config.yaml")]
-    return sorted(jobs, key=lambda job: (int(job.name) if job.name.isdigit() else np.inf, job.name))
+    """The folders of a sweep's own jobs, at any depth: `hydra.sweep.subdir` names them. Numbers are
+    in order.
+    """
+    found = (config.parents[1] for config in folder.rglob(".hydra/config.yaml"))
+    own = [job for job in found if job != folder and folder_of(job) == folder]
+    names = {job: job.relative_to(folder).parts for job in own}
+    return sorted(
+        (job for job in own if not any(name.startswith(".") for name in names[job])),
+        key=lambda job: [(int(n) if n.isdigit() else np.inf, n) for n in names[job]],
+    )
 
 
 def _job(folder: Path) -> SearchRun | None:
@@ -87,7 +95,7 @@ def _read_job(folder: Path) -> SearchRun | None:
         "data": choices["data"],
         "seed": int(config["seed"]),
         "config": flat(config),
-        "where": folder.name,
+        "where": folder.relative_to(folder_of(folder)).as_posix(),
         "folder": runtime.get("cwd", ""),
     }
     if unfinished:
