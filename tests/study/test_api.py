@@ -457,7 +457,7 @@ def test_every_call_has_the_door_and_every_result_a_picture():
             r" required",
         ):
             getattr(tractexp, name)(nonsense=1)
-    assert len(result_kinds()) == 16
+    assert len(result_kinds()) == 17
     for cls in result_kinds().values():
         assert issubclass(cls, Outcome)
         assert cls._repr_html_
