@@ -2,14 +2,16 @@
 
     python benchmarks/kills.py [--every N]        at every Nth call that changes the disk; 1
 
-An investigation is computed once, in a folder with the results of an identification. A copy of the
+Each long task is computed once, in a folder with the results of an identification. A copy of the
 process then writes what was found, and ends at the first such call; the next copy at the second,
-and so on. An export is done anew each time. Left may be the earlier files whole, or the new ones,
-to the bit: the counts of both go to kills.json, and the exit code says whether anything else was.
+and so on. An export, a survey and a station are done anew each time. Left may be the earlier files
+whole, or the new ones, to the bit: the counts of both go to kills.json, and the exit code says
+whether anything else was.
 """
 
 import argparse
 import contextlib
+import functools
 import io
 import itertools
 import os
@@ -37,7 +39,17 @@ from tractexp.storage.run_folder import LOCK, settle  # noqa: E402
 ALWAYS = ("tracking.enabled=false", "hydra.run.dir=run")
 IDENTIFY = ("optimizer=multistart_least_squares", "budget=200", *ALWAYS)
 EFFECTS = "task.effects=[stator_resistance]"
-INVESTIGATE = ("task=discrepancy", "data=tibet_30pct", EFFECTS, *ALWAYS)
+SEARCH = "optimizer=multistart_least_squares"
+# tasks whose results are written at their end
+LONG = {
+    "discrepancy": (EFFECTS,),
+    "profile": (SEARCH, "budget=200", "task.points=3"),
+    "plan": (),
+    "posterior": (SEARCH, "budget=200", "task.steps=60", "task.walkers=16"),
+    "linear_network": (),
+}
+FOLDERS = ("survey", "station")  # tasks that keep what they found of each file of a folder
+RESULTS = (".json", ".csv", ".html")  # of these, beside what is kept
 EXPORT = ("task=export", "task.format=modelica", *ALWAYS)
 EARLIER, NEWER = "the earlier, whole", "the newer, whole"
 State = dict[str, bytes]
@@ -87,8 +99,8 @@ def kill_each(do: Callable[[], object], folder: Path, every: int) -> Iterator[St
                 return
 
 
-def kill_investigation(every: int) -> Counter[str]:
-    """How often which files were left of those of an identification and an investigation."""
+def kill_long_task(task: str, every: int) -> Counter[str]:
+    """How often which files were left of those of an identification and a longer task."""
     run(*IDENTIFY)
     folder, left = Path("run").absolute(), []
     earlier, write = read_state(folder), Job.write
@@ -100,8 +112,37 @@ def kill_investigation(every: int) -> Counter[str]:
         return paths
 
     with mock.patch.object(Job, "write", write_and_end):
-        run(*INVESTIGATE)
+        run(f"task={task}", "data=tibet_30pct", *LONG[task], *ALWAYS)
     return count(left[:-1], earlier, left[-1])
+
+
+def kill_folder_task(task: str, every: int) -> Counter[str]:
+    """How often which results were left of a folder of two records, and of three."""
+    tractexp.examples("records")
+    last = Path("records", "dip3.cfg")
+    parts = sorted(Path("records").glob(f"{last.stem}.*"))
+    Path("kept").mkdir()
+    for part in parts:
+        part.rename(Path("kept", part.name))
+    folder = Path("run")
+    command = (f"task={task}", "data.path=records", "task.cores=1", *ALWAYS)
+    run(*command)
+    earlier = _select_results(read_state(folder))
+    for part in parts:
+        Path("kept", part.name).rename(part)
+    states = kill_each(lambda: run(*command), folder, every)
+    left = [_select_results(state) for state in states]
+    run(*command)
+    return count(left, earlier, _select_results(read_state(folder)))
+
+
+def _select_results(state: State) -> State:
+    """The files at the top of a folder that hold what a task came to."""
+    return {path: content for path, content in state.items() if _is_result(path)}
+
+
+def _is_result(path: str) -> bool:
+    return "/" not in path and path.endswith(RESULTS)
 
 
 def kill_export(every: int) -> Counter[str]:
@@ -135,10 +176,18 @@ def count(states, earlier: State, newer: State) -> Counter[str]:
 def perform(every: int) -> dict[str, Counter[str]]:
     """The counts of each command, in a folder that goes."""
     found = {}
-    for name, kill in {"discrepancy": kill_investigation, "export": kill_export}.items():
+    for name, kill in KILLS.items():
         with tempfile.TemporaryDirectory() as place, contextlib.chdir(place):
             found[name] = kill(every)
+            print(name, found[name], flush=True)
     return found
+
+
+KILLS: dict[str, Callable[[int], Counter[str]]] = {
+    **{task: functools.partial(kill_long_task, task) for task in LONG},
+    **{task: functools.partial(kill_folder_task, task) for task in FOLDERS},
+    "export": kill_export,
+}
 
 
 if __name__ == "__main__":
@@ -146,5 +195,4 @@ if __name__ == "__main__":
     asked.add_argument("--every", type=int, default=1)
     counts = perform(asked.parse_args().every)
     files.write_json(Path(__file__).with_suffix(".json"), counts)
-    print(counts)
     sys.exit(any(name.startswith("neither") for one in counts.values() for name in one))
