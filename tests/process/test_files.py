@@ -340,6 +340,7 @@ READ = {
     "tractexp/kernel/kernel.py": {"json.loads": "the store"},
     "tractexp/cache/store.py": {"np.load": "the store; nothing is unpickled"},
     "tractexp/api/survey.py": {"json.loads": "entries with their sums"},
+    "tractexp/api/station.py": {"json.loads": "entries with their sums"},
     "tractexp/sweep/hydra_groups.py": {"json.loads": "the store"},
     "tractexp/studies/search_store.py": {"json.loads": "the store"},
     "tractexp/sweep/job.py": {"json.loads": "its own text"},

@@ -97,7 +97,7 @@ def _add_equation(document: Any, latex: str, path: Path) -> None:
     if not drawn:
         document.add_paragraph(latex)
         return
-    path.write_bytes(drawn)
+    files.write(path, drawn)
     _add_picture(document, path, EQUATION_HEIGHT)
 
 
