@@ -4,9 +4,10 @@
 
 Each long task is computed once, in a folder with the results of an identification. A copy of the
 process then writes what was found, and ends at the first such call; the next copy at the second,
-and so on. An export, a survey and a station are done anew each time. Left may be the earlier files
-whole, or the new ones, to the bit: the counts of both go to kills.json, and the exit code says
-whether anything else was.
+and so on. An export, a survey and a station are done anew each time; of the latter two the results
+are looked at, beside which an earlier page may stand until theirs is drawn. Left may be the earlier
+files whole, or the new ones, to the bit: the counts of both go to kills.json, and the exit code
+says whether anything else was.
 """
 
 import argparse
@@ -45,11 +46,11 @@ LONG = {
     "discrepancy": (EFFECTS,),
     "profile": (SEARCH, "budget=200", "task.points=3"),
     "plan": (),
-    "posterior": (SEARCH, "budget=200", "task.steps=60", "task.walkers=16"),
+    "posterior": (SEARCH, "budget=200", "task.steps=100", "task.walkers=16"),
     "linear_network": (),
 }
 FOLDERS = ("survey", "station")  # tasks that keep what they found of each file of a folder
-RESULTS = (".json", ".csv", ".html")  # of these, beside what is kept
+RESULTS = (".json", ".csv")  # of these, beside what is kept; their page is drawn afterwards
 EXPORT = ("task=export", "task.format=modelica", *ALWAYS)
 EARLIER, NEWER = "the earlier, whole", "the newer, whole"
 State = dict[str, bytes]
