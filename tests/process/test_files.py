@@ -338,9 +338,10 @@ READ = {
     "tractexp/cache/provenance.py": {"read_bytes": "code"},
     "tractexp/model/model.py": {"json.loads": "the store, whose entries are its own"},
     "tractexp/kernel/kernel.py": {"json.loads": "the store"},
-    "tractexp/cache/store.py": {"np.load": "the store; nothing is unpickled"},
-    "tractexp/api/survey.py": {"json.loads": "entries with their sums"},
-    "tractexp/api/station.py": {"json.loads": "entries with their sums"},
+    "tractexp/cache/store.py": {
+        "np.load": "the store; nothing is unpickled",
+        "json.loads": "entries with their sums",
+    },
     "tractexp/sweep/hydra_groups.py": {"json.loads": "the store"},
     "tractexp/studies/search_store.py": {"json.loads": "the store"},
     "tractexp/sweep/job.py": {"json.loads": "its own text"},

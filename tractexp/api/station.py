@@ -2,7 +2,6 @@
 to dip, and how well each dip was predicted by those before it.
 """
 
-import json
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
 from tractexp.api.look import Listed
-from tractexp.api.station_load import FEWEST_DIPS, LoadJob, fit_load, read_files, store_dips
+from tractexp.api.station_load import FEWEST_DIPS, LoadJob, fit_load, read_files
 from tractexp.api.survey import survey
 from tractexp.api.surveying import keys
 from tractexp.api.task import Job, Task, call
@@ -214,16 +213,14 @@ def _read_dips(
         wanted[row["file"]].append(row["event"])
     own = keys(folder, [folder / file for file in wanted])
     store = Store(DIPS, folder=keep or Path())
-    by_file = {}
-    if keep:
-        stored = {file: store.read(own[file]) for file in wanted}
-        by_file = {file: json.loads(entry) for file, entry in stored.items() if entry is not None}
+    entries = {file: store.read_json(own[file]) for file in wanted} if keep else {}
+    by_file = {file: entry for file, entry in entries.items() if entry is not None}
     fresh = {file: names for file, names in wanted.items() if file not in by_file}
     with count_parts("files with dips", len(fresh), progress) as count:
         for file, read in read_files(folder, fresh, workers):
             by_file[file] = read
             if keep:
-                store_dips(store, own[file], read)
+                store.write_json(own[file], files.plain(read))
             count()
     return {
         name: {**one, "key": own[file]}
@@ -282,8 +279,8 @@ def _fit_loads(
         key(environment(), job.load, job.station, job.keys, job.model) if keep else ""
         for job in jobs
     ]
-    entries = [store.read(name) for name in names]
-    found = {k: json.loads(entry) for k, entry in enumerate(entries) if entry is not None}
+    entries = enumerate(map(store.read_json, names))
+    found = {k: entry for k, entry in entries if entry is not None}
     fresh = [k for k in range(len(jobs)) if k not in found]
     position = {id(jobs[k]): k for k in fresh}
     with count_parts("loads", len(fresh), progress) as count:
@@ -292,7 +289,7 @@ def _fit_loads(
             killed = "the program was killed at this load, as where the memory is too small for it"
             found[k] = told or {"load": job.load, "station": job.station, "why": killed}
             if told:
-                store.write(names[k], json.dumps(told, ensure_ascii=False).encode())
+                store.write_json(names[k], told)
             count()
     return [found[k] for k in range(len(jobs))]
 

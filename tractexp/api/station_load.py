@@ -3,7 +3,6 @@ data.
 """
 
 import functools
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -15,7 +14,6 @@ import numpy as np
 from tractexp.api.compose import LoadModel, Portable
 from tractexp.api.identify import Identification
 from tractexp.api.read import record_from_dict, record_to_dict
-from tractexp.cache.store import Store
 from tractexp.errors import UserError
 from tractexp.identification.composition import (
     Composition,
@@ -96,12 +94,6 @@ def read_files(
     killed = "the program was killed at this file, as where the memory is too small for it"
     for (file, names), read in workers.results(reading, list(wanted.items())):
         yield file, read or [{"why": killed} for _ in names]
-
-
-def store_dips(store: Store, key: str, read: Sequence[Read]) -> None:
-    """Keep what was read of a file."""
-    plain = [files.plain(one) for one in read]
-    store.write(key, json.dumps(plain, ensure_ascii=False).encode())
 
 
 def fit_load(job: LoadJob) -> dict[str, Any]:

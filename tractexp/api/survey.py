@@ -2,7 +2,6 @@
 fitting.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -184,15 +183,13 @@ def survey(
     if not paths:
         raise UserError(f"{DATA.path}={folder} holds no file that can be read")
     store, names = Store(ROWS, folder=Path(keep or "")), keys(place, paths)
-    entries = {name: store.read(key) for name, key in names.items()} if keep else {}
-    rows = {name: json.loads(entry) for name, entry in entries.items() if entry is not None}
+    entries = {name: store.read_json(key) for name, key in names.items()} if keep else {}
+    rows = {name: entry for name, entry in entries.items() if entry is not None}
     fresh = [name for name in names if name not in rows]
     with count_parts("files", len(fresh), progress) as count:
         for name, fresh_rows in look_at_files(place, fresh, cores or -1):
             rows[name] = files.plain(fresh_rows)
-            store.write(
-                names[name] if keep else "", json.dumps(rows[name], ensure_ascii=False).encode()
-            )
+            store.write_json(names[name] if keep else "", rows[name])
             count()
     content = {
         "folder": str(folder),

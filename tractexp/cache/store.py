@@ -16,6 +16,7 @@ import hashlib
 import hmac
 import importlib.metadata
 import io
+import json
 import os
 import platform
 import re
@@ -78,6 +79,15 @@ class Store:
             if self.limit is not None and self._written % (1 + self.limit // 64) == 0:
                 self._forget(path.parent, self.limit)
             self._written += 1
+
+    def read_json(self, key: str) -> Any:
+        """The plain data of an entry; None where there is none."""
+        content = self.read(key)
+        return None if content is None else json.loads(content)
+
+    def write_json(self, key: str, content: Any) -> None:
+        """Write an entry of plain data."""
+        self.write(key, json.dumps(content, ensure_ascii=False).encode())
 
     def get(self, key: str, compute: Callable[[], bytes]) -> bytes:
         """The content of an entry, computed and written where there is none."""
