@@ -102,7 +102,7 @@ def test_a_motor_of_another_size_has_the_same_constants():
     dips = [draw_dip(k) for k in (0, 5)]
     fit = fit_dips(LoadSpec("load", tractexp.compose().model, {}, {}), dips)
     names = [fit.problem.space.names[k] for k in fit.problem.constants]
-    found = dict(zip(names, fit.problem.on_own_power(fit.constants), strict=True))
+    found = dict(zip(names, fit.constants * fit.problem.scale_to_own_power, strict=True))
     assert found["X_prime"] == pytest.approx(0.15, rel=0.05)
     assert found["M"] == pytest.approx(0.011, rel=0.05)
     assert fit.torques == pytest.approx([0.4, 0.6], abs=0.01)

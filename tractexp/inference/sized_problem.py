@@ -87,13 +87,11 @@ class SizedProblem(Problem):
         rows = SeparableColumns.of_power(self.drive, None).rows
         return SeparableColumns(self.shares[:, None], rows)
 
-    def on_own_power(self, values: np.ndarray) -> np.ndarray:
-        """Values (k,) of the constants on the base of what the motors draw themselves."""
-        return values * self.scale_to_own_power
-
     @property
     def scale_to_own_power(self) -> np.ndarray:
-        """What the constants (k,) are multiplied by for that base."""
+        """What the constants (k,) are multiplied by for the base of what the motors draw
+        themselves.
+        """
         names = [self.space.names[k] for k in self.constants]
         exponents = dict(zip(self.model.names, self.exponents.tolist(), strict=True))
         return self.reference ** -np.array([exponents[name] for name in names], dtype=float)
