@@ -17,7 +17,7 @@ from tractexp.configuration.overrides import build_typed_command
 from tractexp.configuration.plugin import discover, get, plugin
 from tractexp.errors import DATA, UserError, check_range
 from tractexp.outcome import Written
-from tractexp.record import detect
+from tractexp.record import detect, measure_promise
 from tractexp.recording import archive
 from tractexp.recording.record_files import find_records
 from tractexp.report import survey as shown
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 ROWS = "rows"  # in the folder of `keep`: an entry for each file that was looked at
 # events that are read again to be ranked: those of the greatest depth over noise
 MOST_RANKED_EVENTS = 300
-LEAST_NOISE = 1e-4  # of P: what shows less is not told from what shows so much
 PICTURES = ("U_picture", "P_picture")
 ABOUT = {
     "event": "FILE#LOAD.DIP, as data.train takes it",
@@ -220,8 +219,8 @@ def survey(
 
 
 def _promise(row: Mapping[str, Any]) -> float:
-    """How much an event may tell: its depth over its noise."""
-    return (row["depth"] or 0.0) / max(row["noise"] or 0.0, LEAST_NOISE)
+    """How much the event of a row may tell."""
+    return measure_promise(row["depth"], row["noise"])
 
 
 def _best(

@@ -25,12 +25,11 @@ from tractexp.inference.prediction_band import PredictionBand, measure_band
 from tractexp.inference.sized_problem import SizedProblem
 from tractexp.model.model import Model
 from tractexp.noise.color import SMALLEST_DEVIATION
-from tractexp.record import Event
+from tractexp.record import Event, measure_promise
 
 MOST_BEGUN = 4  # dips that the first fit, from all over the box, is made to
 # dips that constants are fitted to, those of the greatest depth over noise
 MOST_FITTED_DIPS = 300
-LEAST_SHARE_OF_NOISE = 1e-4  # of P: what shows less noise is not told from what shows so much
 TRIED_TORQUES = 9  # in the range of the torque, at which each dip is tried first
 FEWEST_JUDGED_DIPS = 5  # of which one can be odd
 # an odd dip is missed by so much of its response, by so many times the median error, and lies so
@@ -51,7 +50,7 @@ class Dip:
     @property
     def promise(self) -> float:
         """How much it may tell: its depth over its noise."""
-        return self.event.depth / max(self.event.noise_share or 0.0, LEAST_SHARE_OF_NOISE)
+        return measure_promise(self.event.depth, self.event.noise_share)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from tractexp.record.event import Event as Event
 from tractexp.record.event import describe as describe
 from tractexp.record.event import detect as detect
+from tractexp.record.event import measure_promise as measure_promise
 from tractexp.record.fall import find_dips as find_dips
 from tractexp.record.own_base import OwnBase as OwnBase
 from tractexp.record.own_base import on_own_base as on_own_base
