@@ -82,13 +82,18 @@ def dask(folder: Path, workers: int, jobs: int) -> Iterator[tuple[str, ...]]:
         yield "hydra/launcher=dask", f"hydra.launcher.address={cluster.scheduler_address}"
 
 
-@contextlib.contextmanager
-def slurm(folder: Path, workers: int, jobs: int) -> Iterator[tuple[str, ...]]:
-    """A job array with so many tasks, each with its share of the jobs."""
+def write_commands(folder: Path) -> None:
+    """Write the commands of a SLURM that is this computer."""
     for name, body in COMMANDS.items():
         head = f"#!{sys.executable}\nimport os, pathlib, re, subprocess, sys\n"
         (path := folder / name).write_text(head + body)
         path.chmod(0o755)
+
+
+@contextlib.contextmanager
+def slurm(folder: Path, workers: int, jobs: int) -> Iterator[tuple[str, ...]]:
+    """A job array with so many tasks, each with its share of the jobs."""
+    write_commands(folder)
     before = os.environ["PATH"]
     os.environ["PATH"] = os.pathsep.join([str(folder), before])
     try:

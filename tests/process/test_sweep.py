@@ -518,41 +518,16 @@ def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged,
         assert results(tmp_path / f"sweep{k}") == first
 
 
-SLURM = {  # commands of a cluster that is this computer
-    "sbatch": """
-script = pathlib.Path(sys.argv[-1])
-last = int(re.search(r"--array=0-([0-9]+)", script.read_text())[1])
-one = dict.fromkeys(("NODEID", "PROCID", "LOCALID"), "0")
-one |= {"JOB_NUM_NODES": "1", "NTASKS": "1", "JOB_NODELIST": "here", "ARRAY_JOB_ID": "9"}
-for k in range(last + 1):
-    own = {**one, "ARRAY_TASK_ID": str(k), "JOB_ID": str(9 + k)}
-    names = {f"SLURM_{name}": text for name, text in own.items()}
-    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    subprocess.Popen(["bash", script], env={**os.environ, **names}, **silent)
-print("Submitted batch job 9")
-""",
-    "srun": """
-options = {"--unbuffered": 1, "--output": 2, "--error": 2}
-words = sys.argv[1:]
-while words[0] in options:
-    del words[:options[words[0]]]
-os.execv(words[0], words)
-""",
-    "sacct": 'print("JobID|State|NodeList")',
-}
-
-
 @needs_submitit
 def test_submitit_runs_jobs_in_tasks_isolates_a_failure_and_logs_below_the_parent(
     site, tmp_path, uri, monkeypatch
 ):
     """Three jobs in two tasks; one that fails does not touch the next in its task."""
+    import clusters
+
     commands = tmp_path / "commands"
     commands.mkdir()
-    for name, body in SLURM.items():
-        head = f"#!{sys.executable}\nimport os, pathlib, re, subprocess, sys\n"
-        (commands / name).write_text(head + body)
-        (commands / name).chmod(0o755)
+    clusters.write_commands(commands)
     monkeypatch.setenv("PATH", os.pathsep.join([str(commands), os.environ["PATH"]]))
     launcher = ("hydra/launcher=slurm", "hydra.launcher.timeout_min=3")
     sweep = ("-m", "budget=200", *launcher, "hydra.launcher.jobs_per_task=2", HERE)
