@@ -18,7 +18,7 @@ from tractexp.record.steadiness import steady_part
 from tractexp.record.swing import Swing, find_swing
 
 NO_POWER = 1e-9  # pu: nothing is a share of less
-LEAST_NOISE_SHARE = 1e-4  # of P: what shows less noise is not told from what shows so much
+LEAST_TOLD_NOISE = 1e-4  # of P: what shows less noise is not told from what shows so much
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ def noise(t: np.ndarray, values: np.ndarray) -> float:
 
 def measure_promise(depth: float | None, noise_share: float | None) -> float:
     """How much an event may tell: its depth over its noise, the share of P."""
-    return (depth or 0.0) / max(noise_share or 0.0, LEAST_NOISE_SHARE)
+    return (depth or 0.0) / max(noise_share or 0.0, LEAST_TOLD_NOISE)
 
 
 def detect(record: Record) -> Event:
