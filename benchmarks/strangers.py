@@ -1,8 +1,9 @@
 """Loads of simulators that nobody here wrote, as judges of names: python benchmarks/strangers.py
-[--count 30] [--minutes 9] [--tables]
+[--count 60] [--minutes 9] [--simulator DPsim] [--tables]
 
-Loads of motulator (`strangers_motulator`) and of ANDES (`andes_loads`) in turn, three dips each of
-which the last is held out, with noise of 0.05 to 1 %. What a load has that the base model lacks is
+Loads of motulator, ANDES, DPsim and HERMESS (`strangers_motulator`, `andes_loads`,
+`strangers_dpsim`, `strangers_hermess`) in turn, three dips each of which the last is held out, with
+noise of 0.05 to 1 %. `--simulator` takes those of one. What a load has that the base model lacks is
 known. What is said of it is *right* where every effect named is there, a *class* where that holds
 for one of the sets that are tied, *silent* where nothing is named though something is missing.
 Where nothing is missing to say nothing is *rightly silent*, and to say that something is, without a
@@ -14,6 +15,7 @@ import argparse
 import itertools
 import json
 import os
+import subprocess
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -25,8 +27,11 @@ for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 import andes_loads  # noqa: E402
+import hidden_effects_evidence as evidence  # noqa: E402
 import marked  # noqa: E402
 import numpy as np  # noqa: E402
+import strangers_dpsim as dpsim  # noqa: E402
+import strangers_hermess as hermess  # noqa: E402
 import strangers_motulator as motulator  # noqa: E402
 
 from hidden_effects.noise import Noise  # noqa: E402
@@ -39,6 +44,8 @@ LEVELS = (0.0005, 0.01)  # pu, of the noise of P and Q
 RIGHT, CLASS, SILENT, WRONG = "right", "class", "silent", "wrong"
 RIGHTLY_SILENT, DOUBTED = "rightly silent", "doubted"
 OUTCOMES = (RIGHT, CLASS, RIGHTLY_SILENT, SILENT, DOUBTED, WRONG)
+BESIDE = {"DPsim": dpsim, "HERMESS": hermess}  # what is beside a machine of motulator's
+SIMULATORS = ("motulator", "ANDES", *BESIDE)
 Columns = dict[str, np.ndarray]
 
 
@@ -59,13 +66,16 @@ class Stranger:
 
 
 def make_strangers() -> Iterator[tuple[int, str]]:
-    """Numbers and simulators in turn, without end."""
-    return zip(itertools.count(), itertools.cycle(("motulator", "ANDES")))
+    """Numbers and simulators in turn, without end; those of ANDES and HERMESS are odd."""
+    for number in itertools.count(0, 2):
+        yield from ((number + k % 2, name) for k, name in enumerate(SIMULATORS))
 
 
 def make_stranger(number: int, simulator: str) -> Stranger:
     """The load of this number. Raises what its simulator raises where there is none."""
     rng = andes_loads.generator(SERIES, number, simulator)
+    if simulator in BESIDE:
+        return make_beside(number // 2, simulator, rng)
     make = make_machine if simulator == "motulator" else make_system
     return make(number // 2, rng)
 
@@ -84,6 +94,16 @@ def make_machine(number: int, rng: np.random.Generator) -> Stranger:
     truth = motulator.KINDS[kind] + (() if whole else motulator.ALWAYS)
     outside = kind in motulator.OUTSIDE
     return Stranger("motulator", kind, model, motulator.FREQUENCY, dips, truth, outside)
+
+
+def make_beside(number: int, simulator: str, rng: np.random.Generator) -> Stranger:
+    """A load of another simulator beside a machine, which the base model has."""
+    own = BESIDE[simulator]
+    kind = list(own.KINDS)[number % len(own.KINDS)]
+    load = own.draw_load(kind, rng)
+    dips = [own.record_dip(load, dip) for dip in motulator.draw_dips(rng, DIPS, jumps=False)]
+    model, outside = "fifth_order_stator_flux", kind in own.OUTSIDE
+    return Stranger(simulator, kind, model, motulator.FREQUENCY, dips, own.KINDS[kind], outside)
 
 
 def make_system(number: int, rng: np.random.Generator) -> Stranger:
@@ -106,7 +126,7 @@ def judge_stranger(number: int, simulator: str) -> dict[str, Any]:
     """
     import tractexp
 
-    row: dict[str, Any] = {"number": number, "simulator": simulator}
+    row: dict[str, Any] = {"number": number, "simulator": simulator, "version": find_version()}
     try:
         stranger = make_stranger(number, simulator)
     except (andes_loads.StalledMotor, RuntimeError, ArithmeticError) as error:
@@ -131,6 +151,12 @@ def judge_stranger(number: int, simulator: str) -> dict[str, Any]:
     return row | {"seconds": sum(os.times()[:4]) - begun}
 
 
+def find_version() -> str:
+    """The commit whose product judges."""
+    git = ("git", "-C", str(STORED.parent), "rev-parse", "--short=8", "HEAD")
+    return subprocess.run(git, capture_output=True, text=True, check=True).stdout.strip()
+
+
 def rate(told: dict[str, Any], truth: tuple[str, ...], outside: bool) -> str:
     """What a verdict is worth; a candidate is a name."""
     if told["verdict"] in ("none", "unexplained"):
@@ -144,14 +170,25 @@ def rate(told: dict[str, Any], truth: tuple[str, ...], outside: bool) -> str:
 
 
 def make_tables(rows: list[dict[str, Any]]) -> str:
-    """A row a simulator and kind of load, Markdown."""
+    """A row a simulator and kind of load, then of all together how many say nothing wrong and how
+    many are named wrongly, with intervals; Markdown.
+    """
     judged = [row for row in rows if "outcome" in row]
     groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
     for row in judged:
         groups.setdefault((row["simulator"], row["kind"]), []).append(row)
     lines = [[*group, len(own), *count_outcomes(own)] for group, own in sorted(groups.items())]
     lines.append(["all", "", len(judged), *count_outcomes(judged)])
-    return marked.table(["simulator", "load", "sets", *OUTCOMES], lines)
+    wrong = sum(row["outcome"] == WRONG for row in judged)
+    doubted = sum(row["outcome"] == DOUBTED for row in judged)
+    shares = (
+        ("right, class or silent", len(judged) - wrong - doubted),
+        ("no wrong name", len(judged) - wrong),
+        ("wrong", wrong),
+    )
+    told = [f"{what}: {evidence.share(count, len(judged))}" for what, count in shares]
+    table = marked.table(["simulator", "load", "sets", *OUTCOMES], lines)
+    return f"{table}\n\n{'; '.join(told)}"
 
 
 def count_outcomes(rows: list[dict[str, Any]]) -> list[int]:
@@ -169,8 +206,9 @@ def read_rows() -> list[dict[str, Any]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--count", type=int, default=30)
+    parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further set after")
+    parser.add_argument("--simulator", choices=SIMULATORS, help="default: all in turn")
     parser.add_argument("--tables", action="store_true", help="print the stored rows' table")
     asked = parser.parse_args()
     rows = read_rows()
@@ -178,7 +216,8 @@ def main() -> None:
         done = {(row["number"], row["simulator"]) for row in rows}
         end = time.monotonic() + 60 * asked.minutes
         for number, simulator in itertools.islice(make_strangers(), asked.count):
-            if (number, simulator) in done or time.monotonic() > end:
+            is_asked = asked.simulator in (None, simulator)
+            if not is_asked or (number, simulator) in done or time.monotonic() > end:
                 continue
             row = judge_stranger(number, simulator)
             rows.append(row)

@@ -173,12 +173,33 @@ def draw_dips(rng: np.random.Generator, count: int, jumps: bool) -> list[Dip]:
 
 def record_dip(load: tuple[list[Machine], list[float], Any], dip: Dip) -> dict[str, np.ndarray]:
     """Columns t [s], U, P, Q [pu], f [Hz] (N,) of one-cycle phasors, without noise."""
-    machines, shares, static = load
-    t = np.arange(round((BEFORE + AFTER) * FINE)) / FINE - BEFORE
+    _, _, static = load
+    t = find_times()
     u = dip.find_voltage(t)
+    i = play_machines(load, dip.find_voltage, t) + np.conj(static(np.abs(u)) / u)
+    return sample_phasors(t, u, i)
+
+
+def find_times() -> np.ndarray:
+    """The times (N,) [s] at which a simulator tells voltage and current."""
+    return np.arange(round((BEFORE + AFTER) * FINE)) / FINE - BEFORE
+
+
+def play_machines(
+    load: tuple[list[Machine], list[float], Any],
+    voltage: Callable[[np.ndarray], np.ndarray],
+    t: np.ndarray,
+) -> np.ndarray:
+    """The current (N,) [pu] of a load's machines at times t (N,) in the frame of the voltage."""
+    machines, shares, _ = load
     pairs = zip(machines, shares, strict=True)
-    i = sum(share * one.play(dip.find_voltage, t) for one, share in pairs)
-    i = i + np.conj(static(np.abs(u)) / u)
+    return np.sum([share * one.play(voltage, t) for one, share in pairs], axis=0)
+
+
+def sample_phasors(t: np.ndarray, u: np.ndarray, i: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns t [s], U, P, Q [pu], f [Hz] (N,) of one-cycle phasors of voltage and current [pu] at
+    the times of `find_times`, in the frame that turns with nominal frequency.
+    """
     cycle = round(FINE / FREQUENCY)
     middle = np.arange(cycle // 2, len(t) - cycle // 2, round(FINE / RATE))
     U, current = (average(x, cycle)[middle - cycle // 2] for x in (u, i))

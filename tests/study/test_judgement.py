@@ -263,3 +263,12 @@ def test_a_name_counts_by_label_and_by_class(sets, right, by_class, wrong, wrong
         assert judgement_pooled.is_right(one, by_class=True) == by_class
         assert judgement_pooled.is_wrong(one) == wrong
         assert judgement_pooled.is_wrong(one, by_class=True) == wrong_by_class
+
+
+def test_what_makes_a_load_inexact_is_there_by_class():
+    """A torque that depends on the speed is in every such load; a power limit in none."""
+    row = {"group": "null, error 1%", "label": "error 1%", "truth": [], "verdict": "named"}
+    for names, wrong in ((["speed_dependent_torque"], False), (["dc_link_lag"], True)):
+        said = row | {"sets": [names]}
+        assert judgement_pooled.is_wrong(said)
+        assert judgement_pooled.is_wrong(said, by_class=True) == wrong

@@ -1,8 +1,12 @@
 """Loads of other simulators as judges: what their machines draw, and what a verdict is worth."""
 
+import itertools
+
 import numpy as np
 import pytest
 import strangers
+import strangers_dpsim as dpsim
+import strangers_hermess as hermess
 import strangers_motulator as motulator
 
 
@@ -27,10 +31,11 @@ def test_what_a_verdict_is_worth(verdict, sets, truth, outside, worth):
 
 
 def test_a_load_of_each_simulator_is_drawn_from_its_own_numbers():
-    first = list(zip(range(4), strangers.make_strangers(), strict=False))
-    assert [one for _, one in first] == [
+    assert [*itertools.islice(strangers.make_strangers(), 6)] == [
         (0, "motulator"),
         (1, "ANDES"),
+        (0, "DPsim"),
+        (1, "HERMESS"),
         (2, "motulator"),
         (3, "ANDES"),
     ]
@@ -49,3 +54,32 @@ def test_a_machine_of_motulator_stands_still_before_the_dip_and_recovers(kind):
     assert record["U"].min() == pytest.approx(1 - dip.depth, abs=1e-3)
     assert record["P"][-1] == pytest.approx(record["P"][0], rel=0.01)
     assert np.ptp(record["f"]) > 0.1  # of the jump
+
+
+@pytest.mark.parametrize(
+    ("module", "package", "kind"),
+    [(dpsim, "dpsimpy", "saturable core"), (hermess, "hermess", "compensator")],
+)
+def test_a_load_beside_a_machine_rests_before_the_dip_and_returns(module, package, kind):
+    pytest.importorskip("motulator")
+    pytest.importorskip(package)
+    record = module.record_dip(
+        module.draw_load(kind, np.random.default_rng(3)), motulator.Dip(0.3, 0.113, 0.0)
+    )
+    before = record["t"] < -0.02
+    for name in ("U", "P", "Q"):
+        assert np.ptp(record[name][before]) < 1e-4, name
+    assert record["U"].min() == pytest.approx(0.7, abs=0.02)
+    assert record["P"][-1] == pytest.approx(record["P"][0], rel=0.01)
+    after = record["Q"][record["t"] > 0.14]
+    assert np.ptp(after) > 0.2  # inrush, or what the compensator gives too much
+
+
+def test_tables_tell_shares_with_intervals():
+    rows = [
+        {"simulator": "DPsim", "kind": "core", "outcome": outcome}
+        for outcome in ("right", "right", "doubted", "wrong")
+    ] + [{"simulator": "DPsim", "refused": "UserError: no"}]
+    told = strangers.make_tables(rows)
+    assert "right, class or silent: 50.0% (7%-93%)" in told
+    assert "wrong: 25.0% (1%-81%)" in told
