@@ -59,6 +59,7 @@ RECORDS = {
 
 
 @pytest.mark.parametrize("name", RECORDS)
+@pytest.mark.usefixtures("no_proposal")
 def test_the_base_model_has_one_error_one_grade_and_one_sentence(name):
     train, validate = RECORDS[name]()
     alone = tractexp.identify(train, validate=validate, check_intervals=False, progress=False)

@@ -8,15 +8,16 @@ start). The loudest shape is fitted as the noise lets it be seen, taken away, an
 looked for. f = 0 is a decay, and a step where tau is infinite too.
 """
 
+import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tractexp.domain import domain_of
+from tractexp.inference.recursion import sum_with_decay
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 from tractexp.noise.color import FEWEST_NOISE_SAMPLES, SMALLEST_DEVIATION
@@ -30,6 +31,10 @@ FREQUENCIES = 512  # tried at most with each of them
 HIGHEST_RELATIVE_FREQUENCY = 0.45  # of the sampling rate
 SHORTEST_SHAPE = 8  # samples of a shape
 POLISH_ROUNDS = 2  # of polishing the frequency and the decay, then the start
+NEIGHBORS = 5  # of a shape along its time constant and its frequency, itself among them
+ZOOMS = 8  # on the best of them, each half as wide as the last
+# the widest: of the logarithm of the time constant, and of the frequency times that constant
+DECAY_REACH, FREQUENCY_REACH = 0.6, 0.03
 STAYS = 3.0  # lengths of the rest of the record: what takes so long to die away does not
 PULSE = 3.0  # samples: what is over sooner is a pulse
 # of what a shape must gain: one that gains less before it is polished never does
@@ -162,22 +167,40 @@ class _Stretch:
         """How many values are judged there."""
         return domain_of(self.event).values(self.drive)
 
+    @functools.cached_property
+    def white_residual(self) -> np.ndarray:
+        """What is left, as independent rows (C, n) of unit variance."""
+        return self.white(self.residual[None])[0]
+
     def white(self, rows: np.ndarray) -> np.ndarray:
         """(m, C, n) [pu] to independent rows (m, C, n) of unit variance."""
         return self.noise.whiten(rows, self.drive, self.drive.weights > 0).reshape(rows.shape)
 
-    def fit_shape(self, shape: _Shape, channel: int) -> tuple[float, np.ndarray, np.ndarray]:
-        """By how much a shape in one channel lowers the deviance, its sizes (1 or 2,) [pu], and
-        itself (C, n).
+    def fit_shapes(self, shapes: Sequence[_Shape], channel: int) -> tuple[np.ndarray, np.ndarray]:
+        """By how much each of shapes of one kind in one channel lowers the deviance (m,), and its
+        sizes (m, 1 or 2) [pu].
         """
-        templates = shape.templates(self.residual.shape[1])
-        raw = np.zeros((len(templates), *self.residual.shape))
-        raw[:, channel] = templates
-        rows, left = self.white(np.nan_to_num(raw)), self.white(self.residual[None])[0].ravel()
-        columns = rows.reshape(len(rows), -1).T
-        sizes = np.linalg.lstsq(columns, left, rcond=None)[0]
-        gain = float(left @ left - np.sum((left - columns @ sizes) ** 2))
-        return gain, sizes, np.einsum("k,kcn->cn", sizes, raw)
+        templates = np.stack([shape.templates(self.residual.shape[1]) for shape in shapes])
+        raw = np.zeros((*templates.shape[:2], *self.residual.shape))
+        raw[:, :, channel] = templates
+        rows = self.white(raw.reshape(-1, *self.residual.shape)).reshape(*templates.shape[:2], -1)
+        shared = rows @ self.white_residual.ravel()
+        inverse = np.linalg.pinv(rows @ rows.transpose(0, 2, 1), hermitian=True)
+        sizes = np.einsum("mkl,ml->mk", inverse, shared)
+        return np.sum(shared * sizes, axis=1), sizes
+
+    def find_best(self, shapes: Sequence[_Shape], channel: int) -> tuple[float, _Shape]:
+        """That of shapes of one kind which lowers the deviance most, and by how much."""
+        samples = self.residual.shape[1]
+        visible = [not shape.frequency or shape.rings(samples) for shape in shapes]
+        gains = np.where(visible, self.fit_shapes(shapes, channel)[0], 0.0)
+        return float(gains.max()), shapes[int(gains.argmax())]
+
+    def take_away(self, shape: _Shape, channel: int) -> tuple[np.ndarray, "_Stretch"]:
+        """The sizes (1 or 2,) [pu] of a shape, and what is left without it."""
+        sizes, residual = self.fit_shapes([shape], channel)[1][0], self.residual.copy()
+        residual[channel] -= sizes @ shape.templates(residual.shape[1])
+        return sizes, replace(self, residual=residual)
 
 
 def _level(rows: np.ndarray) -> np.ndarray:
@@ -206,18 +229,17 @@ def remainders(
         )
         for e, (event, part) in enumerate(zip(events, parts, strict=True))
     ]
-    excess = sum(float(np.sum(s.white(s.residual[None]) ** 2)) - s.size for s in stretches)
+    excess = sum(float(np.sum(s.white_residual**2)) - s.size for s in stretches)
     loudest = [_loudest(s, false_alarms / len(stretches)) for s in stretches]
     shapes: list[Remainder] = []
     while len(shapes) < MOST_SHAPES and (
         candidates := [(one, e) for e, one in enumerate(loudest) if one]
     ):
         (gain, shape, channel), e = max(candidates, key=lambda f: f[0][0])
-        _, sizes, curve = stretches[e].fit_shape(shape, channel)
+        sizes, stretches[e] = stretches[e].take_away(shape, channel)
         shapes.append(
             _describe_shape(stretches[e], shape, channel, sizes, gain / max(excess, gain))
         )
-        stretches[e] = replace(stretches[e], residual=stretches[e].residual - curve)
         loudest[e] = _loudest(stretches[e], false_alarms / len(stretches))
     return shapes
 
@@ -229,22 +251,20 @@ def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int
     The bound on chance is that of as many independent tries as there are starts, decays and
     frequencies.
     """
-    white = stretch.white(stretch.residual[None])[0]
+    white = stretch.white_residual
     tried, candidates = _search_shapes(white, max(stretch.event.start - 2, 0))
     sparing = SPARING * np.log(white.size)
-    best = max(candidates, key=lambda f: f[0] - sparing * bool(f[1].frequency))
+    gain, shape, channel = max(candidates, key=lambda f: f[0] - sparing * bool(f[1].frequency))
     limit = 2 * np.log(tried / false_alarms)
-    if best[0] < LEAST_UNPOLISHED_GAIN * limit:
+    if gain < LEAST_UNPOLISHED_GAIN * limit:
         return None
-    polished = max(
-        (_refine_shape(stretch, best[1], c) for c in range(len(white))), key=lambda f: f[0]
-    )
-    return polished if polished[0] > limit else None
+    gain, shape = _refine_shape(stretch, shape, channel)
+    return (gain, shape, channel) if gain > limit else None
 
 
-def _search_shapes(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Shape]]]:
+def _search_shapes(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Shape, int]]]:
     """How many shapes were tried in white rows (C, n) from sample `first` on, and the best of each
-    kind.
+    kind: what it gains, itself and its channel.
     """
     length = white.shape[1] - first
     decays = np.geomspace(2.0, max(length, 4), TRIED_TIME_CONSTANTS)
@@ -255,76 +275,56 @@ def _search_shapes(white: np.ndarray, first: int) -> tuple[int, list[tuple[float
             :FREQUENCIES
         ]
         shapes += [(float(d), float(f)) for f in frequencies]
-    best: dict[bool, tuple[float, _Shape]] = {}
+    best: dict[bool, tuple[float, _Shape, int]] = {}
     for decay, frequency in shapes:
         gains = _gains(white[:, first:], decay, frequency)
-        k = int(gains.argmax())
-        if (gain := float(gains[k])) > best.get(frequency > 0, (-1.0,))[0]:
-            best[frequency > 0] = gain, _Shape(first + k, decay, frequency)
+        channel, k = divmod(int(gains.argmax()), gains.shape[1])
+        if (gain := float(gains[channel, k])) > best.get(frequency > 0, (-1.0,))[0]:
+            best[frequency > 0] = gain, _Shape(first + k, decay, frequency), channel
     return len(white) * length * len(shapes), list(best.values())
 
 
 def _gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
-    """Drop of the sum of squares (n - SHORTEST,) by a shape from each sample on, in the channel
-    that shows it most.
+    """Drop of the sum of squares (C, n + 1 - `SHORTEST_SHAPE`) by a shape from each sample on, in
+    each channel.
     """
-    from scipy.signal import lfilter
-
-    z = np.exp(-1 / decay + 2j * np.pi * frequency)
-    sums = np.asarray(
-        lfilter([1.0], [1.0, -z], white[:, ::-1].astype(complex), axis=1), dtype=np.complex128
-    )[:, ::-1]
-    left = np.arange(white.shape[1], 0, -1)  # samples from each on
-
-    def series(q: complex) -> NDArray[np.complex128]:
-        """1 + q + ... over the samples left."""
-        return left.astype(complex) if abs(1 - q) < 1e-12 else (1 - q**left) / (1 - q)
-
-    power = series(abs(z) ** 2).real
+    z = complex(np.exp(-1 / decay + 2j * np.pi * frequency))
+    sums = np.stack([sum_with_decay(row[::-1], z)[::-1] for row in white])
+    every = np.ones(white.shape[1])
+    power = sum_with_decay(every, abs(z) ** 2).real[::-1]
     if not frequency:
-        return (sums.real**2 / power).max(axis=0)[: 1 - SHORTEST_SHAPE]
-    double = series(z * z)
+        return (sums.real**2 / power)[:, : 1 - SHORTEST_SHAPE]
+    double = sum_with_decay(every, z * z)[::-1]
     cc, ss, cs = (power + double.real) / 2, (power - double.real) / 2, double.imag / 2
     a, b, determinant = sums.real, sums.imag, cc * ss - cs**2
     gain = (ss * a**2 - 2 * cs * a * b + cc * b**2) / np.maximum(determinant, 1e-9)
-    return np.where(determinant > 0.01 * power**2 / 4, gain, 0.0).max(axis=0)[: 1 - SHORTEST_SHAPE]
+    return np.where(determinant > 0.01 * power**2 / 4, gain, 0.0)[:, : 1 - SHORTEST_SHAPE]
 
 
-def _refine_shape(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _Shape, int]:
-    """The best shape near one, as the noise lets it be seen in one channel."""
-    from scipy.optimize import minimize
-
-    n = stretch.residual.shape[1]
-
-    def gain(shape: _Shape) -> float:
-        visible = shape.rings(n) or not shape.frequency
-        return stretch.fit_shape(shape, channel)[0] if visible else 0.0
-
+def _refine_shape(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _Shape]:
+    """The best shape near one, as the noise lets it be seen in one channel, and what it gains."""
+    n, gain = stretch.residual.shape[1], 0.0
     for _ in range(POLISH_ROUNDS):
-        if np.isfinite(shape.decay):
-            start, ringing = shape.start, bool(shape.frequency)
-
-            def build_shape(x: np.ndarray, start: int = start, ringing: bool = ringing) -> _Shape:
-                return _Shape(
-                    start,
-                    float(np.exp(np.clip(x[0], 0.0, np.log(20 * n)))),
-                    abs(x[1]) if ringing else 0.0,
-                )
-
-            begin = np.array([np.log(shape.decay), shape.frequency][: 1 + ringing])
-            simplex = np.stack(
-                [begin, *(begin + np.diag([0.3, 0.1 / (2 * np.pi * shape.decay)][: 1 + ringing]))]
-            )
-            options = {"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-3, "maxfev": 80}
-            done = minimize(
-                lambda x, at=build_shape: -gain(at(x)), begin, method="Nelder-Mead", options=options
-            )
-            shape = max(shape, build_shape(done.x), key=gain)
+        for zoom in 0.5 ** np.arange(ZOOMS if np.isfinite(shape.decay) else 0):
+            gain, shape = stretch.find_best(_list_neighbors(shape, zoom, n), channel)
         period = 1 / shape.frequency if shape.frequency else 4.0
         reach = int(np.clip(period / 2, 3, 25))
         near = range(max(shape.start - reach, 0), min(shape.start + reach, n - SHORTEST_SHAPE) + 1)
-        shape = max((shape._replace(start=k) for k in near), key=gain)
-    return gain(shape), shape, channel
+        gain, shape = stretch.find_best([shape._replace(start=k) for k in near], channel)
+    return gain, shape
+
+
+def _list_neighbors(shape: _Shape, zoom: float, samples: int) -> list[_Shape]:
+    """A shape and those around it, of other time constants and, where it rings, of other
+    frequencies.
+    """
+    steps = zoom * np.linspace(-1, 1, NEIGHBORS)
+    decays = np.clip(shape.decay * np.exp(DECAY_REACH * steps), 1.0, 20.0 * samples)
+    frequencies = np.zeros(1)
+    if shape.frequency:
+        frequencies = np.abs(shape.frequency + FREQUENCY_REACH * steps / shape.decay)
+    pairs = itertools.product(decays, frequencies)
+    return [shape._replace(decay=float(d), frequency=float(f)) for d, f in pairs]
 
 
 def _describe_shape(

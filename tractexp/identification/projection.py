@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tractexp.domain.port import Complex, Port
+from tractexp.inference.recursion import sum_with_decay
 
 TRIED_DECAYS = 6  # of a pole that is tried, from the slowest to the fastest
 # Hz against the frame, of a pole that is tried
@@ -152,17 +153,12 @@ def compute_pole_response(u: Complex, pole: complex, step: float) -> Complex:
     """The response 1 / (s - p) (N,) to u, at rest at first; exact where u is a straight line
     between samples.
     """
-    # as fast as scipy.signal's filter, which takes a second to import
-    from scipy.linalg import get_blas_funcs
-
     z = pole * step
     grown = np.expm1(z)
     last = (grown - z) / (pole * z)
     driven = last * u
     driven[1:] += (grown / pole - last) * u[:-1]
-    bands = np.repeat(np.array([[1.0], [-np.exp(z)]]), len(u), axis=1)
-    (solve_banded,) = get_blas_funcs(["tbsv"], dtype=np.complex128)
-    return np.asarray(solve_banded(1, bands, driven, lower=1, diag=1))
+    return sum_with_decay(driven, np.exp(z))
 
 
 def _rows(ports: Sequence[Port], of: Callable[[Port], Complex]) -> Complex:
