@@ -33,8 +33,8 @@ from tractexp.inference.chance import Chance
 from tractexp.inference.context import FAULT_PRIOR
 from tractexp.inference.fitting import Refit
 from tractexp.inference.free_set import FreeSet
-from tractexp.inference.noise_in_quiet import WALK_SEEN
 from tractexp.inference.score_test import Score
+from tractexp.noise import random_walk
 from tractexp.noise.random_walk import Rest, find
 from tractexp.parameter import Box
 
@@ -126,7 +126,7 @@ def closes_share(c, closed, kept=1):
     return Findings.closes_share.fget(SimpleNamespace(verdict=verdict, **graded, **judged))
 
 
-def wandering(seen, seed, rests=(), walk=0.0):
+def wandering(seed, rests=(), walk=0.0):
     """How a load wanders that shows noise and a random walk before its event; None where it is not
     said to.
     """
@@ -134,10 +134,10 @@ def wandering(seen, seed, rests=(), walk=0.0):
     before = rng.normal(size=(2, 250)) + np.cumsum(
         rng.normal(size=(2, 250)) * np.array([[walk], [0.0]]), axis=1
     )
-    return find([before], 0.002, steady(1000), rests, seen=seen)
+    return find([before], 0.002, steady(1000), rests)
 
 
-def wandering_within(seen):
+def wandering_within():
     """The same with what is left of the event, which shows a little more than the stretch before
     it.
     """
@@ -145,7 +145,7 @@ def wandering_within(seen):
     left = rng.normal(size=(2, 1000)) + np.cumsum(
         rng.normal(size=(2, 1000)) * np.array([[0.012], [0.0]]), axis=1
     )
-    return wandering(seen, 73, [Rest(left, np.zeros((1, 2, 1000)), np.ones(1000))])
+    return wandering(73, [Rest(left, np.zeros((1, 2, 1000)), np.ones(1000))])
 
 
 def prior_of_skew(prior):
@@ -269,10 +269,11 @@ def test_a_wider_prior_lets_clocks_be_farther_off():
     assert prior_of_skew(FAULT_PRIOR) < 0.0051 < prior_of_skew(6.0)
 
 
-@pytest.mark.parametrize("walk", [lambda seen: wandering(seen, 73), wandering_within])
-def test_a_lower_likelihood_lets_a_load_wander(walk):
-    assert walk(WALK_SEEN) is None
-    assert walk(1.5) is not None
+@pytest.mark.parametrize("walk", [lambda: wandering(73), wandering_within])
+def test_a_lower_likelihood_lets_a_load_wander(walk, monkeypatch):
+    assert walk() is None
+    monkeypatch.setattr(random_walk, "LEAST_WANDERING", 1.5)
+    assert walk() is not None
 
 
 def test_every_criterion_has_a_case_and_an_origin():

@@ -34,7 +34,7 @@ from tractexp.discrepancy.held_out import assess, carry_fits, compare_on
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.errors import UserError
-from tractexp.inference import goodness_of_fit, kernels, multistart, observed
+from tractexp.inference import goodness_of_fit, kernels, multistart
 from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.chance import BLURRED, scales
@@ -46,7 +46,7 @@ from tractexp.inference.goodness_of_fit import GoodnessOfFit, Scale, tail
 from tractexp.inference.injection import PUSHES
 from tractexp.inference.least_squares import normal
 from tractexp.inference.linearization import tangent
-from tractexp.inference.noise_in_quiet import WALK_SEEN, QuietNoise
+from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records, check_events
 from tractexp.inference.score_test import ScoreTest, signed_drop
@@ -55,8 +55,7 @@ from tractexp.model.model import compose
 from tractexp.noise import Autoregression, white_noise
 from tractexp.noise import Noise as PowerNoise
 from tractexp.noise.quiet import estimate
-from tractexp.noise.random_walk import Load, RandomWalk, Rest
-from tractexp.noise.random_walk import find as wandering
+from tractexp.noise.random_walk import Load, RandomWalk, Rest, find
 from tractexp.noise.voltage import smooth_voltage
 from tractexp.record import Record, detect
 
@@ -90,11 +89,6 @@ def bench(model, made, only=FEW, bounds=None):
 def steady(samples):
     """A load that takes the same power throughout, in one event."""
     return Load(np.tile([[1.0], [0.0]], samples), np.array([[1.0, 0.0]]))
-
-
-def find(before, step, load, rests=()):
-    """Whether a load wanders, by the criteria of an investigation."""
-    return wandering(before, step, load, rests, seen=WALK_SEEN)
 
 
 @pytest.fixture(scope="module")
@@ -274,20 +268,6 @@ def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not()
     found = find(walks, 0.002, steady(250))
     assert 1.0 < found.intensity[0] / (0.05**2 / 0.002) < 2.0  # the larger end of its interval
     assert found.intensity[1] < found.intensity[0] / 2
-
-
-def test_an_identification_asks_for_more_before_it_says_that_a_load_wanders():
-    rng = np.random.default_rng(9)
-    calm = lambda: [rng.normal(size=(2, 250)) for _ in range(3)]  # noqa: E731
-
-    def seen(before):
-        return wandering(before, 0.002, steady(250), seen=observed.LEAST_WANDERING) is not None
-
-    def walk():
-        return [b + np.cumsum(rng.normal(size=(2, 250)) * [[0.03], [0.0]], axis=1) for b in calm()]
-
-    assert sum(seen(calm()) for _ in range(150)) <= 3  # 0.3 %; of an investigation 6 %
-    assert 28 <= sum(seen(walk()) for _ in range(60)) <= 36  # of which an investigation sees 42
 
 
 def test_heavy_tails_are_drawn_beyond_what_the_quiet_samples_showed():

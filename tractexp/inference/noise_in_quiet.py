@@ -14,11 +14,6 @@ from tractexp.inference.jumps import jumps
 from tractexp.inference.observed import Observed, estimate_noise
 from tractexp.noise import Noise
 
-# Twice the log-likelihood from which a load is said to wander before its events, and twice that by
-# what the events show. Half a chi-square of one degree is beyond it in 8 % of channels; a wandering
-# that is not there costs little.
-WALK_SEEN = 2.0
-
 
 @dataclass(frozen=True, eq=False)
 class QuietNoise:
@@ -73,7 +68,6 @@ class QuietNoise:
             shapes,
             left,
             columns,
-            seen=WALK_SEEN,
         )
 
 

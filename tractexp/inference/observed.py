@@ -24,9 +24,6 @@ from tractexp.record import Event
 
 # of a residual's variance: where the fit takes more, it tells nothing of the noise
 LEAST_REST = 0.2
-# Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a
-# wandering that is not there costs it little, and an estimate a third of its precision.
-LEAST_WANDERING = 5.0
 MOST_SAMPLES = 2_000_000  # of voltages with an error that are simulated at once
 
 
@@ -85,7 +82,6 @@ class Observed:
                 input_errors,
                 residuals,
                 columns,
-                seen=LEAST_WANDERING,
             )
         except UserError:
             return None
@@ -151,17 +147,15 @@ def estimate_noise(
     input_errors: np.ndarray | None,
     left: np.ndarray | None,
     columns: np.ndarray | None,
-    *,
-    seen: float,
 ) -> Noise:
     """Return the noise of a residual (C, N) in the quiet stretches of the records.
 
     `model` with its free values (d,) tells how noise of the voltage is passed on, `input_errors`
     (k, C, N) what errors of the record do. What the fit leaves, `left` (C, N), and the columns of
-    all that could explain it (k, C, N) tell more of how the load wanders; it does where twice the
-    log-likelihood gains `seen`. Raises `UserError` where too few samples are quiet.
+    all that could explain it (k, C, N) tell more of how the load wanders. Raises `UserError` where
+    too few samples are quiet.
     """
     walk = functools.partial(
-        walk_of_load, records.events, records.drive, records.power, left, columns, valid, seen=seen
+        walk_of_load, records.events, records.drive, records.power, left, columns, valid
     )
     return records.domain.noise(residual, valid, quiet, *model, walk, input_errors)

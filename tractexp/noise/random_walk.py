@@ -26,6 +26,11 @@ LEAST_DIRECTION_SHARE = 0.03
 # log-likelihood below the largest at which the intensity is taken: the larger end of an interval of
 # 84 %
 LESS = 1.0
+# Twice the log-likelihood from which a load is said to wander before its events, and twice that by
+# what the events show. Half a chi-square of one degree is beyond it in 8 % of channels. One that is
+# not there costs an estimate a third of its precision; one that is not seen costs a wrong name, or
+# an interval without the truth.
+LEAST_WANDERING = 2.0
 # of the intensity, variances of the channel per second
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))
 # of a single stretch, in variances of its noise
@@ -130,17 +135,15 @@ def find(
     step: float,
     load: Load,
     rests: Sequence[Rest] = (),
-    *,
-    seen: float,
 ) -> RandomWalk | None:
     """The wandering of two channels in stretches (2, n_i) before the events; None where there is
     none to be seen.
 
     To be safe the largest intensity whose log-likelihood is at most `LESS` below the likeliest's,
     given the fast noise; in both channels where it is seen in one, for what wanders is the load. It
-    is seen where twice the log-likelihood gains `seen`. What is left of the events counts, too,
-    where both show twice that, but no more than the stretches before them allow: what answers a dip
-    does not wander.
+    is seen where twice the log-likelihood gains `LEAST_WANDERING`. What is left of the events
+    counts, too, where both show twice that, but no more than the stretches before them allow: what
+    answers a dip does not wander.
     """
     stretches = [b for b in before if b.shape[1] >= 8 * (WANDERING_COSINES + 2)]
     if not stretches:
@@ -152,14 +155,14 @@ def find(
     total -= total[:, :1]
     most = [_last(row) for row in total]
     walk = RandomWalk(GRID[most], step, load)
-    if 2 * total.max() >= seen:
+    if 2 * total.max() >= LEAST_WANDERING:
         return walk
     rest = np.array(
         [sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)]
     )
     both = total + rest - rest[:, :1]
     gained = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
-    return walk if gained >= 2 * seen else None
+    return walk if gained >= 2 * LEAST_WANDERING else None
 
 
 def walk_of_load(
@@ -170,8 +173,6 @@ def walk_of_load(
     columns: np.ndarray | None,
     valid: np.ndarray,
     mix: np.ndarray,
-    *,
-    seen: float,
 ) -> RandomWalk | None:
     """How the load wanders before the events, and during them, in channels mixed by `mix`, as
     `find` tells it.
@@ -191,7 +192,7 @@ def walk_of_load(
             Rest(mix @ left[:, part], mixed[:, :, part], load.apparent[part]) for part in parts
         ]
     stretches = [mix @ b for b in before if np.isfinite(b).all()]
-    return find(stretches, events[0].record.step, load, rests, seen=seen)
+    return find(stretches, events[0].record.step, load, rests)
 
 
 def _last(likelihood: np.ndarray) -> int:
