@@ -365,8 +365,8 @@ def test_of_two_effects_each_is_shown_over_the_other_alone(
 
     monkeypatch.setattr(held_out, "compare_on", judged)
     (row,) = assess(both, [SetEvidence(pair, pair.names, pair.names)], 0)
-    assert row.gap.is_shown
-    assert [name for name, gap in row.without.items() if gap.is_denied] == needless
+    assert row.gap.outcome == "shown"
+    assert [name for name, gap in row.without.items() if gap.outcome == "denied"] == needless
     assert holds(row, Criteria()) == (not needless)
     verdict = decide(
         Evidence(

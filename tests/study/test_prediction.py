@@ -20,7 +20,7 @@ from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, Predicted
 from tractexp.discrepancy.explain import explain, find_nearest_sets
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
-from tractexp.discrepancy.precision import standard_errors
+from tractexp.discrepancy.precision import estimates, standard_errors
 from tractexp.discrepancy.prediction import SHARING
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.ranking import beats, find_nearest
@@ -419,7 +419,7 @@ def test_all_is_told_by_the_records_own_noise_and_the_base_model_as_it_is_identi
     alone = tractexp.identify(dips()[:2], progress=False)
     assert inexact.train.before.error.value == pytest.approx(alone.model_error.value, rel=0.03)
     errors = alone.result.standard_errors
-    for e in inexact.base_estimates:
+    for e in estimates(inexact.first, inexact.bare.unit, ()):
         assert abs(e.value - alone.result.parameters[e.parameter.name]) < errors[e.parameter.name]
 
 

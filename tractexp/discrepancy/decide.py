@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
-from tractexp.discrepancy.gap import share_gone
+from tractexp.discrepancy.gap import DENIED, SHOWN, share_gone
 from tractexp.discrepancy.ranking import beats, find_leading
 from tractexp.inference.fitting import Names
 
@@ -104,7 +104,7 @@ def holds(row: SetEvidence, criteria: Criteria) -> bool:
     if row.gap is None:
         return True
     stands = row.p_of_all >= criteria.adequate_p and not criteria.rejects(row.behind_of_all)
-    return stands and not any(gap.is_denied for gap in row.gaps)
+    return stands and DENIED not in {gap.outcome for gap in row.gaps}
 
 
 def needs_all_events(rows: Sequence[SetEvidence], criteria: Criteria) -> bool:
@@ -127,7 +127,7 @@ def is_confirmed(row: SetEvidence, evidence: Evidence) -> bool:
     if chose_by_all(row, evidence):
         share = row.replicated_share
         return share is not None and share >= CONFIRMED_SHARE
-    return all(gap.is_shown for gap in row.gaps)
+    return all(gap.outcome == SHOWN for gap in row.gaps)
 
 
 def chose_by_all(row: SetEvidence, evidence: Evidence) -> bool:

@@ -122,11 +122,6 @@ class Disagreement:
         """Whether this fit leaves nothing, and no further effect helps."""
         return self.adequate and not self.asks_for_more
 
-    @property
-    def doubtful(self) -> bool:
-        """Whether anything says that more is missing."""
-        return not self.suffices or bool(self.faults)
-
     @functools.cached_property
     def faults(self) -> tuple[str, ...]:
         """The faults of the measurement that are not at their null.
@@ -170,7 +165,7 @@ def examine_fit(
     chance = chance_at(t, projection, noise, quiet, seed, plain=True)
     result = Disagreement(fit, noise, t, projection, chance, scores)
     plain = plain or is_noise_exact(context, noise) or (bool(scores) and scores[0].p < PLAIN)
-    if not plain and result.doubtful:
+    if not plain and not (result.suffices and not result.faults):
         result = replace(result, chance=chance_at(t, projection, noise, quiet, seed, plain=False))
     if result.is_undecided:
         result = replace(

@@ -14,7 +14,7 @@ from tractexp.discrepancy.decide import CANDIDATE, NAMED, TIED, UNEXPLAINED, sho
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.explain import find_status
 from tractexp.discrepancy.forms import by_name, forms
-from tractexp.discrepancy.gap import SPREAD, Curves, GapTest, measure_closed_share, share_closed
+from tractexp.discrepancy.gap import SPREAD, Curves, GapTest, measure_closed_share
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import estimates
@@ -179,7 +179,7 @@ def _graded_gap(before: Misfit, after: Misfit, ranked: GapTest | None) -> dict[s
         if ranked is None
         else (ranked.before.chi2_per_sample, ranked.after.chi2_per_sample)
     )
-    closed = share_closed(before.error, after.error)
+    closed = measure_closed_share(before.error, after.error)
     return {
         "before": _misfit(before, was),
         "after": _misfit(after, now),
@@ -201,7 +201,7 @@ def _gap(before: Curves, after: Curves) -> dict[str, Any]:
     return {
         "before": _curves(before),
         "after": _curves(after),
-        "closed": files.plain(measure_closed_share(before, after)),
+        "closed": files.plain(measure_closed_share(before.error, after.error)),
     }
 
 
@@ -246,7 +246,7 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     )
     return {
         "model_error": _error(nearest or after.error),
-        "share": files.plain(1 - share_closed(before.error, after.error))
+        "share": files.plain(1 - measure_closed_share(before.error, after.error))
         if investigation.names
         else None,
         "p": tests.p_left,

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.gap import Curves, GapTest
+from tractexp.discrepancy.gap import MILD, Curves, GapTest
 from tractexp.inference.blocks import reach
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit
@@ -198,7 +198,7 @@ class Evidence:
     def is_mild(self) -> bool:
         """Whether the held-out events are too mild for all that explains the fitted ones."""
         gaps = [row.gap for row in self.rows if row.gap is not None]
-        return bool(gaps) and all(gap.is_mild for gap in gaps)
+        return bool(gaps) and all(gap.outcome == MILD for gap in gaps)
 
     def row_of(self, names: Names) -> SetEvidence | None:
         """The row of these effects, None where they were not fitted."""

@@ -20,7 +20,7 @@ from tractexp.discrepancy.decide import (
     is_confirmed,
 )
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
-from tractexp.discrepancy.gap import Curves, curves, measure_closed_share
+from tractexp.discrepancy.gap import DENIED, MILD, SHOWN, Curves, curves, measure_closed_share
 from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.proposal.library import term
@@ -65,9 +65,12 @@ class Nearest:
         """The share of the gap that is closed on the fitted and on the held-out events, nan without
         any.
         """
-        return measure_closed_share(*self.curves), measure_closed_share(
-            *self.carried
-        ) if self.carried else np.nan
+        before, after = self.curves
+        fitted = measure_closed_share(before.error, after.error)
+        if self.carried is None:
+            return fitted, np.nan
+        before, after = self.carried
+        return fitted, measure_closed_share(before.error, after.error)
 
 
 def find_nearest_sets(
@@ -87,7 +90,7 @@ def find_nearest_sets(
     before, *after = (curves(context, fit.unit, evidence.last.noise, fit.names) for fit in fits)
     there = _carry_curves(context, validate, fits[:2]) if validate else None
     others = [
-        (row.fit.names, measure_closed_share(before, one))
+        (row.fit.names, measure_closed_share(before.error, one.error))
         for row, one in zip(rows[1:], after[1:], strict=True)
     ]
     return Nearest(rows[0], others, (before, after[0]), there)
@@ -159,9 +162,9 @@ def explain(
 
 def _explain_confirmation(verdict: Verdict, evidence: Evidence, *, all_fitted: bool) -> list[str]:
     """What the held-out events say of what is kept, one clause; [] where that is nothing more."""
-    mild = [row.gap.is_mild for row in verdict.kept if row.gap is not None]
+    outcomes = {row.gap.outcome for row in verdict.kept if row.gap is not None}
     is_open = verdict.word == CANDIDATE and bool(verdict.kept[0].open_sizes)
-    if mild and all(mild) and not is_open:
+    if outcomes == {MILD} and not is_open:
         return ["the held-out events are too mild to show it"]
     if verdict.word == NAMED and chose_by_all(verdict.kept[0], evidence):
         return [CONFIRMED_IN_TURN]
@@ -218,7 +221,7 @@ def _explain_doubt(row: SetEvidence, evidence: Evidence, *, all_fitted: bool) ->
     if is_confirmed(row, evidence):
         return "the model with it does not describe this load, so it is no name"
     if not chose_by_all(row, evidence):
-        doubtful = [name for name, gap in row.without.items() if not gap.is_shown]
+        doubtful = [name for name, gap in row.without.items() if gap.outcome != SHOWN]
         return f"the held-out events are too mild to show {join_words(doubtful)}"
     if evidence.is_predicted:
         why = "the held-out events took part in choosing it"
@@ -452,9 +455,9 @@ def _explain_denial(word: str, seemed: str, best: SetEvidence, context: Context)
 def _describe_objection(best: SetEvidence, context: Context) -> str:
     """Why the best set is not kept, by what the held-out events say."""
     assert best.gap is not None
-    if best.gap.is_denied:
+    if best.gap.outcome == DENIED:
         return "there it fits no better than the base model"
-    if needless := [name for name, gap in best.without.items() if gap.is_denied]:
+    if needless := [name for name, gap in best.without.items() if gap.outcome == DENIED]:
         return (
             "there it fits no better than without"
             f" {join_words(label_effects(needless, context), 'or')}"

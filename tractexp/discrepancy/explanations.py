@@ -80,13 +80,6 @@ class Explanations:
         """The faults of the measurement beside the chosen set."""
         return self.last.faults
 
-    @property
-    def empty(self) -> bool:
-        """Whether neither an effect of the load nor a fault of the measurement helps more than
-        chance.
-        """
-        return not self.chosen.names and not self.faults
-
 
 def explanations(
     base: BaseFit, first: Disagreement, seed: int, window_settled: bool = False

@@ -16,6 +16,7 @@ from tractexp.inference.model_error import ModelError, model_error
 from tractexp.noise import Noise
 from tractexp.noise.span import compute_basis
 
+SHOWN, MILD, DENIED = "shown", "mild", "denied"  # what events say of an extension
 # roots of what is expected: in 95 % of cases no more than so many are lacking of it
 SPREAD = 2 * 1.645
 # singular values below this share of the largest: pushes that differ from others in noise only
@@ -66,7 +67,7 @@ class GapTest:
     @property
     def closed_share(self) -> float:
         """The share of the squared model error that is gone."""
-        return measure_closed_share(self.before, self.after)
+        return measure_closed_share(self.before.error, self.after.error)
 
     @property
     def explained_share(self) -> float:
@@ -79,21 +80,15 @@ class GapTest:
         return self.gain / whole if whole > 0 else 0.0
 
     @property
-    def is_shown(self) -> bool:
-        """Whether these events show that the extension helps."""
-        return self.gain >= self.shown
-
-    @property
-    def is_denied(self) -> bool:
-        """Whether they gain less than a true explanation does in 95 % of cases."""
+    def outcome(self) -> str:
+        """What these events say of the extension: `SHOWN`, `DENIED` where they gain less than a
+        true one does in 95 % of cases, or `MILD` where they are too mild for either.
+        """
+        if self.gain >= self.shown:
+            return SHOWN
         least = self.expected - SPREAD * self.expected**0.5
         # of no steady state neither is a number
-        return not self.is_shown and not self.gain >= least
-
-    @property
-    def is_mild(self) -> bool:
-        """Whether these events are too mild to show that, and to deny it."""
-        return not self.is_shown and not self.is_denied
+        return MILD if self.gain >= least else DENIED
 
 
 def share_gone(factor: float) -> float:
@@ -101,12 +96,7 @@ def share_gone(factor: float) -> float:
     return 1 - 1 / factor**2
 
 
-def measure_closed_share(before: Curves, after: Curves) -> float:
-    """The share of the squared model error that is gone between two curves."""
-    return share_closed(before.error, after.error)
-
-
-def share_closed(before: ModelError, after: ModelError) -> float:
+def measure_closed_share(before: ModelError, after: ModelError) -> float:
     """The share of the squared model error that is gone; above 1 where less is left than noise
     leaves in the mean, below 0 where more is left than before. nan where that falls short of the
     noise by more than there was before, which was within the error of the noise's level then.

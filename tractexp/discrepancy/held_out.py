@@ -10,7 +10,7 @@ from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.decide import find_adequate, needs_all_events
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.gap import GapTest, beyond_chance, compute_pushed_changes, gap
+from tractexp.discrepancy.gap import SHOWN, GapTest, beyond_chance, compute_pushed_changes, gap
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit, fit_initial_power, refit
 from tractexp.inference.noise_in_quiet import QuietNoise, white
@@ -51,9 +51,8 @@ def judge_held_out(
         return evidence
     both = AllEvents(context, events, noise, faults, bare, explained.refits)
     if not any(row.fit.names or faults for row in adequate):
-        is_silent = (
-            context.domain.calibrated and explained.empty and base.p_left >= criteria.adequate_p
-        )
+        is_empty = not explained.chosen.names and not explained.faults
+        is_silent = context.domain.calibrated and is_empty and base.p_left >= criteria.adequate_p
         if is_silent and exceeds_noise(both):
             base = replace(base, p_of_all=both.p_left(explained.base.local_minima, seed))
         return replace(evidence, base=base)
@@ -130,7 +129,7 @@ def assess(both: AllEvents, rows: Sequence[SetEvidence], seed: int) -> list[SetE
 def _suffices(row: SetEvidence) -> bool:
     """Whether a set is shown as it was fitted, and leaves nothing of the held-out events."""
     assert row.gap is not None
-    return all(gap.is_shown for gap in row.gaps) and row.gap.left <= row.gap.shown
+    return all(gap.outcome == SHOWN for gap in row.gaps) and row.gap.left <= row.gap.shown
 
 
 def judge_fits(

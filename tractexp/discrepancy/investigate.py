@@ -29,7 +29,7 @@ from tractexp.discrepancy.explain import (
     measure_least_error,
 )
 from tractexp.discrepancy.explanations import Explanations, explanations
-from tractexp.discrepancy.gap import GapTest, gap, share_closed, share_gone
+from tractexp.discrepancy.gap import GapTest, gap, measure_closed_share, share_gone
 from tractexp.discrepancy.grades import Grader
 from tractexp.discrepancy.held_out import judge_held_out
 from tractexp.discrepancy.incomplete import predict_held_out
@@ -275,11 +275,6 @@ class Findings:
         return held_out or fitted
 
     @functools.cached_property
-    def base_estimates(self) -> list[ParameterEstimate]:
-        """The parameters of the base model alone."""
-        return estimates(self.first, self.bare.unit, ())
-
-    @functools.cached_property
     def final_estimates(self) -> list[ParameterEstimate]:
         """The parameters of the model that the investigation ends with."""
         return estimates(self.tests, self.extended_fit.unit, self.names)
@@ -395,7 +390,7 @@ class Findings:
         before, after = (
             self.select_misfit(one).error for one in (self.base_grade, self.final_grade)
         )
-        return share_closed(before, after) >= share_gone(self.context.criteria.ahead)
+        return measure_closed_share(before, after) >= share_gone(self.context.criteria.ahead)
 
 
 def investigate(

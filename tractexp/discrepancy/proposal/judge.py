@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.gap import GapTest, compute_pushed_changes, gap, share_gone
+from tractexp.discrepancy.gap import SHOWN, GapTest, compute_pushed_changes, gap, share_gone
 from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.proposal.bed import carried_over
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, TermFits
@@ -52,7 +52,7 @@ class TermAssessment:
         enough = gap.explained_share >= least
         rows = {
             (little if gap.gain > 0 else "it makes the held-out events worse"): not enough,
-            "the held-out events are too mild to show it": enough and not gap.is_shown,
+            "the held-out events are too mild to show it": enough and gap.outcome != SHOWN,
             "chance gives the best of the library as much": self.p > PROPOSED_P,
         }
         return [why for why, true in rows.items() if true]
