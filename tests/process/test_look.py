@@ -28,6 +28,10 @@ from tractexp.report.look_charts import envelope
 from tractexp.report.look_console import summary
 
 
+# what a command races is left as it is but for how many structures take part
+QUICK_RACE = "model.candidates.phasors=[static_exponential]"
+
+
 def saved(path, values=None, **more):
     path.parent.mkdir(parents=True, exist_ok=True)
     write(recording(constant() if values is None else values, **more), path, "BINARY", 1999)
@@ -164,6 +168,7 @@ def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, statio
         done = run_command(
             *words[1:],
             "--all",
+            QUICK_RACE,
             "optimizer=random_search",
             "budget=50",
             "tracking.enabled=false",
@@ -198,11 +203,10 @@ def test_a_short_dip_is_to_be_fitted_in_waves_and_that_command_runs_too(tmp_path
     """
     short = saved(tmp_path / "short.cfg", constant(start=0.5, end=0.56))
     (command,) = tractexp.look(short).commands
-    assert command.endswith(" domain=waves")
+    assert command.endswith(" model=auto domain=waves")
     done = run_command(
         *shlex.split(command)[1:],
-        "model/motor=none",
-        "model/static=branch",
+        "model.candidates.waves=[fifth_order_branch]",
         "optimizer=random_search",
         "budget=50",
         "tracking.enabled=false",

@@ -87,6 +87,13 @@ def test_a_structure_that_does_not_go_with_the_records_loses_and_says_why():
     assert won.race[1]["predicted"] is None
 
 
+def test_two_structures_that_are_one_on_these_records_are_raced_once():
+    again = "third_order_exponential"
+    won = auto(again, "static_exponential", again).fit_for([dip("none")])
+    assert [entry["name"] for entry in won.race] == ["static_exponential", again, again]
+    assert won.race[2]["why"] == f"on these records it is the same as {again}"
+
+
 def test_where_none_can_be_fitted_it_is_told():
     with pytest.raises(UserError, match="none of the structures can be fitted"):
         auto("line_side_converter").fit_for([dip("none")])

@@ -132,15 +132,25 @@ class LoadModel(Portable, Plain, Tabulated):
         models, refused = dict[str, LoadModel](), list[Entry]()
         for name in names:
             try:
-                models[name] = self._prepare_choice(name).fit_for(events)
-                _ = models[name].model
+                prepared = self._prepare_choice(name).fit_for(events)
+                prepared.refuse_same(models)
+                models[name] = prepared
             except UserError as error:
-                models.pop(name, None)
                 refused.append(Entry(name, 0, math.inf, math.inf, str(error)))
         candidates = [Candidate(name, one.model, one.bounds) for name, one in models.items()]
         entries = race_structures(candidates, events, self.fixed)
         race = [entry.to_dict() for entry in (*entries, *refused)]
         return replace(models[entries[0].name], race=race)
+
+    def refuse_same(self, models: Mapping[str, "LoadModel"]) -> None:
+        """Raise `UserError` where one of the models by name is the same, as where the records show
+        nothing that one of two would add; and for parts that do not compose.
+        """
+        _ = self.model
+        own = self.node, self.bounds, self.fixed
+        for name, other in models.items():
+            if (other.node, other.bounds, other.fixed) == own:
+                raise UserError(f"on these records it is the same as {name}")
 
     def _prepare_choice(self, name: str) -> "LoadModel":
         """A choice of model by name, in this one's domain, with what is known of its parameters."""

@@ -29,6 +29,7 @@ from tractexp.storage import files
 from tractexp.text.progress import Progress, tell_stages
 from tractexp.text.wording import count_noun
 
+RACE = "model=auto"  # what a load of the field is made of nobody knows: structures are raced
 NAME_THEM = "name the channels of one load: voltages=[...] currents=[...]"
 # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves
 # out
@@ -548,7 +549,15 @@ def command(view: View, shown: Sight) -> str:
             if key == "name" or not _is_usual(usual[key], value)
         }
     )
-    return f"{text} domain=waves" if waves_serve(view, shown) else text
+    raced = [RACE] if _is_from_field(shown) else []
+    sampled = ["domain=waves"] if waves_serve(view, shown) else []
+    return " ".join([text, *raced, *sampled])
+
+
+def _is_from_field(shown: Sight) -> bool:
+    """Whether the load that is fitted is one whose structure nobody knows: of kV and MW."""
+    events = (each.event for each in shown.events if each.worth)
+    return any(event is not None and event.record.is_from_field for event in events)
 
 
 def waves_serve(view: View, shown: Sight) -> bool:
