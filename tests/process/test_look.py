@@ -27,7 +27,6 @@ from tractexp.recording.trace import half_cycle_rms
 from tractexp.report.look_charts import envelope
 from tractexp.report.look_console import summary
 
-
 # what a command races is left as it is but for how many structures take part
 QUICK_RACE = "model.candidates.phasors=[static_exponential]"
 
