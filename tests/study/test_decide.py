@@ -51,6 +51,8 @@ CONFIRMED, MILD, DENIED = held_out(50.0, 55.0), held_out(3.0, 6.0), held_out(-2.
         ([row("a", "b", gap=CONFIRMED, without={"a": CONFIRMED, "b": CONFIRMED})], "named"),
         ([row("a", "b", gap=CONFIRMED, without={"a": CONFIRMED, "b": MILD})], "candidate"),
         ([row("a", "b", gap=CONFIRMED, without={"a": CONFIRMED, "b": DENIED})], "unexplained"),
+        # so many together are never a name
+        ([row("a", "b", "c", gap=CONFIRMED, without=dict.fromkeys("abc", CONFIRMED))], "candidate"),
         ([row("a", gap=CONFIRMED), row("b", behind=5.9, gap=MILD)], "tied"),
         ([row("a", gap=CONFIRMED), row("b", behind=6.1, gap=CONFIRMED)], "named"),
         ([row("a", gap=CONFIRMED), row("b", behind=3.0, gap=DENIED)], "named"),

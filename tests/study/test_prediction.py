@@ -21,7 +21,7 @@ from tractexp.discrepancy.explain import explain, find_nearest_sets
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.precision import estimates, standard_errors
-from tractexp.discrepancy.prediction import SHARING
+from tractexp.discrepancy.prediction import SHARING, search_third
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.ranking import beats, find_nearest
 from tractexp.inference.catalogue import catalogue
@@ -572,3 +572,21 @@ def test_the_files_say_what_is_left(investigation, tmp_path):
     page = (tmp_path / "run" / "discrepancy.html").read_text()
     assert "What is left" in page
     assert "undervoltage_trip" in str(investigation)
+
+
+@pytest.mark.parametrize(("error", "asked"), [(0.02, True), (0.009, False)])
+def test_a_third_effect_is_sought_beside_two_that_leave_more_than_anyone_cares_about(
+    inexact, error, asked
+):
+    """It may fit no worse than the two do; beside one no second is sought here."""
+    context = inexact.explanations.base.context.with_measured_power.held_to_usual
+    best = inexact.evidence.row_of(("stator_resistance", "undervoltage_trip"))
+    noise = inexact.evidence.noise
+    ground = inexact.first.score_fit(context, inexact.bare, noise)
+    refits = {row.fit.names: row.fit for row in inexact.evidence.every}
+    row = replace(best, prediction=off(*best.names, error=error).prediction)
+    found = search_third(ground, refits, [row])
+    third = ("dc_link_lag", *best.names)
+    assert [fit.names for fit in found] == [third] * asked
+    assert all(fit.deviance < best.fit.deviance for fit in found)
+    assert search_third(ground, refits, [replace(row, fit=refits[third[:1]])]) == []

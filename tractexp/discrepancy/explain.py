@@ -10,6 +10,7 @@ import numpy as np
 from tractexp.discrepancy.decide import (
     CANDIDATE,
     CONFIRMED_SHARE,
+    MOST_NAMED,
     NAMED,
     NONE,
     TIED,
@@ -218,6 +219,8 @@ def _explain_doubt(row: SetEvidence, evidence: Evidence, *, all_fitted: bool) ->
     """Why a set that is kept alone is a candidate and no name."""
     if row.open_sizes:
         return f"{'; '.join(row.open_sizes)}: so it is no name"
+    if len(row.fit.names) > MOST_NAMED:
+        return f"more than {MOST_NAMED} effects together are no name: chance finds such sets, too"
     if is_confirmed(row, evidence):
         return "the model with it does not describe this load, so it is no name"
     if not chose_by_all(row, evidence):

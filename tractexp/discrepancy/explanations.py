@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
+from tractexp.discrepancy.decide import MOST_NAMED
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examine_fit
 from tractexp.discrepancy.families import against_members
 from tractexp.discrepancy.window_search import behind_window
@@ -41,10 +42,8 @@ from tractexp.inference.score_test import Score
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct, even
 
-# of some 3,000 data sets that were judged, three named four times, and never the right ones
-MOST_EFFECTS = 2
 MOST_STEPS = 6  # of adding and leaving out
-SHORTLIST = {1: 10, 2: 8}  # sets of each size that are refitted
+SHORTLIST = {1: 10, 2: 8, 3: 4}  # sets of each size that are refitted
 COMBINED = 14  # effects whose sets are ranked exhaustively
 PATCHED = 4  # sets of one size that are tried before a further effect is added
 WIDELY = 3  # single effects with thresholds or times that are searched to the end
@@ -121,7 +120,7 @@ def worth_another(steps: Sequence[Disagreement]) -> bool:
     the same set.
     """
     same = len(steps) > 1 and steps[-2].fit.names == steps[-1].fit.names
-    return len(steps[-1].fit.names) < MOST_EFFECTS and not same
+    return len(steps[-1].fit.names) < MOST_NAMED and not same
 
 
 def without_needless(
@@ -268,13 +267,13 @@ def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) 
 
 def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
     """The sets of `size` effects that lower the linearised deviance most: from the base fit, and by
-    adding one.
+    adding one; of more than are named by adding one alone.
     """
     first, last = steps[0], steps[-1]
     sets: dict[Names, float] = {}
     for score in last.scores[: SHORTLIST[size]]:
         sets[tuple(sorted((*last.fit.names, score.name)))] = last.fit.deviance - score.drop
-    if size > 1:
+    if 1 < size <= MOST_NAMED:
         names = [s.name for s in first.scores if s.drop > 0][:COMBINED]
         columns = {s.name: _column(first, s) for s in first.scores}
         for subset in itertools.combinations(sorted(names), size):

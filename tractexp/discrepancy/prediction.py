@@ -7,12 +7,14 @@ predicts in events that it was not fitted to.
 
 import functools
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from tractexp.discrepancy.decide import find_predicting
+from tractexp.discrepancy.classes import LEAST_PARTING
+from tractexp.discrepancy.decide import MOST_NAMED, find_predicting
+from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.explanations import (
     WIDELY,
@@ -42,9 +44,9 @@ SHARING = 10.0
 
 
 def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence:
-    """The table of single effects, of sets of two, and of what the search by likelihood ended with,
-    by the model's error on the held-out events. The powers before events are those measured, as in
-    an identification.
+    """The table of single effects, of sets of two, of a third beside the best two, and of what the
+    search by likelihood ended with, by the model's error on the held-out events. The powers before
+    events are those measured, as in an identification.
     """
     plain = explained.base.context.with_measured_power
     context, noise = plain.held_to_usual, residual_noise(plain, explained.chosen)
@@ -61,18 +63,25 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
             for fit, one in zip(fits, predicted, strict=True)
         ]
 
+    def complete(table: Evidence, best: Sequence[SetEvidence]) -> Evidence:
+        missing = _find_missing_subsets(table, best)
+        fits = refit(context, noise, missing, faults=()) if missing else []
+        return replace(table, rows=(*table.rows, *fill(fits)))
+
+    ground, refits = _search_all_sets(context, explained, noise)
     base, *rows = sorted(
-        fill(_fit_all_sets(context, explained, noise)), key=lambda row: bool(row.fit.names)
+        fill(_fit_without_faults(context, noise, refits.values())),
+        key=lambda row: bool(row.fit.names),
     )
     table = Evidence(base, tuple(rows), noise=noise, there=there)
-    if missing := _find_missing_subsets(table, rank_sets(table, criteria)[:1]):
-        rows += fill(refit(context, noise, missing, faults=()))
-        table = Evidence(base, tuple(rows), noise=noise, there=there)
+    best = rank_sets(table, criteria)[:1]
+    table = complete(table, best)
+    if further := search_third(ground, refits, best):
+        rows = fill(_fit_without_faults(context, noise, further))
+        table = complete(replace(table, rows=(*table.rows, *rows)), rows)
     if not find_predicting(table, criteria):
         return table
-    return Evidence(
-        base, tuple(rows), term=_find_best_term(context, table), noise=noise, there=there
-    )
+    return replace(table, term=_find_best_term(context, table))
 
 
 def _find_missing_subsets(
@@ -98,15 +107,46 @@ def _find_best_term(context: Context, table: Evidence) -> SetEvidence:
     return min(rows, key=lambda row: (row.held_out_prediction.excess, row.names))
 
 
-def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> list[Refit]:
-    """The base model and sets of effects, each as it fits best by least squares.
+def search_third(
+    ground: Disagreement, refits: dict[Names, Refit], best: Sequence[SetEvidence]
+) -> list[Refit]:
+    """A third effect beside two that predict best, from where these fit; none where they leave no
+    more of the held-out events than anyone cares about.
 
-    Faults of the measurement are free while sets are looked for; what is told of them is without.
+    Two weak ones beside a strong one may show together only.
     """
-    base, at = explained.base, context.coordinates
+    context = ground.context
+    if not best or len(best[0].fit.names) < MOST_NAMED:
+        return []
+    pair = refits.get(best[0].fit.names, best[0].fit)
+    known = context.catalogue.of_load
+    if best[0].held_out_prediction.error < LEAST_PARTING or not {*pair.names} <= {*known}:
+        return []
+    beside = ground.score_fit(context, pair, ground.noise)
+    return search_effect_sets([ground, beside], refits, len(pair.names) + 1, _say(context))
 
-    def say(line: str) -> None:
-        context.effort.say(f"{line}, by least squares")
+
+def _fit_without_faults(context: Context, noise: Noise, fits: Iterable[Refit]) -> list[Refit]:
+    """Sets as they fit without the faults of the measurement, which are free while sets are looked
+    for.
+    """
+    at = context.coordinates
+    wanted = [(fit.names, at.without_faults(fit.unit, ())) for fit in fits]
+    return refit(context, noise, wanted, faults=())
+
+
+def _say(context: Context) -> Callable[[str], None]:
+    """Tells what is done, and how."""
+    return lambda line: context.effort.say(f"{line}, by least squares")
+
+
+def _search_all_sets(
+    context: Context, explained: Explanations, noise: Noise
+) -> tuple[Disagreement, dict[Names, Refit]]:
+    """The tests of the base model by least squares, and the best fits of it and of sets of effects,
+    with the faults of the measurement free.
+    """
+    base, at, say = explained.base, context.coordinates, _say(context)
 
     squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0])
     squares = replace(squares, prior=context.prior)
@@ -134,12 +174,7 @@ def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> li
     of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]
     for single in of_load[:MOST_TRIED_FAMILIES]:
         add(search_effect_sets([ground, ground.score_fit(context, single, noise)], refits, 2, say))
-    return refit(
-        context,
-        noise,
-        [(f.names, at.without_faults(f.unit, ())) for f in refits.values()],
-        faults=(),
-    )
+    return ground, refits
 
 
 def predict(there: Context, fit: Refit) -> PredictedError:
