@@ -19,8 +19,20 @@ BASE_FIT_ROUNDS = 2  # of noise and fit in turn
 
 @dataclass(frozen=True, eq=False)
 class BaseFit:
-    """The fit, its noise, and the valleys of the base model: its best fits (D,) from all over its
-    box.
+    """The base model's own fit, before any effect is tried.
+
+    Attributes
+    ----------
+    context : Context
+        The records, coordinates and kernels.
+    fit : Refit
+        The best fit, faults of the measurement free.
+    noise : Noise
+        That of its residual.
+    quiet : QuietNoise
+        What estimates the noise of any further fit.
+    local_minima : tuple of (D,) arrays
+        Coordinates of the best fits from all over the box of the base model.
     """
 
     context: Context
@@ -30,7 +42,9 @@ class BaseFit:
     local_minima: tuple[np.ndarray, ...]
 
     def minima_but(self, unit: np.ndarray) -> list[np.ndarray]:
-        """The valleys but the one nearest to coordinates (D,)."""
+        """The local minima but the one nearest to coordinates (D,), by the base model's
+        parameters.
+        """
         base = self.context.coordinates.base
         far = [float(np.linalg.norm((minimum - unit)[base])) for minimum in self.local_minima]
         return [
@@ -41,15 +55,39 @@ class BaseFit:
 
 
 def base_fit(context: Context) -> BaseFit:
-    """Fit the base model from all over its box, where its own fast kernel fits it best."""
+    """Fit the base model from all over its box.
+
+    The search is that of its own kernel, which is the fastest; the fit has the faults of the
+    measurement free.
+
+    Parameters
+    ----------
+    context : Context
+        The records, coordinates and kernels.
+
+    Returns
+    -------
+    BaseFit
+    """
     # the first may not stay the best: faults are free
     minima = minima_of(context, Likelihood.from_problem(context.kernels.bare))
     return fitted_from(context, minima, minima)
 
 
 def minima_of(context: Context, bare: Likelihood) -> list[np.ndarray]:
-    """Coordinates (D,) of the best fits of the base model alone by this likelihood, from all over
-    its box.
+    """The local minima of the base model alone.
+
+    Parameters
+    ----------
+    context : Context
+        Whose coordinates are returned.
+    bare : Likelihood
+        That of the base model, by which the minima are looked for.
+
+    Returns
+    -------
+    list of (D,) arrays
+        The best first, every effect at its null.
     """
     at, ends = context.coordinates, valleys(bare)
     minima = np.tile(at.null, (len(ends), 1))
@@ -60,8 +98,22 @@ def minima_of(context: Context, bare: Likelihood) -> list[np.ndarray]:
 def fitted_from(
     context: Context, starts: Sequence[np.ndarray], local_minima: Sequence[np.ndarray]
 ) -> BaseFit:
-    """Fit the base model from these starts (D,): noise and fit in turn, the first time with what
-    precedes the dips.
+    """Fit the base model from given starts, noise and fit in turn.
+
+    The first noise is what precedes the dips, each later one what the fit before left in quiet.
+
+    Parameters
+    ----------
+    context : Context
+        The records, coordinates and kernels.
+    starts : sequence of (D,) arrays
+        Coordinates that descents begin from.
+    local_minima : sequence of (D,) arrays
+        Kept in what is returned.
+
+    Returns
+    -------
+    BaseFit
     """
     noise = white(context)
     fit = refit(context, noise, [((), start) for start in starts])[0]

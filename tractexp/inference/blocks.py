@@ -1,5 +1,5 @@
-"""Stretches of a tenth of a second: what a model leaves in one of them tells little of what it
-leaves in the next.
+"""Blocks of a tenth of a second: what a model leaves in one tells little of what it leaves in the
+next.
 
 A residual that is no noise is correlated, in a way that no noise model knows. Blocks longer than
 its memory are nearly independent, and to leave out one of them at a time tells how far an estimate
@@ -24,8 +24,24 @@ LEAST_SQUARES_DIFFERENCE = 0.02  # of a sum of squares, 1 % of an error: less is
 def blocks_of(
     events: Sequence[Event], drive: Drive, parameters: int = 1, *, from_dip: bool = False
 ) -> list[slice]:
-    """Blocks of the drive's samples, counted from the start of each dip; `from_dip` leaves out what
-    is before it.
+    """Blocks of the drive's samples, counted from the start of each dip.
+
+    Parameters
+    ----------
+    events : sequence of Event
+        The events of the drive.
+    drive : Drive
+        Their samples, one event after the other.
+    parameters : int
+        Number of free parameters. Blocks are `LENGTH` [s] long, or shorter where a record would
+        have fewer than `FEWEST_BLOCKS` of them for each parameter.
+    from_dip : bool
+        Whether samples before the dip are left out.
+
+    Returns
+    -------
+    list of slice
+        In the order of the samples; each lies within one event.
     """
     parts = [drive.part(e) for e in range(drive.events)]
     starts = [part.start + event.start for part, event in zip(parts, events, strict=True)]
@@ -48,10 +64,29 @@ def blocks_of(
 
 
 def exceeds(squares: np.ndarray, others: np.ndarray, blocks: Sequence[slice]) -> bool:
-    """Whether squares (N,) exceed others by more than chance explains: by twice the scatter of
-    their differences.
+    """Whether squares exceed others by more than chance explains.
 
-    Paired by sample, summed over blocks; and by more than `ALIKE` of the others.
+    The differences are paired by sample and summed over blocks. Their sum has to be more than twice
+    its scatter, and more than `LEAST_SQUARES_DIFFERENCE` of the others.
+
+    Parameters
+    ----------
+    squares, others : (N,)
+        Squares of two residuals at the same samples.
+    blocks : sequence of slice
+        Blocks of the samples, nearly independent of each other.
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> blocks = [slice(0, 2), slice(2, 4)]
+    >>> exceeds(np.array([2.0, 2.0, 2.0, 2.0]), np.ones(4), blocks)
+    True
+    >>> bool(exceeds(np.array([9.0, 9.0, 0.0, 0.0]), np.ones(4), blocks))
+    False
     """
     difference = np.array([float(np.sum(squares[b] - others[b])) for b in blocks])
     count, total = len(difference), float(difference.sum())
@@ -62,10 +97,26 @@ def exceeds(squares: np.ndarray, others: np.ndarray, blocks: Sequence[slice]) ->
 
 
 def reach(without: np.ndarray, whole: float) -> float:
-    """Half the 95 % interval of a figure that is `whole`, by its values without each block (b,): a
-    jackknife's.
+    """Half of the 95 % interval of a figure, by the delete-a-block jackknife.
 
-    One block tells nothing of chance: infinite.
+    Parameters
+    ----------
+    without : (b,)
+        The figure without each of the blocks.
+    whole : float
+        The figure of all of them.
+
+    Returns
+    -------
+    float
+        In the unit of the figure; infinite for fewer than two blocks, which tell nothing of chance.
+
+    Examples
+    --------
+    >>> round(reach(np.array([0.9, 1.0, 1.1]), 1.0), 3)
+    0.497
+    >>> reach(np.array([1.0]), 1.0)
+    inf
     """
     count = len(without)
     if count < 2:

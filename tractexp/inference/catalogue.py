@@ -23,8 +23,19 @@ LEAST_SWING = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that may be missing. `settings` are the values scanned of parameters that vanish at
-    the null.
+    """An effect that may be missing in a model.
+
+    Attributes
+    ----------
+    name : str
+        That of the effect.
+    effect : Effect
+        Its equations.
+    sizes : tuple of Parameter
+        Its parameters with a null: the value at which the effect vanishes.
+    settings : tuple of {name: value}
+        The values that are scanned of its other parameters, such as thresholds and times, in their
+        own units.
     """
 
     name: str
@@ -43,15 +54,27 @@ class Candidate:
         return int(parameter.null == low) - int(parameter.null == high)
 
     def relevant(self, parameter: Parameter) -> float:
-        """The smallest departure from the null that matters."""
+        """The smallest departure from the null that matters, in the parameter's unit."""
         low, high = parameter.bounds
         return float(self.effect.relevant.get(parameter.name, 0.1 * (high - low)))
 
     def compute_sized_value(self, parameter: Parameter, size: float, least: float) -> float:
-        """The value of one of `sizes` that is `size` off its null, or `least` relevant sizes where
-        that is more.
+        """The value of one of `sizes` at some distance from its null.
 
-        A null on a bound is left into the box, whatever sign the size has.
+        Parameters
+        ----------
+        parameter : Parameter
+            One of `sizes`.
+        size : float
+            Distance from the null, in the parameter's unit. Where the null lies on a bound its sign
+            does not count: the value lies inside the box.
+        least : float
+            The least distance, in relevant sizes.
+
+        Returns
+        -------
+        float
+            Cut to the parameter's bounds.
         """
         sign = self.sign(parameter) or np.sign(size) or 1.0
         moved = sign * max(sign * size, least * self.relevant(parameter))
@@ -60,10 +83,17 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """All candidates that can be tested, and why the others cannot.
+    """All effects that can be tested on some records, and why the others cannot.
 
-    `members` of their families have another place or another law; they are tried beside the best
-    textbook effect.
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        The textbook effects and the faults of the measurement.
+    untestable : {name: sentence}
+        Why the records or the model do not allow an effect.
+    members : tuple of Candidate
+        Effects of the candidates' families with another place or another law; they are tried beside
+        the best textbook effect.
     """
 
     candidates: tuple[Candidate, ...]
@@ -80,23 +110,25 @@ class Catalogue:
         return {c.name: c for c in (*self.candidates, *self.members)}
 
     def parameters(self, names: Sequence[str]) -> list[Parameter]:
-        """What effects bring with them."""
+        """All parameters of the named effects."""
         return [p for name in names for p in self[name].effect.parameters]
 
     def sizes(self, names: Sequence[str]) -> list[Parameter]:
-        """Those of them that have a null."""
+        """The parameters of the named effects that have a null."""
         return [p for name in names for p in self[name].sizes]
 
     def family(self, name: str) -> str:
-        """The textbook effect whose family an effect belongs to: itself, where it is one."""
+        """The name of the textbook effect whose family an effect belongs to; its own where it is
+        one.
+        """
         return self[name].effect.family or name
 
     def textbook(self, names: Sequence[str]) -> tuple[str, ...]:
-        """The names by which effects are told, whatever place and law they were found at."""
+        """The names of the textbook effects whose families these effects belong to."""
         return tuple(self.family(name) for name in names)
 
     def label_effect(self, name: str) -> str:
-        """An effect as a sentence tells it: by its textbook name, and what differs from that."""
+        """The name of the textbook effect, followed by what differs from it in place or law."""
         differs = self[name].effect.differs
         if not differs:
             return name
@@ -123,10 +155,26 @@ NOTHING = Catalogue((), {})  # of a model that is fitted as it is
 
 
 def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -> Catalogue:
-    """The registered effects that the model lacks. `only` restricts it; faults of the measurement
-    always stay.
+    """The registered effects that a model lacks.
 
-    Raises `UserError` for a name in `only` that no effect has.
+    Parameters
+    ----------
+    model : Model
+        The base model; its own effects are left out.
+    events : sequence of Event
+        The records, whose channels decide which effects can be seen.
+    only : names
+        Restricts the load's effects to these and their families; none: all. Faults of the
+        measurement always stay.
+
+    Returns
+    -------
+    Catalogue
+
+    Raises
+    ------
+    UserError
+        For a name in `only` that no effect has.
     """
     registered = discover().get("effect", {})
     for name in only:
@@ -154,8 +202,10 @@ def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -
 
 
 def _is_wanted(effect: Effect, only: Sequence[str]) -> bool:
-    """Whether an effect is among those that are asked for, all of them where none is named: with
-    the textbook's effect its family is, and faults of the measurement always are.
+    """Whether an effect is among those asked for.
+
+    Where none is named all are. With a textbook effect its family is, and faults of the measurement
+    always are.
     """
     if not only or effect.name in only:
         return True
@@ -174,7 +224,9 @@ def missing_channel(effect: Effect, events: Sequence[Event]) -> str:
 
 
 def candidate(effect: Effect) -> Candidate:
-    """An effect as it is looked for: its sizes, and the settings of its other parameters."""
+    """The candidate of an effect: its sizes, and at most about `MOST_SETTINGS` combinations of what
+    is scanned of its other parameters.
+    """
     sizes = tuple(p for p in effect.parameters if p.null is not None)
     scanned = [p for p in effect.parameters if p.null is None]
     grid = getattr(effect, "grid", {})

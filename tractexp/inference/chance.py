@@ -33,16 +33,32 @@ SCALE_DRAW_FACTOR = 10  # times as many are drawn for the scales alone
 
 
 def by_draws(p: float) -> str:
-    """A probability as a sentence tells it: no finer than the draws do, though its tail is
-    extrapolated.
+    """A probability as a sentence tells it, no finer than 199 draws can.
+
+    The tail of the statistics is extrapolated, so that a smaller number would say more than is
+    known.
+
+    Examples
+    --------
+    >>> by_draws(0.03), by_draws(1e-6)
+    ('0.03', 'less than 0.005')
     """
     return in_words(p) if p >= 1 / (NULL_DRAWS + 1) else f"less than {1 / (NULL_DRAWS + 1):g}"
 
 
 @dataclass(frozen=True, eq=False)
 class Chance:
-    """Draws of the smallest p (b,) of any candidate or fault of the measurement, and of what is
-    left.
+    """The null distribution of the tests of one fit: what they are where nothing but noise is left.
+
+    Attributes
+    ----------
+    least_p : (b,)
+        The smallest p of any candidate or fault of the measurement, of each of b draws.
+    left : {name: (b,) or (b, k)}
+        The statistics of what is left, by test.
+    scales : {name: Scale}
+        What columns are measured in, of the statistics of which the largest counts and whose scale
+        is known from more draws.
     """
 
     least_p: np.ndarray
@@ -51,26 +67,52 @@ class Chance:
     scales: Mapping[str, Scale] = field(default_factory=dict)
 
     def critical_p(self, alpha: float) -> float:
-        """The p a single candidate must undercut so that chance names any with
-        probability `alpha`.
+        """The p below which a single candidate stands out of all of them.
+
+        Parameters
+        ----------
+        alpha : float
+            Probability that chance alone undercuts it with any candidate.
+
+        Returns
+        -------
+        float
         """
         return float(np.quantile(self.least_p, alpha, method="lower"))
 
     def surprises(self, projection: ScoreTest, context: Context) -> dict[str, float]:
-        """How often chance leaves as much as a fit does, by each test of adequacy."""
+        """{test: p}: how often chance leaves as much as a fit does."""
         return compare_with_draws(projection.statistics(context.problem), self.left, self.scales)
 
 
 def chance_at(
     t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
 ) -> Chance:
-    """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise
-    taken as known.
+    """Draw the null distribution of every statistic at a fit.
 
-    `own` is the projection of the fit under this noise.
+    Draws that estimate their noise anew are kept on disk, for a run that goes on after it was
+    stopped; others cost less than keeping them.
 
-    Draws that estimate their noise anew are kept, as for a run that was stopped; others cost less
-    than keeping them.
+    Parameters
+    ----------
+    t : Linearization
+        All differences at the fit.
+    own : ScoreTest
+        The projection of the fit under this noise.
+    noise : Noise
+        That of the records.
+    quiet : QuietNoise
+        What estimates the noise of a draw from its quiet stretches.
+    seed : int
+        The same seed gives the same draws.
+    plain : bool
+        Whether the noise is taken as known. It is, too, where quiet stretches tell it exactly
+        enough.
+
+    Returns
+    -------
+    Chance
+        Of `NULL_DRAWS` draws.
     """
     context = t.context
     plain = plain or is_noise_exact(context, noise)
@@ -88,12 +130,28 @@ def chance_at(
 
 
 def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[str, Scale]:
-    """Scales of the statistics of which the largest counts, by many draws of noise that is taken as
-    known.
+    """Scales of the statistics of which the largest counts, by `SCALE_DRAW_FACTOR` times as many
+    draws.
 
     The scale of the column that turns out largest is the one most likely to be too small. By the
     draws of a `Chance` alone it is a tenth off, and a p of 1e-3 comes out as anything from 1e-4 to
     1e-2.
+
+    Parameters
+    ----------
+    t : Linearization
+        All differences at the fit.
+    own : ScoreTest
+        The projection of the fit under this noise.
+    noise : Noise
+        That of the records; it is taken as known.
+    seed : int
+        The same seed gives the same draws.
+
+    Returns
+    -------
+    {name: Scale}
+        By test.
     """
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -115,10 +173,10 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
 def _draw_null_distribution(
     t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
 ) -> Chance:
-    """What draws of the noise give: the least p of each over all candidates, and its statistics.
+    """The null distribution by draws of the noise.
 
-    With `plain` the draws are white and not estimated anew; else each draw (NULL_DRAWS, C, N)
-    estimates its own noise from its quiet stretches, as the records do.
+    With `plain` the draws are white and the noise is known; else each draw estimates its own noise
+    from its quiet stretches, as the records do.
     """
     rng = np.random.default_rng(seed)
     if plain:
@@ -145,16 +203,19 @@ def _white(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarr
 
 
 def is_noise_exact(context: Context, noise: Noise) -> bool:
-    """Whether quiet stretches tell the noise exactly enough; of one that follows from the model,
-    its size alone.
+    """Whether quiet stretches tell the noise exactly enough to take it as known.
+
+    That is so where they are worth `QUIET_WORTH` independent samples, and in a domain whose noise
+    follows from the model, so that its size alone is estimated.
     """
     samples = sum(part.stop - part.start for part in context.problem.quiet)
     return context.domain.noise_from_model or noise.worth(samples) >= QUIET_WORTH
 
 
 def _chance(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
-    """The least p (b,) of projected draws and their statistics; a fault of the measurement counts
-    where the noise of the voltage is not loud.
+    """The null distribution of projected draws.
+
+    A fault of the measurement counts where the noise of the voltage is not loud.
     """
     p = projection.least_p
     if noise.loudest_input_mode <= BLURRED:

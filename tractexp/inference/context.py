@@ -35,8 +35,28 @@ FAULT_PRIOR = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """A base model with its catalogue on the events of `records`. Nothing of it changes but what
-    `effort` counts.
+    """A base model with a catalogue of effects on the events of an investigation.
+
+    Nothing of it changes but what `effort` counts.
+
+    Attributes
+    ----------
+    load : Model
+        The base model.
+    catalogue : Catalogue
+        The effects that can be tested.
+    records : Records
+        The events, as recorded and smoothed.
+    kernels : Kernels
+        What simulates the model with any set of effects.
+    coordinates : FreeSet
+        The free numbers of all fits, (D,).
+    criteria : Criteria
+        The thresholds of the decisions.
+    effort : Effort
+        The count of simulations.
+    prior : float
+        Weight of the rows that hold the motor to what machines usually are; 0 is without.
     """
 
     load: Model
@@ -63,8 +83,35 @@ class Context:
         *,
         priors: bool = False,
     ) -> "Context":
-        """A context for these records; the load is simulated behind the recorder's window, where
+        """The context of some records; the load is simulated behind the recorder's window, where
         there is one.
+
+        Parameters
+        ----------
+        load : Model
+            The base model.
+        catalogue : Catalogue
+            The effects that can be tested.
+        records : Records
+            The events.
+        bounds : {name: (lower, upper)}
+            Of the base model's parameters, in their units.
+        fixed : {name: value}
+            Parameters that are held.
+        criteria : Criteria
+            The thresholds of the decisions.
+        effort : Effort
+            What counts the simulations.
+        substeps : int
+            Runge-Kutta steps per sample; None: as many as are needed.
+        family : type
+            The class that builds the model of a set of effects.
+        priors : bool
+            Whether there is a prior on the motor.
+
+        Returns
+        -------
+        Context
         """
         kernels = Kernels(
             family(load.place_behind_recorder(records.window), catalogue),
@@ -78,8 +125,9 @@ class Context:
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
 
     def move_to_records(self, records: Records) -> "Context":
-        """The same model and catalogue on other records, with the same Runge-Kutta steps and a
-        count of its own.
+        """The same model and catalogue on other records, with the same Runge-Kutta steps.
+
+        Its count of simulations is a part of this one's; P0 and Q0 are free where they are here.
         """
         kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
         same = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
@@ -91,15 +139,16 @@ class Context:
 
     @property
     def with_measured_power(self) -> "Context":
-        """The same with P0 and Q0 of each event as they were measured before it: they are no part
-        of a fit.
+        """The context in which P0 and Q0 of each event are as measured before it, and no part of a
+        fit.
         """
         return replace(self, coordinates=replace(self.coordinates, before=np.array([], dtype=int)))
 
     @property
     def held_to_usual(self) -> "Context":
-        """The same for residuals in units of what is left, with the prior of an identification
-        where `model.priors` asks for one.
+        """The context with the prior on the motor, where `model.priors` asks for one.
+
+        Its rows are for residuals in units of what is left, as in an identification.
         """
         bare = self.kernels.bare
         if not bare.priors:
@@ -161,11 +210,13 @@ class Context:
 
     @property
     def samples(self) -> int:
-        """Values that count: of P and Q, or of the currents."""
+        """The number of values that count: of P and Q, or of the currents."""
         return int(np.count_nonzero(self.valid))
 
     def describe(self, noise: Noise) -> str:
-        """Level and color of the noise of what is compared, as a run prints them."""
+        """The level and color of the noise of each channel that is compared, as a run prints
+        them.
+        """
         labels = noise.describe(self.drive.labels).split(", ")
         return ", ".join(
             part
@@ -174,17 +225,41 @@ class Context:
         )
 
     def residuals(self, unit: np.ndarray, names: Sequence[str], beside: str = "") -> np.ndarray:
-        """Calculated minus measured (n, C, N) [pu] at coordinates (n, D) where effects but `names`
-        are at their null.
+        """The residuals at n points with one set of effects.
 
-        Of what they leave one more effect `beside` them, or the pushes, may be off theirs.
+        Parameters
+        ----------
+        unit : (n, D)
+            Coordinates; effects that are not named have to be at their null.
+        names : names
+            The effects of the fit.
+        beside : str
+            One more effect, or the injected perturbations, that may be off its null; "": none.
+
+        Returns
+        -------
+        (n, C, N) array [pu]
+            Calculated minus measured.
         """
         self.effort.spend(len(unit))
         key = self.kernels.family.key(names, beside)
         return self.kernels.residuals(key, unit)
 
     def residuals_of(self, unit: np.ndarray, sets: Sequence[Sequence[str]]) -> np.ndarray:
-        """As `residuals`, with a set of names for each of the coordinates."""
+        """The residuals at n points, each with a set of effects of its own.
+
+        Parameters
+        ----------
+        unit : (n, D)
+            Coordinates.
+        sets : n times names
+            The effects of each point.
+
+        Returns
+        -------
+        (n, C, N) array [pu]
+            Calculated minus measured.
+        """
         of_kernels = self._of_one_kernel([(names, "") for names in sets])
         if len(of_kernels) == 1:
             return self.residuals(unit, sets[0])
@@ -196,11 +271,25 @@ class Context:
     def changes(
         self, unit: np.ndarray, points: np.ndarray, names: Sequence[str], beside: Sequence[str]
     ) -> np.ndarray:
-        """What each of the points (n, D) changes (n, C, N) [pu] against coordinates (D,): one
-        effect beside the names.
+        """The changes of the residuals by one effect beside those of a fit.
 
-        Both by the same kernel, so that what changes nothing is exactly 0; 0 where a simulation
-        diverges, too.
+        Both sides are simulated by the same kernel, so that what changes nothing is exactly 0.
+
+        Parameters
+        ----------
+        unit : (D,)
+            Coordinates of the fit.
+        points : (n, D)
+            The fit with one effect each off its null.
+        names : names
+            The effects of the fit.
+        beside : n names
+            The effect that differs at each point.
+
+        Returns
+        -------
+        (n, C, N) array [pu]
+            0 where a simulation diverges, too.
         """
         changes = np.empty((len(points), self.drive.channels, self.drive.samples))
         for mine in self._of_one_kernel([(names, other) for other in beside]):
@@ -211,7 +300,7 @@ class Context:
         return changes
 
     def _of_one_kernel(self, sets: Sequence[tuple[Sequence[str], str]]) -> list[list[int]]:
-        """Which of the sets share a kernel."""
+        """The positions of the sets (names, effect beside them), in groups that share a kernel."""
         lanes: dict[Key, list[int]] = {}
         for lane, (names, beside) in enumerate(sets):
             lanes.setdefault(self.kernels.family.key(names, beside), []).append(lane)
@@ -224,8 +313,24 @@ class Context:
     def rows(
         self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]
     ) -> np.ndarray:
-        """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of
-        the free faults, and that of the motor.
+        """The rows whose sum of squares is the deviance.
+
+        Parameters
+        ----------
+        unit : (n, D)
+            Coordinates.
+        noise : Noise
+            That of the records.
+        faults : k columns
+            The coordinates that have a prior.
+        sets : n times names
+            The effects of each point.
+
+        Returns
+        -------
+        (n, C N + k + m) array
+            Whitened residuals, then the departures from the priors in standard deviations, then the
+            m rows of the motor's prior, where there is one.
         """
         raw = self.residuals_of(unit, sets)
         white = self.whiten(noise, raw)
@@ -240,11 +345,26 @@ class Context:
     def linearize(
         self, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residuals (C, N) of a fit with the named effects, and rows (1 + k, R): they
-        and their differences.
+        """The residuals of a fit and their derivatives.
 
-        The rows are whitened: C N of the records, then those of the priors of the faults of the
-        measurement.
+        Parameters
+        ----------
+        unit : (D,)
+            Coordinates of the fit.
+        noise : Noise
+            That of the records.
+        columns : k columns
+            The coordinates to differentiate by.
+        names : names
+            The effects of the fit.
+
+        Returns
+        -------
+        (C, N) array [pu]
+            The residuals.
+        (1 + k, R) array
+            Whitened: the residuals, then their derivatives per range. The first C N columns are
+            those of the records, then those of the priors.
         """
         at, k = self.coordinates, len(columns)
         points, width = two_sided(unit, columns)
@@ -259,6 +379,8 @@ class Context:
 
     @property
     def separable_columns(self) -> SeparableColumns:
-        """P0 and Q0 of each event where they are free, which act on its own rows only."""
+        """P0 and Q0 of each event, where they are free, as separable columns: they act on its own
+        residuals only.
+        """
         first = len(self.coordinates.base) if len(self.coordinates.before) else None
         return SeparableColumns.of_power(self.drive, first)

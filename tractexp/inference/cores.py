@@ -28,11 +28,11 @@ _calls: list[Callable[[int], Any]] = []
 
 
 def cores() -> int:
-    """How many processes an investigation may fork: as many as there are cores for this one, a
-    container's limit considered.
+    """The number of processes that an investigation may fork: the cores of this one, a container's
+    limit considered.
 
-    One in a worker of a sweep, which has its share of the cores, in a process that was forked here,
-    and in a thread: others may hold locks beside it.
+    It is 1 where forking is not safe: off Linux, in a worker of a sweep (which has its share of the
+    cores), in a process that was forked here, and in a thread, beside which others may hold locks.
     """
     from joblib import cpu_count
 
@@ -46,10 +46,27 @@ def cores() -> int:
 def each_apart(
     function: Callable[[Item], Result], items: Sequence[Item], effort: Effort
 ) -> list[Result]:
-    """`function` of each item, on all cores. What it returns is data; what it does to objects of
-    this process is lost, but for what it spends of an effort.
+    """Apply a function to independent items, on all cores.
 
-    Raises `UserError` where a process is killed.
+    Parameters
+    ----------
+    function : item -> result
+        What it returns is sent back as data; what it does to objects of this process is lost, but
+        for what it spends of the effort.
+    items : sequence
+        The arguments.
+    effort : Effort
+        Counts the simulations, and tells how many items have ended.
+
+    Returns
+    -------
+    list
+        The results, in the order of the items.
+
+    Raises
+    ------
+    UserError
+        Where a process is killed, as systems do where memory is short.
     """
     processes = min(cores(), len(items))
     with effort.parts(len(items)) as ended:
@@ -100,27 +117,29 @@ def _fork_processes(
 
 
 def _results_in_order(calls: Sequence[Future[Any]]) -> Iterator[Any]:
-    """Not `Executor.map`: it cancels what is left, and Python 3.11's pool cannot end a call that
-    was cancelled.
+    """The results of calls, in their order.
+
+    `Executor.map` does not serve: it cancels what is left, and Python 3.11's pool cannot end a call
+    that was cancelled.
     """
     for future in calls:
         yield future.result()
 
 
 def _count_result(result: Result, ended: Callable[[], None]) -> Result:
-    """The result, after its end was counted."""
+    """The result, whose end is counted."""
     ended()
     return result
 
 
 def _call(k: int) -> Any:
-    """What the function that is mapped at present gives for the k-th item; runs in a worker."""
+    """The result of the k-th item; runs in a worker."""
     return _calls[-1](k)
 
 
 def _begin(call: Callable[[int], Any]) -> None:
-    """Keep the call, which a fork need not send; end by Ctrl-C without a word, and with the parent,
-    even killed.
+    """Set a worker up: it keeps the call, which a fork need not send, and ends by Ctrl-C without a
+    traceback and with its parent, even where that is killed.
     """
     _calls.append(call)
     signal.signal(signal.SIGINT, signal.SIG_DFL)

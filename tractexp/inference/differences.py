@@ -25,11 +25,33 @@ def forward_differences(
     lanes: np.ndarray,
     apart: SeparableColumns = NOT_SEPARABLE,
 ) -> np.ndarray:
-    """Derivatives (n, k + m, R) of the rows at `unit` (n, D), where they are `base` (n, R), away
-    from the nearer wall.
+    """Derivatives of rows from one side, away from the nearer bound.
 
-    First those to each coordinate that acts on all rows, then those to the m of each row's own
-    event. One that cannot be simulated is zero.
+    Parameters
+    ----------
+    rows : (n, D), (n,) -> (n, R)
+        The function, of coordinates and lanes.
+    unit : (n, D)
+        Coordinates of n lanes in the unit cube.
+    base : (n, R)
+        The rows there.
+    lanes : (n,) ints
+        Which lanes these are.
+    apart : SeparableColumns
+        Coordinates that act on the rows of one event each, m an event.
+
+    Returns
+    -------
+    (n, k + m, R) array
+        Per range of each coordinate: first of the k that act on all rows, then of the m of each
+        row's own event. A derivative that cannot be simulated is zero.
+
+    Examples
+    --------
+    >>> point = np.array([[0.2, 0.7]])
+    >>> lane = np.zeros(1, dtype=int)
+    >>> forward_differences(lambda x, lanes: 3 * x, point, 3 * point, lane).round(6).tolist()
+    [[[3.0, 0.0], [-0.0, 3.0]]]
     """
     n, d = unit.shape
     shared, steps = apart.find_shared_columns(d), apart.moves(d)
@@ -48,11 +70,35 @@ def forward_differences(
 def central_differences(
     rows: Rows, unit: np.ndarray, lanes: np.ndarray, apart: SeparableColumns = NOT_SEPARABLE
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (n, R) at `unit` (n, D) and derivatives (n, k + m, R) from both sides, in the order of
-    the forward ones.
+    """Rows, and their derivatives from both sides.
 
-    One batch of n (2 (k + m) + 1). Next to a wall, or where one side cannot be simulated, the
-    difference is one-sided.
+    One batch of n (2 (k + m) + 1) simulations. Next to a bound, or where one side cannot be
+    simulated, the difference is one-sided.
+
+    Parameters
+    ----------
+    rows : (n, D), (n,) -> (n, R)
+        The function, of coordinates and lanes.
+    unit : (n, D)
+        Coordinates of n lanes in the unit cube.
+    lanes : (n,) ints
+        Which lanes these are.
+    apart : SeparableColumns
+        Coordinates that act on the rows of one event each, m an event.
+
+    Returns
+    -------
+    (n, R) array
+        The rows at `unit`.
+    (n, k + m, R) array
+        Derivatives per range, in the order of `forward_differences`.
+
+    Examples
+    --------
+    >>> at = np.array([[0.5]]), np.zeros(1, dtype=int)
+    >>> base, slope = central_differences(lambda x, lanes: x**2, *at)
+    >>> base.tolist(), slope.round(9).tolist()
+    ([[0.25]], [[[1.0]]])
     """
     n, d = unit.shape
     up = np.minimum(unit + CENTRAL, 1.0) - unit
@@ -88,8 +134,12 @@ def _from_both_sides(
 
 
 def finite(changes: np.ndarray) -> np.ndarray:
-    """Changes of a residual; none where a simulation diverges: that tells nothing of what little
-    would do.
+    """Changes of a residual, 0 where a simulation diverges: that tells nothing of small changes.
+
+    Examples
+    --------
+    >>> finite(np.array([1.0, np.nan, np.inf])).tolist()
+    [1.0, 0.0, 0.0]
     """
     return np.nan_to_num(changes, posinf=0.0, neginf=0.0)
 
@@ -97,8 +147,27 @@ def finite(changes: np.ndarray) -> np.ndarray:
 def two_sided(
     unit: np.ndarray, columns: Sequence[int] | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points (2 k, D) a small step above in each of the columns, then below, and how far they are
-    apart (k,).
+    """Points a small step above and below a fit, for difference quotients.
+
+    Parameters
+    ----------
+    unit : (D,)
+        Coordinates of the fit in the unit cube.
+    columns : (k,) ints
+        Which coordinates are moved, one at a time.
+
+    Returns
+    -------
+    (2 k, D) array
+        The points above, then those below; none leaves the cube.
+    (k,) array
+        How far the two of each column are apart.
+
+    Examples
+    --------
+    >>> points, width = two_sided(np.array([0.5, 1.0]), [0, 1])
+    >>> width.round(6).tolist()
+    [0.0002, 0.0001]
     """
     points, at = (
         np.tile(unit, (2, len(columns), 1)),
@@ -110,8 +179,24 @@ def two_sided(
 
 
 def slopes(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Difference quotients (k, ...) of what there is (2 k, ...) at such points; 0 where that
-    diverges.
+    """Difference quotients of what was computed at the points of `two_sided`.
+
+    Parameters
+    ----------
+    rows : (2 k, ...)
+        Values at those points.
+    width : (k,)
+        How far the two points of each column are apart.
+
+    Returns
+    -------
+    (k, ...) array
+        0 where the values diverge.
+
+    Examples
+    --------
+    >>> slopes(np.array([3.0, 1.0]), np.array([0.5])).tolist()
+    [4.0]
     """
     k = len(width)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -12,7 +12,7 @@ SILENCE = 4.0  # s after which a line says that a step goes on
 
 
 class Parts:
-    """How many parts of a step have ended, and how long the others take."""
+    """How many parts of a step have ended, and how long the rest will take."""
 
     def __init__(self, total: int):
         """Count from now on to `total` parts."""
@@ -29,7 +29,13 @@ class Parts:
 
 
 class Effort:
-    """Counts simulations and passes on what each step says."""
+    """Counts simulations, and tells a listener which step is at work.
+
+    Attributes
+    ----------
+    simulations : int
+        Those of this part of the work.
+    """
 
     def __init__(self, tell: Callable[[str], None] = lambda line: None):
         """Count simulations from 0 and tell the stages to `tell`."""
@@ -44,7 +50,7 @@ class Effort:
         return part
 
     def say(self, line: str) -> None:
-        """Name the step that begins."""
+        """Tell the listener the step that begins."""
         self._step, self._said = line, time.perf_counter()
         self._tell(line)
 
@@ -62,18 +68,25 @@ class Effort:
 
     @property
     def counts(self) -> list[int]:
-        """Simulations of each part of the work."""
+        """The simulations of each part of the work."""
         return [effort.simulations for effort in self._all]
 
     def spent_since(self, counts: Sequence[int]) -> list[int]:
-        """Simulations of each of those parts since, and of parts that were begun since."""
+        """The simulations of each part since given `counts`, also of parts that have begun
+        since.
+        """
         return [
             now - before for now, before in itertools.zip_longest(self.counts, counts, fillvalue=0)
         ]
 
     def add(self, spent: Sequence[int]) -> None:
-        """Count what another process has spent on each part; what this one does not know was begun
-        for this part.
+        """Count what another process has spent.
+
+        Parameters
+        ----------
+        spent : simulations of each part
+            In the order of `counts`; parts that this process does not know were begun for this part
+            of the work, and count for it.
         """
         known = tuple(self._all)
         for effort, simulations in zip(known, spent, strict=False):
@@ -91,7 +104,9 @@ class Effort:
 
     @contextmanager
     def audible(self) -> Iterator["Effort"]:
-        """While this is entered no step is silent for long."""
+        """Tell the listener, as long as this is entered, that a step goes on wherever nothing was
+        told for `SILENCE` seconds.
+        """
         ended = Event()
 
         def watch() -> None:

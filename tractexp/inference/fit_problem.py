@@ -16,8 +16,15 @@ from tractexp.inference.separable import SeparableColumns
 class FitProblem:
     """A problem whose residuals are asked for at coordinates (n, D) of its free set.
 
-    With `initial_power` P0 and Q0 of each event are coordinates beside the parameters; else they
-    are the means before. `valid` (C, N) marks the samples that count: gaps do not.
+    Attributes
+    ----------
+    problem : Problem
+        The model on its events.
+    valid : (C, N) bools
+        Which samples of each channel count; gaps do not.
+    initial_power : bool
+        Whether P0 and Q0 of each event are coordinates beside the parameters; else they are the
+        means before it.
     """
 
     problem: Problem
@@ -31,38 +38,54 @@ class FitProblem:
 
     @property
     def samples(self) -> int:
-        """Values of P and Q that count."""
+        """The number of values, over all channels, that count."""
         return int(np.count_nonzero(self.valid))
 
     @functools.cached_property
     def gaps(self) -> bool:
-        """Whether a sample does not count."""
+        """Whether any sample does not count."""
         return not self.valid.all()
 
     @functools.cached_property
     def free_set(self) -> FreeSet:
-        """What its coordinates are."""
+        """The meaning of the coordinates: names, bounds and nulls."""
         return FreeSet.of_problem(self.problem, self.initial_power)
 
     def to_unit(self, values: np.ndarray) -> np.ndarray:
-        """Free values (n, free), at the measured power before each event, as coordinates (n, D)."""
+        """The coordinates (n, D) of free values (n, d), at the power measured before each event."""
         return self.place_parameters(self.problem.space.to_unit(np.atleast_2d(values)))
 
     def place_parameters(self, unit: np.ndarray) -> np.ndarray:
-        """Parameters (n, free or more) in the unit cube as coordinates (n, D), at the measured
-        power before each event.
+        """The coordinates of parameters, at the power measured before each event.
 
-        Whatever power the given ones have is left out.
+        Parameters
+        ----------
+        unit : (n, d or more)
+            Parameters in the unit cube; what follows them, such as another power before, is left
+            out.
+
+        Returns
+        -------
+        (n, D) array
         """
         return self.free_set.at_measured_power(unit)
 
     def values(self, unit: np.ndarray) -> np.ndarray:
-        """Free values (..., free) of coordinates (..., D)."""
+        """The free values (..., d), in physical units, of coordinates (..., D)."""
         return self.problem.space.from_unit(unit[..., : self.free])
 
     def residuals(self, unit: np.ndarray) -> np.ndarray:
-        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D): 0 in gaps, nan where not
-        simulated.
+        """The residuals at n points.
+
+        Parameters
+        ----------
+        unit : (n, D)
+            Coordinates in the unit cube.
+
+        Returns
+        -------
+        (n, C, N) array [pu]
+            Calculated minus measured: 0 in gaps, nan in an event without a steady state.
         """
         problem, drive = self.problem, self.problem.drive
         before = None
@@ -83,7 +106,7 @@ class FitProblem:
 
     @functools.cached_property
     def separable_columns(self) -> SeparableColumns:
-        """P0 and Q0 of each event, which act on its own rows only."""
+        """P0 and Q0 of each event as separable columns: they act on its own residuals only."""
         return SeparableColumns.of_power(
             self.problem.drive, self.free if self.initial_power else None
         )

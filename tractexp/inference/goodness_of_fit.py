@@ -32,18 +32,30 @@ WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
 
 @dataclass(frozen=True)
 class GoodnessOfFit:
-    """How often chance leaves as much as a fit does, by what each test looks for."""
+    """How often chance leaves as much as a fit does.
+
+    Attributes
+    ----------
+    p_by_test : {name: p}
+        By what each test looks for.
+    """
 
     p_by_test: dict[str, float]
 
     @property
     def most_significant_test(self) -> str:
-        """What stands out most of that which the fit leaves."""
+        """The name of the test with the smallest p."""
         return min(self.p_by_test, key=self.p_by_test.__getitem__)
 
     @property
     def p(self) -> float:
-        """By the most significant test, corrected for the number of tests."""
+        """The p of the most significant test, multiplied by the number of tests, at most 1.
+
+        Examples
+        --------
+        >>> GoodnessOfFit({"a step": 0.01, "an oscillation": 0.6}).p
+        0.02
+        """
         return min(1.0, len(self.p_by_test) * self.p_by_test[self.most_significant_test])
 
 
@@ -95,19 +107,40 @@ def windows(problem: Problem, event: int) -> list[tuple[float, float]]:
 
 
 class Scale(NamedTuple):
-    """What columns (k,) of a statistic are measured in before the largest is taken."""
+    """The mean (k,) and spread (k,) by which columns of a statistic are standardized before the
+    largest is taken.
+    """
 
     mean: np.ndarray
     spread: np.ndarray
 
     def largest(self, draws: np.ndarray) -> np.ndarray:
-        """The largest (b,) of draws (b, k)."""
+        """The largest (b,) of the standardized columns of draws (b, k).
+
+        Examples
+        --------
+        >>> scale = Scale(np.array([1.0, 2.0]), np.array([1.0, 4.0]))
+        >>> scale.largest(np.array([[4.0, 4.0]])).tolist()
+        [3.0]
+        """
         return ((draws - self.mean) / self.spread).max(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualWindow:
-    """A stretch of one channel of one event, as samples of the drive and as times of the record."""
+    """A stretch of one channel of one event.
+
+    Attributes
+    ----------
+    event : int
+        Number of the event, from 0.
+    channel : str
+        The channel's label.
+    part : slice
+        Its samples in the drive.
+    start, end : float [s]
+        Its times in the record.
+    """
 
     event: int
     channel: str
@@ -117,8 +150,19 @@ class ResidualWindow:
 
 
 def statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
-    """Statistics of whitened, projected residuals (b, 2, N) by what each looks for, of which the
-    largest counts.
+    """The statistics of which the largest counts, by what each looks for.
+
+    Parameters
+    ----------
+    channels : (b, C, N)
+        Whitened, projected residuals: of a fit b is 1, of draws their number.
+    problem : Problem
+        Whose events, windows and quiet stretches count.
+
+    Returns
+    -------
+    {name: (b, k)}
+        The energy of each window, of steps and pulses, and of oscillations.
     """
     after = align_residuals(channels, problem)
     return {
@@ -172,9 +216,9 @@ def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> fl
 def _compute_exceedance(largest: np.ndarray, value: float) -> float:
     """How often the largest of many exceeds a value, given draws (b,) of it.
 
-    By the moments of a Gumbel distribution; by the L-moments of a generalised extreme value
-    distribution where those say that the tail is heavier. Source: Hosking, Wallis and Wood 1985,
-    their estimates and their test.
+    The tail is that of a Gumbel distribution by its moments, or, where the L-moments say that it is
+    heavier, that of a generalized extreme value distribution by those. Source: Hosking, Wallis and
+    Wood 1985, their estimates and their test.
     """
     from scipy.special import gamma
 
@@ -194,10 +238,22 @@ def _compute_exceedance(largest: np.ndarray, value: float) -> float:
 
 
 def extremes(draws: np.ndarray) -> tuple[Scale, np.ndarray]:
-    """The scale of draws (b, k), and the largest of each in it, (b,).
+    """The scale of draws, and the largest of each in it.
 
     Each draw is judged by the others: among many columns its own part in their mean and spread
     would tell.
+
+    Parameters
+    ----------
+    draws : (b, k)
+        A statistic of k columns under the null.
+
+    Returns
+    -------
+    Scale
+        Of all draws.
+    (b,) array
+        The largest standardized column of each draw.
     """
     b, whole, squares = len(draws), draws.sum(axis=0), (draws**2).sum(axis=0)
     mean = (whole - draws) / (b - 1)
@@ -207,7 +263,9 @@ def extremes(draws: np.ndarray) -> tuple[Scale, np.ndarray]:
 
 
 def residual_windows(problem: Problem) -> list[ResidualWindow]:
-    """Every window of every event, for each channel that is compared."""
+    """Every window of every event, for each channel that is compared; none shorter than two
+    samples.
+    """
     cells = []
     for e, event in enumerate(problem.events):
         first, step, origin = int(problem.drive.first[e]), event.record.step, event.record.t[0]
@@ -251,10 +309,21 @@ def energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def align_residuals(channels: np.ndarray, problem: Problem) -> np.ndarray:
-    """What follows the dips, summed over the events at the same time after each, (b, 2, n) of unit
-    variance.
+    """What follows the dips, summed over the events at the same time after each.
 
     Timers and controls answer every dip alike, however little each event shows of it.
+
+    Parameters
+    ----------
+    channels : (b, C, N)
+        Whitened residuals.
+    problem : Problem
+        Whose events they are of.
+
+    Returns
+    -------
+    (b, C, n) array
+        Of unit variance; n is the number of samples of the shortest event after its dip.
     """
     drive = problem.drive
     after = [
@@ -265,7 +334,20 @@ def align_residuals(channels: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def steps(channels: np.ndarray, problem: Problem) -> np.ndarray:
-    """Square of the sum from each instant to the end of an event, in P and in Q, (b, instants)."""
+    """The evidence of a step at each instant, up to the end of the event.
+
+    Parameters
+    ----------
+    channels : (b, C, N)
+        Whitened residuals.
+    problem : Problem
+        Whose events they are of.
+
+    Returns
+    -------
+    (b, columns) array
+        Squares of the sums from every `STRIDE`-th instant to the end, of each event and channel.
+    """
     columns = []
     for e in range(len(problem.events)):
         sums = np.cumsum(channels[:, :, problem.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
@@ -274,8 +356,19 @@ def steps(channels: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def pulses(after: np.ndarray, problem: Problem) -> np.ndarray:
-    """Square of the sum over each short stretch of aligned residuals (b, 2, n), in P and in Q, (b,
-    stretches).
+    """The evidence of a short pulse after the dips.
+
+    Parameters
+    ----------
+    after : (b, C, n)
+        Residuals as `align_residuals` sums them.
+    problem : Problem
+        Whose sampling it is.
+
+    Returns
+    -------
+    (b, columns) array
+        Squares of the sums over stretches of `PULSES` [s], over their numbers of samples.
     """
     sums = np.cumsum(np.pad(after, ((0, 0), (0, 0), (1, 0))), axis=2)
     columns = [np.empty((len(after), 0))]
@@ -291,8 +384,19 @@ def pulses(after: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
-    """Power at each frequency of all events and channels, in the dip, after it and in both, (b,
-    frequencies).
+    """The evidence of an oscillation that lasts.
+
+    Parameters
+    ----------
+    channels : (b, C, N)
+        Whitened residuals.
+    problem : Problem
+        Whose events they are of.
+
+    Returns
+    -------
+    (b, frequencies) array
+        Power over all events and channels: in the dips, after them and in both.
     """
     power = np.zeros((len(channels), 3, SPECTRUM_BINS // 2 + 1))
     for e, event in enumerate(problem.events):
@@ -307,8 +411,19 @@ def tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
-    """Power of aligned residuals (b, 2, n) by frequency in stretches that overlap by half, (b,
-    cells).
+    """The evidence of an oscillation that comes and goes after the dips.
+
+    Parameters
+    ----------
+    after : (b, C, n)
+        Residuals as `align_residuals` sums them.
+    problem : Problem
+        Whose sampling it is.
+
+    Returns
+    -------
+    (b, cells) array
+        Power by frequency in stretches of `BURSTS` [s] that overlap by half.
     """
     columns = [np.empty((len(after), 0))]
     for length in BURSTS:
@@ -321,8 +436,8 @@ def bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def _power(stretch: np.ndarray) -> np.ndarray:
-    """Power (..., frequencies) of stretches (..., n), of long ones folded onto one transform's
-    length.
+    """The power (..., frequencies) of stretches (..., n), at the frequencies of one transform of
+    `SPECTRUM_BINS` however long they are.
     """
     padded = -(-stretch.shape[-1] // SPECTRUM_BINS) * SPECTRUM_BINS
     return np.abs(np.fft.rfft(stretch, padded, axis=-1)[..., :: padded // SPECTRUM_BINS]) ** 2

@@ -17,11 +17,31 @@ SHARE = 0.02  # of a direction's largest component: smaller ones do not take par
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """The whitened sensitivities `J` (R, d) to the free parameters, in ranges, nuisances projected
-    out.
+    """What the records say about d parameters.
 
-    `values` and `width` (d,) turn ranges into physical and relative changes. Directions whose
-    singular value is below `structural` times the largest change nothing.
+    Attributes
+    ----------
+    names : tuple of str
+        Of the parameters.
+    values : (d,)
+        Their values, in physical units.
+    width : (d,)
+        Their ranges, in physical units.
+    J : (R, d)
+        Whitened sensitivities, per range of each parameter, nuisances projected out.
+    structural : float
+        A direction whose singular value is below this share of the largest changes nothing.
+    held : tuple of str
+        Parameters that cannot move to either side: a requirement of the model holds them.
+
+    Examples
+    --------
+    Two parameters of which the records see only the sum:
+
+    >>> J = np.ones((100, 2))
+    >>> both = Information(("X", "X_prime"), np.ones(2), np.ones(2), J)
+    >>> both.identifiable.tolist(), np.abs(both.unseen).round(6).tolist()
+    ([False, False], [[1.0, 1.0]])
     """
 
     names: tuple[str, ...]
@@ -64,8 +84,8 @@ class Information:
 
     @functools.cached_property
     def _directions(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows, in ranges: those that the records see over their singular values, those they do
-        not; who is blind.
+        """Directions in ranges: those that the records see, over their singular values, and those
+        they do not; and which parameters (d,) change nothing by themselves.
         """
         size = np.linalg.norm(self.J, axis=0)
         scale = np.where(size > 0, size, 1.0)
@@ -78,22 +98,31 @@ class Information:
 
     @property
     def blind(self) -> tuple[str, ...]:
-        """Parameters that change nothing by themselves."""
+        """The names of the parameters that change nothing by themselves."""
         return tuple(
             name for name, blind in zip(self.names, self._directions[2], strict=True) if blind
         )
 
     def find_steps(self, rows: np.ndarray) -> np.ndarray:
-        """Changes (b, d) of the parameters that come nearest to changes `rows` (b, R) of whitened
-        rows, along the directions that the records see.
+        """The changes of the parameters that come nearest to changes of the rows.
+
+        Parameters
+        ----------
+        rows : (b, R)
+            Changes of whitened rows.
+
+        Returns
+        -------
+        (b, d) array
+            In physical units, along the directions that the records see.
         """
         seen = self._directions[0]
         return rows @ self.J @ seen.T @ seen * self.width
 
     @property
     def covariance(self) -> np.ndarray:
-        """(d, d) physical, of the directions that the records see. See `unseen` for those they do
-        not.
+        """The covariance (d, d) in physical units, of the directions that the records see; `unseen`
+        tells the others.
         """
         scaled = self._directions[0] * self.width
         return scaled.T @ scaled
@@ -115,17 +144,19 @@ class Information:
 
     @property
     def identifiable(self) -> np.ndarray:
-        """(d,) False for parameters that take part in a direction that changes nothing."""
+        """Which parameters (d,) take part in no direction that changes nothing."""
         return ~np.any(np.abs(self.unseen) > SHARE, axis=0)
 
     @property
     def standard_errors(self) -> np.ndarray:
-        """(d,) physical; inf for parameters that cannot be identified."""
+        """The standard errors (d,) in physical units; inf for a parameter that cannot be
+        identified.
+        """
         return np.where(self.identifiable, np.sqrt(np.diag(self.covariance)), np.inf)
 
     @property
     def correlation(self) -> np.ndarray:
-        """(d, d), of the directions that the records see."""
+        """The correlation matrix (d, d) of the directions that the records see."""
         covariance = self.covariance
         size = np.sqrt(np.diag(covariance))
         outer = np.outer(size, size)
@@ -173,7 +204,7 @@ def free_standard_errors(root: np.ndarray) -> np.ndarray:
 
 
 def _echelon(rows: np.ndarray) -> np.ndarray:
-    """Reduced row echelon form by full pivoting: the same row space with as many zeros as it
+    """The reduced row echelon form by full pivoting: the same row space with as many zeros as it
     allows.
     """
     rows, done = rows.copy(), 0

@@ -1,8 +1,8 @@
-"""What an unknown effect could look like: a push into one equation during one window of time.
+"""What an unknown effect could look like: a perturbation of one equation during one window of time.
 
-Not an effect of the catalogue but the yardstick of adequacy: if pushes of no catalogued origin
-still help after an effect was added, the effect is not the explanation. Source: score test of a
-variance component (Lin 1997).
+It is no effect of the catalogue but a test of adequacy: if injected perturbations still help after
+an effect was added, the effect is not the explanation. Source: score test of a variance component
+(Lin 1997).
 """
 
 from typing import TYPE_CHECKING
@@ -22,11 +22,12 @@ EDGE_SECONDS = 0.002  # s: how sharp a window starts and ends
 
 
 class Injection(Effect):
-    """Adds push_k to the k-th balance between `window_on` and `window_off` [s since the first
+    """Adds push_k [pu] to the k-th balance between `window_on` and `window_off` [s since the first
     sample].
 
-    Of waveforms what is pushed in place of P and Q is the current's component along the voltage
-    before the event, and that which lags it by a quarter of a cycle: at that voltage, the same.
+    The balances are those of the flux's two axes, the speed, P and Q. Of waveforms the current's
+    component along the voltage before the event stands for P, and that which lags it by a quarter
+    of a cycle for Q: at that voltage they are the same.
     """
 
     name = PUSHES
@@ -73,8 +74,21 @@ PUSH = 1e-3  # how hard
 
 
 def perturbations(context: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (c, D) with a push into one balance in one window of the union of the events', and
-    which balance.
+    """Points with a perturbation of one balance in one window.
+
+    Parameters
+    ----------
+    context : Context
+        The records, whose windows are taken of all events together.
+    unit : (D,)
+        Coordinates of a fit.
+
+    Returns
+    -------
+    (c, D) array
+        The fit with one perturbation of `PUSH` each.
+    (c,) ints
+        Which balance is perturbed, as in `PERTURBATIONS`.
     """
     at = context.coordinates
     spans = sorted({w for e in range(len(context.events)) for w in windows(context.problem, e)})

@@ -13,10 +13,22 @@ INTERVAL_LEVEL = 0.95
 
 
 def interval_factor(freedom: float = np.inf) -> float:
-    """Return half of a 95 % interval over the standard error: Student's t at 97.5 %.
+    """Half of a 95 % interval over the standard error: Student's t at 97.5 %.
 
-    `freedom` counts what the error stands on: samples less what was fitted, or blocks less one. By
-    default the error is known, as that of a forecast.
+    Parameters
+    ----------
+    freedom : float
+        Degrees of freedom that the error stands on: samples less what was fitted, or blocks less
+        one. By default the error is known, as that of a forecast.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> round(interval_factor(), 2), round(interval_factor(4), 2)
+    (1.96, 2.78)
     """
     from scipy.special import stdtrit
 
@@ -27,8 +39,20 @@ def interval_factor(freedom: float = np.inf) -> float:
 class ParameterEstimate:
     """One parameter at a fit.
 
-    `error` is its standard error: nan where it rests on a bound or is not computed. `freedom` is
-    that of the error; `ends` is the interval where that is not the error's alone.
+    Attributes
+    ----------
+    parameter : Parameter
+        Its name, unit and bounds.
+    value : float
+        The estimate, in the parameter's unit.
+    error : float
+        Its standard error; nan where the estimate rests on a bound, or where it is not computed.
+    verdict : str
+        What is said of it, "" where nothing is.
+    freedom : float
+        Degrees of freedom of the error.
+    ends : (lower, upper) or None
+        The interval, where it is not that of the error alone.
     """
 
     parameter: Parameter
@@ -45,19 +69,19 @@ class ParameterEstimate:
 
     @property
     def half(self) -> float:
-        """Half of the 95 % interval; nan without a standard error."""
+        """Half of the 95 % interval, in the parameter's unit; nan without a standard error."""
         return interval_factor(self.freedom) * self.error
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 %, inside the bounds; nan without a standard error."""
+        """The 95 % interval (lower, upper), cut to the bounds; nan without a standard error."""
         if self.ends is not None:
             return self.ends
         ends = np.clip([self.value - self.half, self.value + self.half], *self.parameter.bounds)
         return float(ends[0]), float(ends[1])
 
     def plain(self) -> dict[str, Any]:
-        """As `discrepancy.json` has it."""
+        """{value, standard_error, interval} as `discrepancy.json` holds them."""
         return files.plain(
             {"value": self.value, "standard_error": self.error, "interval": self.interval}
         )

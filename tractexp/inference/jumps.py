@@ -23,10 +23,20 @@ LEAST_JUMP = 0.02
 
 
 def jumps(context: Context, unit: np.ndarray) -> np.ndarray | None:
-    """What may be wrong at the jumps that effects make at coordinates (D,), one standard deviation:
-    (k, C, N) [pu].
+    """The errors that a recorder's filter may make at the jumps of the effects.
 
-    None where samples are averages over a window, in which no jump stays.
+    Parameters
+    ----------
+    context : Context
+        The records and kernels.
+    unit : (D,)
+        Coordinates of a fit; the effects that are present there make the jumps.
+
+    Returns
+    -------
+    (k, C, N) array [pu] or None
+        One standard deviation at one sample each. None where samples are averages over a window, in
+        which no jump stays.
     """
     return None if context.domain.windowed else _jumps(context, unit.tobytes())
 
@@ -34,8 +44,8 @@ def jumps(context: Context, unit: np.ndarray) -> np.ndarray | None:
 # of the two fits that are examined side by side; it holds their context
 @functools.lru_cache(maxsize=2)
 def _jumps(context: Context, key: bytes) -> np.ndarray:
-    """The shapes (k, C, N) of the jumps that the effects present at these coordinates make, for a
-    key of the coordinates' bytes; the caller caches them.
+    """The errors (k, C, N) [pu] at the jumps, for the bytes of the coordinates as a key that a
+    cache can take.
     """
     at, unit = context.coordinates, np.frombuffer(key)
     there = at.present(unit)
@@ -56,8 +66,8 @@ def _jumps(context: Context, key: bytes) -> np.ndarray:
 
 
 def _at_jumps(added: np.ndarray) -> list[tuple[int, float]]:
-    """The samples around the jumps of one channel (N,), each with what may be wrong
-    with it [pu].
+    """The samples around the jumps of one channel (N,), each with the standard deviation [pu] of
+    its error.
     """
     off, least = np.abs(off_neighbors(added)), LEAST_JUMP * np.abs(added).max(initial=0.0)
     doubt: dict[int, float] = {}

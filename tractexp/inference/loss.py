@@ -17,9 +17,21 @@ REFUSED = 1e12
 
 @dataclass(frozen=True, kw_only=True)
 class Loss(Plugin):
-    """Base of the objectives. By itself it is that of Eq. (8), the squares, with equal weights.
+    """Base of the objectives: how a residual counts. By itself it is that of Eq. (8), the squares.
 
-    A robust loss needs to know what residual is usual: the noise before each dip, or `scale`.
+    A robust loss needs to know which residual is usual: the noise before each dip, or `scale`. The
+    objective is the mean over all samples of
+
+        w s² rho((r / s)²)
+
+    with the weight w of the channel, the usual residual s and the residual r [pu].
+
+    Attributes
+    ----------
+    quadratic : bool
+        Whether rho(z) = z, so that the faster sums of squares serve.
+    weight_P, weight_Q : float, 0 or more
+        Weights of the errors of P and of Q.
     """
 
     group: ClassVar[str] = "objective"

@@ -1,8 +1,8 @@
 """Many starts all over the box, and the local minima they end in: a few random ones may all miss
 the best.
 
-What a model seems to miss in a wrong valley is not missing, and what is estimated there is not the
-estimate.
+What a model seems to miss at a wrong local minimum is not missing, and what is estimated there is
+not the estimate.
 """
 
 import numpy as np
@@ -22,8 +22,19 @@ ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looke
 
 
 def screen_points(problem: Problem) -> tuple[np.ndarray, float]:
-    """The most promising points (at most 24, d) of the box by Eq. (8), far apart, and the least
-    objective [pu²].
+    """The most promising of 4096 points that fill the box evenly.
+
+    Parameters
+    ----------
+    problem : Problem
+        Whose objective, Eq. (8), ranks the points.
+
+    Returns
+    -------
+    (at most 24, d) array
+        Points of the unit cube, no two nearer than 0.5.
+    float [pu²]
+        The least objective of all points.
     """
     points = even(SCREENED, problem.space.dimension)
     objective = problem.objective(problem.space.from_unit(points))
@@ -31,8 +42,21 @@ def screen_points(problem: Problem) -> tuple[np.ndarray, float]:
 
 
 def explore_minima(likelihood: Likelihood, points: np.ndarray | None = None) -> Descent:
-    """Where descents from promising `points` (n, d) of the box, by default those screened, end: at
-    most 10.
+    """The ends of descents from all over the box.
+
+    All starts descend for 8 iterations; the best of what they reach goes on.
+
+    Parameters
+    ----------
+    likelihood : Likelihood
+        Whose deviance is lowered.
+    points : (n, d)
+        Starts in the unit cube; by default those of `screen_points`.
+
+    Returns
+    -------
+    Descent
+        Of at most 10 ends.
     """
     points = screen_points(likelihood.problem)[0] if points is None else points
     begun = likelihood.descent(likelihood.place_parameters(points), None, FEW, TOLERANCE)
@@ -44,13 +68,35 @@ def explore_minima(likelihood: Likelihood, points: np.ndarray | None = None) -> 
 
 
 def distinct(ends: Descent, free: int) -> np.ndarray:
-    """Coordinates (at most 4, D) of the ends of distinct valleys, the best first."""
+    """The ends of descents that are different local minima.
+
+    Parameters
+    ----------
+    ends : Descent
+        Where descents ended.
+    free : int
+        Number of free parameters: P0 and Q0, which follow them, do not count.
+
+    Returns
+    -------
+    (at most 4, D) array
+        Coordinates, the best first.
+    """
     return ends.unit[best_distinct(ends.unit[:, :free], ends.deviance, DISTINCT, MOST, norm=2)]
 
 
 def valleys(likelihood: Likelihood) -> np.ndarray:
-    """Coordinates (at most 4, D) of distinct best fits from all over the box and beside the best,
-    the best first.
+    """The distinct local minima of a likelihood, from all over the box and beside the best.
+
+    Parameters
+    ----------
+    likelihood : Likelihood
+        Whose deviance is lowered.
+
+    Returns
+    -------
+    (at most 4, D) array
+        Coordinates, the best first.
     """
     ends = explore_minima(likelihood)
     beside = likelihood.descent(along_least_certain(likelihood, ends.best))
@@ -58,11 +104,22 @@ def valleys(likelihood: Likelihood) -> np.ndarray:
 
 
 def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
-    """Points (6, D) on either side of an optimum (D,), in the direction that the records know
-    least.
+    """Points on either side of a minimum, in the direction that the records know least.
 
     Where q_v is near 2, for instance, the static load takes over the motor's U²/X' and any C will
-    do, so that there is one valley on either side of it.
+    do, so that there is a local minimum on either side.
+
+    Parameters
+    ----------
+    likelihood : Likelihood
+        Whose sensitivities tell the direction.
+    unit : (D,)
+        Coordinates of the minimum.
+
+    Returns
+    -------
+    (6, D) array
+        At 0.3, 0.6 and 0.9 of the way to the bounds.
     """
     _, J = likelihood.jacobian(unit)
     direction = np.linalg.svd(J.shared_columns, full_matrices=False)[2][-1]

@@ -17,8 +17,22 @@ from tractexp.record import Event
 
 
 def departures(problem: Problem, values: np.ndarray) -> np.ndarray:
-    """How far free values (n, d) are from what the model's motor usually is, (n, k), in standard
-    deviations.
+    """How far candidates are from what the model's motor usually is.
+
+    Each usual quantity has a median and a factor, the spread of its logarithm: a departure is
+    log(quantity / median) / log(factor).
+
+    Parameters
+    ----------
+    problem : Problem
+        Whose model has the motor.
+    values : (n, d)
+        Free values of n candidates.
+
+    Returns
+    -------
+    (n, k) array
+        In standard deviations, of k quantities; k is 0 for a motor of which nothing is known.
     """
     by_name = dict(zip(problem.model.names, problem.full(values).T, strict=True))
     motor = problem.model.motor
@@ -33,15 +47,28 @@ def departures(problem: Problem, values: np.ndarray) -> np.ndarray:
 
 
 def weigh_prior(events: Sequence[Event], drive: Drive, free: int) -> float:
-    """The weight of a prior's rows beside residuals in units of what is left, with which a block of
-    samples counts as one of them; `free` is the number of free parameters.
+    """The weight of a prior's rows beside residuals in units of what is left.
+
+    Parameters
+    ----------
+    events : sequence of Event
+        The events of the drive.
+    drive : Drive
+        Their samples; those of weight 0 do not count.
+    free : int
+        Number of free parameters.
+
+    Returns
+    -------
+    float
+        The root of the samples of a block: a block of samples then counts as one row of the prior.
     """
     samples = int(np.count_nonzero(drive.weights > 0))
     return float(np.sqrt(samples / len(blocks_of(events, drive, free))))
 
 
 def held_in_words(problem: Problem, values: np.ndarray) -> str:
-    """That free values (d,) were held by a prior, and how far off it they are, in a sentence."""
+    """A sentence that the free values (d,) were held by a prior, and how far off it they are."""
     (off,) = np.abs(departures(problem, values[None]))
     far = (
         f", and is {off.max():.2g} standard deviations off where it is farthest"

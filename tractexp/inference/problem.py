@@ -26,8 +26,31 @@ PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
 def narrow_bounds(
     parameters: Sequence[Parameter], bounds: Mapping[str, Sequence[float]]
 ) -> tuple[Parameter, ...]:
-    """Parameters with some bounds replaced. Raises `UserError` for an unknown name or reversed
-    bounds.
+    """The parameters with some of their bounds replaced.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        Those of a model.
+    bounds : {name: (lower, upper)}
+        New bounds, in the parameter's own unit; parameters that are not named keep theirs.
+
+    Returns
+    -------
+    tuple of Parameter
+        In the order given. A default outside the new bounds moves to the nearer of them.
+
+    Raises
+    ------
+    UserError
+        For a name that no parameter has, for what is not a pair, and for reversed bounds.
+
+    Examples
+    --------
+    >>> inertia = Parameter(1.0, (0.1, 4.0), "s", "inertia constant", "an example", name="H")
+    >>> (narrow,) = narrow_bounds([inertia], {"H": (2.0, 3.0)})
+    >>> narrow.bounds, narrow.default
+    ((2.0, 3.0), 2.0)
     """
     by_name = {p.name: p for p in parameters}
     for name, pair in bounds.items():
@@ -54,8 +77,8 @@ def _check_name(name: str, by_name: Mapping[str, object], where: str) -> None:
 
 
 def _check_channels(model: Model, events: Sequence[Event]) -> None:
-    """Raise `UserError` where a part of the model reads a channel that an event does not have, and
-    that drives it.
+    """Raise `UserError` where a part of the model is driven by a channel that an event does not
+    have.
     """
     for (channel, part), event in itertools.product(model.reads.items(), events):
         if channel in event.channels or channel in COMPARED:
@@ -71,8 +94,8 @@ def _check_channels(model: Model, events: Sequence[Event]) -> None:
 
 
 def _check_power(events: Sequence[Event]) -> None:
-    """Raise `UserError` for an event in which nothing draws power: every model fits it, and none is
-    told.
+    """Raise `UserError` for an event in which nothing draws power: every model fits it, so that it
+    tells none from another.
     """
     for event in events:
         drawn = float(np.nanmax(np.hypot(event.record.P, event.record.Q)))
@@ -86,15 +109,23 @@ def _check_power(events: Sequence[Event]) -> None:
 
 @dataclass(frozen=True)
 class Step:
-    """Runge-Kutta steps per sample, one number per event, and the error they leave [pu] (nan where
-    given by hand).
+    """The Runge-Kutta steps of a simulation.
+
+    Attributes
+    ----------
+    substeps : (E,) ints
+        Steps per sample of each event.
+    error : (E,) [pu]
+        The largest error that these steps leave; nan where the number was given by hand.
     """
 
     substeps: np.ndarray
     error: np.ndarray
 
     def describe(self, events: Sequence[Event]) -> str:
-        """The sentence a run prints."""
+        """The sentence that a run prints: the steps, their lengths [ms] and the error they leave
+        [pu].
+        """
         sizes = [1e3 * e.record.step / n for e, n in zip(events, self.substeps, strict=True)]
         text = ", ".join(
             f"{n} of {size:g} ms"
@@ -110,8 +141,33 @@ class Step:
 
 
 class Problem:
-    """Free parameters (columns of `values`) of a model, fitted to events. What the search loop
-    works on.
+    """Free parameters of a model that are fitted to events: what the search loop works on.
+
+    A candidate is a row of free values, one column a parameter, in physical units. Many candidates
+    are simulated in one call.
+
+    Attributes
+    ----------
+    model : Model
+        The equations of the load.
+    parameters : tuple of Parameter
+        All parameters of the model, with the bounds of this problem.
+    fixed : {name: value}
+        Parameters that are not searched.
+    space : Box
+        Names and bounds of the d free values.
+    defaults, lower, upper : (d,)
+        Their defaults and bounds.
+    per_event : tuple of names
+        Parameters with a value of their own in each event.
+    loss : Loss
+        How a residual counts in the objective.
+    priors : bool
+        Whether the motor is held to what machines usually are.
+    drive : Drive
+        Inputs and measurements of all events, one after the other.
+    step : Step
+        The Runge-Kutta steps of each event.
     """
 
     model: Model
@@ -139,12 +195,33 @@ class Problem:
         *,
         priors: bool = False,
     ):
-        """Raises `UserError` for unknown names and values out of range; `substeps` None means
-        automatic.
+        """State which parameters of a model are fitted to which events.
 
-        Parameters in `per_event` have a value of their own in each of several events; their columns
-        are called `T_m[1]`, `T_m[2]`, ... `loss` None means least squares. With `priors` the
-        estimate is held to what the model's motor usually is.
+        Parameters
+        ----------
+        model : Model
+            The equations of the load.
+        events : sequence of Event
+            The dips, all of them fitted together.
+        bounds : {name: (lower, upper)}
+            Bounds in place of the model's own, in each parameter's unit.
+        fixed : {name: value}
+            Parameters that are held at a value.
+        substeps : int
+            Runge-Kutta steps per sample; None: as many as the bounds need.
+        per_event : names
+            Parameters with a value of their own in each of several events; their columns are called
+            `T_m[1]`, `T_m[2]`, ...
+        loss : Loss
+            How a residual counts; None: least squares.
+        priors : bool
+            Whether the estimate is held to what the model's motor usually is.
+
+        Raises
+        ------
+        UserError
+            For unknown names, values out of range, an event without load, a channel that the model
+            needs and an event lacks, and where no parameter is left free.
         """
         self.model, self.priors = model, priors
         self.events = self.domain.events(events)
@@ -196,8 +273,18 @@ class Problem:
         self.step = self._step(substeps)
 
     def with_steps_of(self, share: float) -> "Problem":
-        """The same with as many Runge-Kutta steps as this share of the box needs;
-        see `steps_at`.
+        """The problem with as many Runge-Kutta steps as a share of the box needs; the rest is
+        stiff.
+
+        Parameters
+        ----------
+        share : float
+            Share of the candidates all over the box, 0 to 1, that the steps suffice for.
+
+        Returns
+        -------
+        Problem
+            This one where its steps suffice for no more than that share; see `steps_at`.
         """
         if share >= self.domain.probed:
             return self
@@ -206,7 +293,18 @@ class Problem:
         return other
 
     def steps_at(self, values: np.ndarray) -> int:
-        """Runge-Kutta steps per sample that free values (n, free) need."""
+        """The Runge-Kutta steps per sample that some candidates need.
+
+        Parameters
+        ----------
+        values : (n, d)
+            Free values.
+
+        Returns
+        -------
+        int
+            The largest number of all events.
+        """
         candidates = self.candidates(values)
         return int(
             self.model.substeps(self.drive, candidates, self.domain.finest, until=self._until)[
@@ -221,8 +319,10 @@ class Problem:
         return [end + self.domain.aftermath for end in ends]
 
     def digest(self) -> str:
-        """SHA-256 of the equations, the records and what is known of the parameters: of equal
-        problems the same.
+        """The SHA-256 of a problem, as 64 hexadecimal digits: equal problems have the same.
+
+        It covers the equations, the records, the bounds, the steps and what is known of the
+        parameters.
         """
         drive, free = (
             self.drive,
@@ -244,8 +344,17 @@ class Problem:
         return sha.hexdigest()
 
     def driven_by(self, events: Sequence[Event]) -> "Problem":
-        """The same problem with other voltages of the same lengths; Runge-Kutta steps and scales
-        stay.
+        """The problem with other events of the same lengths, such as those with a smoothed voltage.
+
+        Parameters
+        ----------
+        events : sequence of Event
+            As many as this problem has, each with as many samples.
+
+        Returns
+        -------
+        Problem
+            Its Runge-Kutta steps and scales are those of this one.
         """
         other = copy.copy(self)
         other.events = tuple(events)
@@ -254,24 +363,24 @@ class Problem:
 
     @property
     def domain(self) -> Domain:
-        """What the model is compared with."""
+        """The domain in which model and records are compared: phasors or waveforms."""
         return domain_of(self.model)
 
     @property
     def steady(self) -> list[slice]:
-        """The samples of the drive whose means are P0 and Q0 of each event; [] where those are not
-        compared.
+        """The samples of the drive whose means are P0 and Q0, one slice an event; [] where those
+        are not compared.
         """
         return self.domain.steady(self.events, self.drive)
 
     @property
     def quiet(self) -> list[slice]:
-        """The samples of the drive in which little happens."""
+        """The stretches of the drive in which little happens: what is left there is noise."""
         return quiet_stretches(self.events, self.drive)
 
     @property
     def power(self) -> Load:
-        """What the load takes, over what it took before each event."""
+        """The measured power of the load relative to its power before each event."""
         return Load.from_powers(self.drive.measurements, self.drive.before, self.drive.first)
 
     def _driven(self) -> Drive:
@@ -282,34 +391,71 @@ class Problem:
         )
 
     def by_event(self, values: np.ndarray) -> np.ndarray:
-        """Free values (n, free) -> all parameters of the model in each event (E, n, d)."""
+        """All parameters of the model in each event.
+
+        Parameters
+        ----------
+        values : (n, d)
+            Free values of n candidates.
+
+        Returns
+        -------
+        (E, n, p) array
+            The p parameters of the model in the order of its names, fixed ones included.
+        """
         values = np.atleast_2d(values)
         return np.where(
             self._columns[:, None] < 0, self._rest, np.moveaxis(values[:, self._columns], 1, 0)
         )
 
     def full(self, values: np.ndarray) -> np.ndarray:
-        """Free values (n, free) -> all parameters of the model (n, d), a mean where they differ by
-        event.
+        """All parameters of the model, one row a candidate.
+
+        Parameters
+        ----------
+        values : (n, d)
+            Free values of n candidates.
+
+        Returns
+        -------
+        (n, p) array
+            A parameter that differs from event to event is told by its mean.
         """
         return self.by_event(values).mean(axis=0) if self.per_event else self.by_event(values)[0]
 
     def candidates(self, values: np.ndarray) -> np.ndarray:
-        """Free values (n, free) as the model simulates them: (n, d), or (E, n, d) where they differ
-        by event.
+        """The parameters of the model as its simulation takes them.
+
+        Parameters
+        ----------
+        values : (n, d)
+            Free values of n candidates.
+
+        Returns
+        -------
+        (n, p) or (E, n, p) array
+            The latter where parameters differ from event to event.
         """
         return self.by_event(values) if self.per_event else self.full(values)
 
     def objective(self, values: np.ndarray) -> np.ndarray:
-        """Eq. (8) of free values (n, free): mean squared error of P plus that of Q, over all events
-        [pu²].
+        """The objective of Eq. (8): mean squared error of P plus that of Q, over all events.
 
-        Of waveforms, the mean squared error of the phase currents.
+            f = 1/N sum_k (P_k - P_calculated,k)² + (Q_k - Q_calculated,k)²
 
-        With another loss or other weights, the mean of those.
+        Of waveforms it is the mean squared error of the phase currents. Another loss or other
+        weights take the place of the squares.
 
-        Candidates without a steady state get `REFUSED` times one plus how far they miss it; those
-        that diverge get `REFUSED`.
+        Parameters
+        ----------
+        values : (n, d)
+            Free values of n candidates.
+
+        Returns
+        -------
+        (n,) array [pu²]
+            A candidate without a steady state before the dip gets `REFUSED` times one plus how far
+            it misses it, one that diverges gets `REFUSED`: it is never nan.
         """
         if self.loss.quadratic:
             errors = self.model.errors(self.drive, self.candidates(values), self.step.substeps)
@@ -321,8 +467,19 @@ class Problem:
         return np.where(miss > 0, REFUSED * (1 + miss), f)
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
-        """Calculated minus measured (n, C N), channel by channel, so scaled that their squares sum
-        to the objective.
+        """The residuals whose squares sum to the objective.
+
+        Parameters
+        ----------
+        values : (n, d)
+            Free values of n candidates.
+
+        Returns
+        -------
+        (n, C N) array [pu]
+            Calculated minus measured over the root of the number of samples, one channel after the
+            other; nan for a candidate without a steady state. With a robust loss, the roots of the
+            losses.
         """
         drive = self.drive
         if self.loss.quadratic:
@@ -343,7 +500,7 @@ class Problem:
         return response.by_candidate - self.drive.measurements, response.miss
 
     def _losses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Weighted losses (n, C, N) [pu²], and the misses as above."""
+        """Weighted losses (n, C, N) [pu²], and how far each event misses a steady state (E, n)."""
         errors, miss = self._errors(values)
         with np.errstate(invalid="ignore"):  # what diverged, in a gap
             return self.drive.weights * self._scale**2 * self.loss.rho(
@@ -351,8 +508,8 @@ class Problem:
             ), miss
 
     def _find_lasting(self, candidates: np.ndarray) -> np.ndarray:
-        """Which candidates (n, d) do not grow beyond bounds at any step, as circuits with a
-        negative reactance may.
+        """Which candidates (n, d) stay finite at the finest step, (n,): circuits with a negative
+        reactance grow beyond all bounds at any.
         """
         finest = np.full(len(self.events), MOST_SUBSTEPS)
         outputs = self.model.simulate(self.drive, candidates, finest).outputs
@@ -374,7 +531,10 @@ class Problem:
         return self._automatic(self.domain.probed)
 
     def _automatic(self, share: float) -> Step:
-        """As many steps as that share of candidates all over the box needs."""
+        """The fewest steps that suffice for a share of `PROBES` candidates all over the box.
+
+        Raises `UserError` where the finest step that is allowed leaves too large an error.
+        """
         fine, probes = (
             self.domain.finest,
             self.candidates(self.space.from_unit(even(PROBES, self.space.dimension))),

@@ -18,7 +18,17 @@ from tractexp.record import Event
 
 @dataclass(frozen=True, eq=False)
 class Records:
-    """Events as recorded, and as a simulation is driven by them."""
+    """Events as they were recorded, and as they drive a simulation.
+
+    Attributes
+    ----------
+    recorded : tuple of Event
+        As read.
+    smoothed : tuple of SmoothedEvent
+        With the noise of the voltage taken out, and the recorder's window undone where it is known.
+    window : RecorderWindow or None
+        That over which the recorder forms phasors.
+    """
 
     recorded: tuple[Event, ...]
     smoothed: tuple[SmoothedEvent, ...]
@@ -29,7 +39,20 @@ class Records:
     def from_events(
         cls, events: Sequence[Event], window: RecorderWindow | None = None
     ) -> "Records":
-        """The events, by a recorder of this window."""
+        """The records of some events.
+
+        Parameters
+        ----------
+        events : sequence of Event
+            As read.
+        window : RecorderWindow or None
+            That of the recorder: the voltage is sharpened by it. None: it is not known, or there is
+            none.
+
+        Returns
+        -------
+        Records
+        """
         driving = tuple(domain_of(e).smooth_event(e) for e in events)
         if window is not None:
             driving = tuple(replace(s, event=window.sharpen_event(s.event)) for s in driving)
@@ -37,12 +60,23 @@ class Records:
 
     @functools.cached_property
     def events(self) -> tuple[Event, ...]:
-        """The events with their voltage smoothed."""
+        """The events with their voltage smoothed: they drive the simulation."""
         return tuple(s.event for s in self.smoothed)
 
 
 def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
-    """Raise `UserError` for events that do not belong together."""
+    """Check that events can be investigated together.
+
+    Parameters
+    ----------
+    train, validate : sequences of Event
+        Those that are fitted, and those that are held out.
+
+    Raises
+    ------
+    UserError
+        Where an event is in both, and where one has a channel (f or U2) that another lacks.
+    """
     held = [e.record.where for e in validate]
     for event in train:
         if event.record.where in held:

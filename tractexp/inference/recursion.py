@@ -5,7 +5,27 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def sum_with_decay(values: ArrayLike, factor: complex) -> NDArray[np.complex128]:
-    """y[k] = x[k] + factor y[k - 1] of values x (n,), at rest at first: (n,)."""
+    """The sum of what came before, fading by one factor a sample.
+
+        y[k] = x[k] + factor y[k - 1],  y[-1] = 0
+
+    Parameters
+    ----------
+    values : (n,)
+        x.
+    factor : complex
+        The pole of this recursive filter; its modulus below 1 is stable.
+
+    Returns
+    -------
+    (n,) complex array
+        y.
+
+    Examples
+    --------
+    >>> sum_with_decay([1.0, 0.0, 0.0], 0.5).real.tolist()
+    [1.0, 0.5, 0.25]
+    """
     # as fast as scipy.signal's filter, which takes a second to import
     from scipy.linalg.blas import ztbsv
 

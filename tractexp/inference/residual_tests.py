@@ -10,7 +10,21 @@ REJECTED = 0.01  # p-value below which a test speaks
 
 @dataclass(frozen=True)
 class ResidualTest:
-    """One test: its statistic, degrees of freedom, p-value and what it says."""
+    """A test of whitened residuals.
+
+    Attributes
+    ----------
+    name : str
+        What is tested, and by which test.
+    statistic : float
+        Its value.
+    freedom : int
+        Degrees of freedom of the chi-squared distribution it is compared with.
+    p : float
+        Probability of as large a statistic where nothing but noise is left.
+    says : str
+        Its outcome in a word.
+    """
 
     name: str
     statistic: float

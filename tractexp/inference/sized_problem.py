@@ -20,9 +20,22 @@ from tractexp.record import Event
 
 
 def find_torque(model: Model) -> Parameter:
-    """The parameter that tells how much a motor draws before a dip: the first that is a power.
+    """The parameter that tells how much a motor draws before a dip.
 
-    Raises `UserError` for a model without one.
+    Parameters
+    ----------
+    model : Model
+        A load with a motor.
+
+    Returns
+    -------
+    Parameter
+        The first of the motor in per unit that goes with its size: a power or a torque.
+
+    Raises
+    ------
+    UserError
+        For a model without a motor of that kind.
     """
     for parameter in model.motor.parameters:
         if parameter.unit == "pu" and parameter.power_exponent == 1:
@@ -34,8 +47,19 @@ def find_torque(model: Model) -> Parameter:
 
 
 class SizedProblem(Problem):
-    """A problem whose motors are of another size in each event: constants are those of motors that
-    draw `reference` [pu], and the torque of each event scales them.
+    """A problem whose motors are of another size in each event.
+
+    The constants are those of motors that draw `reference` [pu]. The torque T_e of event e scales
+    each by (T_e / reference)^k, where k is the power of the base by which the parameter goes.
+
+    Attributes
+    ----------
+    torque : str
+        Name of the parameter that differs from event to event.
+    reference : float
+        Power [pu] that motors draw whose constants are the free values.
+    exponents : (p,) ints
+        k of each parameter of the model; 0 of the torque and of what is no motor's.
     """
 
     def __init__(
@@ -46,8 +70,17 @@ class SizedProblem(Problem):
         fixed: Mapping[str, float],
         substeps: int | None = None,
     ):
-        """As `Problem`; raises `UserError` for a model without a motor, and where its torque is
-        fixed.
+        """State which parameters are shared by motors whose size differs from event to event.
+
+        Parameters
+        ----------
+        model, events, bounds, fixed, substeps
+            As of `Problem`.
+
+        Raises
+        ------
+        UserError
+            As `Problem`; also for a model without a motor, and where its torque is fixed.
         """
         own = find_torque(model)
         if own.name in fixed:
@@ -64,8 +97,17 @@ class SizedProblem(Problem):
         super().__init__(model, events, bounds, fixed, substeps, (torque.name,))
 
     def by_event(self, values: np.ndarray) -> np.ndarray:
-        """Free values (n, free) -> all parameters of the model in each event (E, n, d), on the base
-        of the load.
+        """All parameters of the model in each event, on the base of the load.
+
+        Parameters
+        ----------
+        values : (n, d)
+            Free values of n candidates.
+
+        Returns
+        -------
+        (E, n, p) array
+            The motor's constants scaled to the size that its torque tells.
         """
         given = super().by_event(values)
         size = given[..., self._at, None] / self.reference
@@ -73,25 +115,23 @@ class SizedProblem(Problem):
 
     @property
     def shares(self) -> np.ndarray:
-        """Columns (E,) of the free values that hold the torque of each event."""
+        """The columns (E,) of the free values that hold the torque of each event."""
         return self._columns[:, self._at]
 
     @property
     def constants(self) -> np.ndarray:
-        """Columns (k,) of the free values that all events share."""
+        """The columns (k,) of the free values that all events share."""
         return np.setdiff1d(np.arange(self.space.dimension), self.shares)
 
     @property
     def separable(self) -> SeparableColumns:
-        """The torques, each of which acts on the rows of its own event."""
+        """The torques as separable columns: each acts on the residuals of its own event only."""
         rows = SeparableColumns.of_power(self.drive, None).rows
         return SeparableColumns(self.shares[:, None], rows)
 
     @property
     def scale_to_own_power(self) -> np.ndarray:
-        """What the constants (k,) are multiplied by for the base of what the motors draw
-        themselves.
-        """
+        """The factors (k,) that turn constants into per unit of the power that the motors draw."""
         names = [self.space.names[k] for k in self.constants]
         exponents = dict(zip(self.model.names, self.exponents.tolist(), strict=True))
         return self.reference ** -np.array([exponents[name] for name in names], dtype=float)
