@@ -20,17 +20,30 @@ TURN = np.exp(-2j * np.pi / 3 * np.arange(3))
 
 def write(tmp_path, *rows, f=50.0, segments=None):
     """A record of (name, unit, phasor (N,) RMS); the name says voltage or current by the unit."""
-    channels = []
+    waves = []
     for k, (name, unit, z) in enumerate(rows):
         x = np.sqrt(2) * np.real(z * np.exp(2j * np.pi * f * T))
-        x += 1e-4 * np.abs(x).max() * np.random.default_rng(k).standard_normal(len(T))
+        few = np.random.default_rng(k).standard_normal(len(T))
+        waves.append((name, unit, x + 1e-4 * np.abs(x).max() * few))
+    return write_waves(tmp_path, waves, f, segments)
+
+
+def write_waves(tmp_path, waves, f=50.0, segments=None):
+    """A record of (name, unit, values (N,))."""
+    channels = []
+    for name, unit, x in waves:
         gain = np.abs(x).max() / 30000
         quantity = "voltage" if unit.endswith("V") else "current"
-        channels.append(
-            Channel(name, np.round(x / gain).astype(np.int16), unit, quantity, gain=gain)
-        )
+        raw = np.round(x / gain).astype(np.int16)
+        channels.append(Channel(name, raw, unit, quantity, gain=gain))
     made = Recording("made", channels, segments or [Segment(0, len(T), RATE, 0.0)], f)
     return next(p for p in comtrade.write(made, tmp_path / "a.cfg") if p.suffix == ".cfg")
+
+
+def waves_of(rows):
+    """The values (N,) at 50 Hz of (name, unit, phasor (N,) RMS)."""
+    wave = np.exp(2j * np.pi * 50 * T)
+    return [(name, unit, np.sqrt(2) * np.real(z * wave)) for name, unit, z in rows]
 
 
 def loads_of(path, **settings):
@@ -356,3 +369,60 @@ def test_names_of_iec_61850_are_phases_to_ground(tmp_path, names):
     rows = [[f"{x:.6f}" for x in row] for row in zip(t, E, E, E, P, Q, strict=True)]
     [load], _, _ = loads_of(write_table(tmp_path / "t.csv", header, rows))
     assert (load["U"], load["P"], load["Q"]) == pytest.approx((110, 20, 8), rel=1e-3)
+
+
+def test_of_the_least_mean_and_largest_values_the_mean_is_read(tmp_path):
+    t, U, P, Q = slow()
+    names = ("U L1-L2 {} (kV rms)", "Active Power Total {} (MW)", "Reactive Power Total {} (Mvar)")
+    header = ["t", *(name.format(what) for name in names for what in ("Min", "Avg", "Max"))]
+    columns = [t, *(x * size for x in (U, P, Q) for size in (0.98, 1.0, 1.02))]
+    rows = [[f"{x:.6f}" for x in row] for row in zip(*columns, strict=True)]
+    [load], _, _ = loads_of(write_table(tmp_path / "t.csv", ",".join(header), rows))
+    assert (load["U"], load["P"], load["Q"]) == pytest.approx((110, 20, 8), rel=1e-3)
+
+
+def test_samples_that_are_counted_have_a_time_that_can_be_given(tmp_path):
+    rows = [[f"{x:.6f}" for x in row] for row in zip(*slow()[1:], strict=True)]
+    numbered = [[str(k), *row] for k, row in enumerate(rows)]
+    path = write_table(tmp_path / "t.csv", "t,U (kV),P (MW),Q (Mvar)", numbered)
+    with pytest.raises(tractexp.UserError, match=r"counts samples, the time of one: .*20 ms"):
+        tractexp.read(path)
+    [dip] = tractexp.read(path, units={"t": "20 ms"})
+    assert dip.t_start == pytest.approx(8, abs=0.03)
+
+
+def test_rms_values_without_angles_are_no_direct_voltage(tmp_path):
+    rows = [(f"U L{k}", "kV", 110 / np.sqrt(3) * DIP) for k in (1, 2, 3)]
+    path = write_waves(tmp_path, [*rows, *((f"I L{k}", "kA", 0.1 * DIP) for k in (1, 2, 3))])
+    loads, first, text = loads_of(path)
+    assert loads == []
+    assert "is direct" not in text
+    assert "keeps its sign, as RMS values do: 63.51 kV in the mean" in first
+    assert "(30.0%) at 1.000 s for 250 ms" in first
+    assert first.endswith("does not follow without angles, or P and Q")
+
+
+def test_a_voltage_whose_recorder_stops_is_no_direct_one(tmp_path):
+    last = int(1.1 * RATE)
+    stopped = [(n, u, np.where(T < 1.1, x, x[last])) for n, u, x in waves_of(station(*three()))]
+    [load], first, text = loads_of(write_waves(tmp_path, stopped))
+    assert load["P"] == pytest.approx(20, rel=0.01)
+    assert first.startswith("nothing is worth fitting")
+    assert "is direct" not in text
+
+
+@pytest.mark.parametrize("clipped", ["U", "I"])
+def test_waves_that_stop_at_a_limit_are_said(tmp_path, clipped):
+    most = {"U": 80.0, "I": 0.12}[clipped]  # of peaks of 89.8 kV and 0.16 kA
+    waves = waves_of(station(*three()))
+    waves = [(n, u, np.clip(x, -most, most) if n[0] == clipped else x) for n, u, x in waves]
+    path = write_waves(tmp_path, waves)
+    said = f"clipped: '{clipped}A', '{clipped}B', '{clipped}C', up to "
+    assert said in loads_of(path)[1]
+    assert any(note.startswith(said) for note in tractexp.read(path)[0].record.notes)
+
+
+def test_whole_waves_are_not_called_clipped(tmp_path):
+    path = write(tmp_path, *station(*three()))
+    assert "clipped" not in loads_of(path)[2]
+    assert not any("clipped" in note for note in tractexp.read(path)[0].record.notes)

@@ -26,7 +26,7 @@ LINES = [
     "电压{}{}",
 ]
 GROUND = ["U {}N", "V {}-G", "U_{}_N", "Vrms {}N Avg", "V{}-E"]
-PLAIN = ["U {}", "V_{}", "Phase {} voltage", "{}相电压", "Напряжение фаза {}"]
+PLAIN = ["U {}", "V_{}", "Phase {} voltage", "{} voltage", "{}相电压", "Напряжение фаза {}"]
 SIZE = (110.0, 20.0, 8.0)  # kV, MW, Mvar
 
 
@@ -199,6 +199,8 @@ def test_where_no_name_tells_the_power_or_the_nominal_voltage_does(tmp_path):
         *((name, False) for name in ("Tensión simple L1", "Sternspannung L1", "A相电压")),
         *((name, True) for name in ("VLLab", "V_LL_AB", "Vll 12", "AB_Voltage")),
         *((name, False) for name in ("V_LN_A", "VLN1", "R-N Volt", "L1-N Voltage")),
+        *((name, True) for name in ("Uph-ph", "VL-L", "Vphase-phase avg")),
+        *((name, False) for name in ("Voltage to neutral", "UL-E", "Uph-n", "V to ground")),
     ],
 )
 def test_names_of_programs_and_languages_say_line_or_ground(name, line):

@@ -315,6 +315,8 @@ def test_a_zone_is_told_where_times_are_turned_into_utc(read, zone, hours):
         ("20240301T101530Z", 30.0),
         ("Fri Mar  1 10:15:30 2024", 30.0),
         ("Fri Mar 1 10:15:30.75 2024", 30.75),
+        ("2024年03月01日 10时15分30.5秒", 30.5),
+        ("2024-03-01 10h15m30.25s", 30.25),
     ],
 )
 def test_times_in_the_basic_form_and_of_asctime(cell, second):
@@ -327,3 +329,13 @@ def test_times_in_the_basic_form_and_of_asctime(cell, second):
 def test_what_only_looks_like_them_is_refused(cell):
     with pytest.raises(BadCell):
         times([cell])
+
+
+@pytest.mark.parametrize("cell", ["061:10:15:30.250", "10h15m30.25s", "10时15分30.25秒"])
+def test_hours_with_units_and_those_of_irig_are_times_of_day(cell):
+    assert times([cell]).begin == pytest.approx(10 * 3600 + 15 * 60 + 30.25)
+
+
+def test_a_time_with_something_behind_it_is_refused_with_how_times_are_written(read):
+    with pytest.raises(tractexp.UserError, match=r"CET' is no time, such as 12:00:00.25"):
+        read([f"10:15:{x:09.6f} CET" for x in dip()[0]])

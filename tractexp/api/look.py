@@ -23,6 +23,7 @@ from tractexp.record.wave_event import COARSEST, describe_smearing
 from tractexp.recording.event_views import join_event, propose_joining
 from tractexp.recording.feeder import can_be_named, explain_unrecognized
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
+from tractexp.recording.quality import describe_clipped
 from tractexp.recording.railway import DIRECT, describe_direct_beside, direct_voltage
 from tractexp.recording.recording import unit_of
 from tractexp.storage import files
@@ -516,9 +517,18 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
         "unexamined": shown.unexamined,
         "dead_phases": shown.dead_phases,
         "secondary": shown.secondary,
+        "clipped": _tell_clipped(view, shown),
         "command": command(view, shown),
         "events": [hide_secondary(event_row(event, view.begun), shown) for event in shown.events],
     }
+
+
+def _tell_clipped(view: View, shown: Sight) -> str:
+    """Which channels of a load stop at a limit, one clause; "" where none does."""
+    if view.recording is None or shown.feeder is None:
+        return ""
+    numbers = (*shown.feeder.voltages, *shown.feeder.currents)
+    return describe_clipped(view.recording, {k: view.quality[k].clipped for k in numbers})
 
 
 def hide_secondary(row: dict[str, Any], shown: Sight) -> dict[str, Any]:

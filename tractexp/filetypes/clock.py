@@ -43,11 +43,16 @@ CLOCK = re.compile(
     r"(?P<s>\d{1,2}(?:[.,]\d*|(?<=:\d\d:\d\d):\d{3})?)"
     r"(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2}|[+-]\d{2})?\s*"
 )
-# times that are written otherwise, and how `CLOCK` knows them: the basic form of ISO 8601, and that
-# of C's asctime
+# times that are written otherwise, and how `CLOCK` knows them: the basic form of ISO 8601, that of
+# C's asctime, hours with their units, and those after the day of a year that IRIG counts
 REWRITTEN = (
     (re.compile(r"\s*(\d{8}T\d\d)(\d\d)(\d\d(?:[.,]\d+)?\S*)\s*"), r"\1:\2:\3"),
     (re.compile(r"\s*[A-Z][a-z]{2} ([A-Z][a-z]{2}) +(\d+) ([\d:.]+) (\d{4})\s*"), r"\1 \2, \4 \3"),
+    (
+        re.compile(r"\s*(.*?)\s*(\d\d?)[时時h](\d\d?)[分m](\d\d?(?:[.,]\d+)?)[秒s]?\s*"),
+        r"\1 \2:\3:\4",
+    ),
+    (re.compile(r"\s*\d{3}:(\d\d:\d\d:\d\d(?:[.,]\d+)?)\s*"), r"\1"),
 )
 DAY, HOUR = 86400.0, 3600.0  # s
 SWAPPED = 3.0  # steps: rows that go back by no more may have been exchanged

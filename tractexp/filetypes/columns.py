@@ -412,10 +412,10 @@ def _match_quantity(words: Sequence[str]) -> str:
 
 
 def _match_phase(words: Sequence[str], ground: bool) -> str:
-    """The phase or sequence that words say, "" for none; a letter says one beside "phase", or where
-    `ground` is said, only.
+    """The phase or sequence that words say, "" for none; a letter by itself only where `ground`
+    or something else says that it is one.
     """
-    sure = ground or "phase" in words
+    sure = ground or _is_letter_a_phase(words)
     for word in words:
         if word in PHASES and (sure or len(word) > 1 or not word.isascii()):
             return PHASES[word]
@@ -423,3 +423,10 @@ def _match_phase(words: Sequence[str], ground: bool) -> str:
     if "正序" in text:
         return "1"
     return "2" if "负序" in text else ""
+
+
+def _is_letter_a_phase(words: Sequence[str]) -> bool:
+    """Whether a letter among words is a phase: beside "phase", or as the one word before the
+    quantity.
+    """
+    return "phase" in words or (len(words) == 2 and WORDS.get(words[1]) in ELECTRICAL)

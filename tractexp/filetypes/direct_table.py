@@ -14,10 +14,14 @@ from tractexp.filetypes.columns import Role, factor, role
 from tractexp.filetypes.mapping import PHASES, map_times
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableFile
-from tractexp.recording.railway import ALTERNATING, DirectVoltage
+from tractexp.recording.railway import (
+    ALTERNATING,
+    FROM_NOMINAL_DIRECT,
+    NOMINAL_DIRECT,
+    DirectVoltage,
+    is_near_direct_nominal,
+)
 
-NOMINAL = (0.6, 0.75, 1.5, 3.0)  # kV of direct-current railways (EN 50163)
-FROM_NOMINAL = 0.2  # of it, by which the mean may differ
 ALTERNATING_NEAR = (0.69, 3.3)  # kV: alternating voltages near those
 NAMED = re.compile(
     r"(?<![a-z])dc(?![a-z])|(?<=[uvip])[_ ]?dc(?![a-z])|gleich(?=spannung|strom)"
@@ -51,7 +55,7 @@ def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
     if any(map(NAMED.search, names)):
         return said
     told = not keys.isdisjoint("IP") or _is_told(direct.mean, t, x)
-    if not told or not _is_railway(direct.mean):
+    if not told or not is_near_direct_nominal(direct.mean):
         return ""
     return (
         f"{said}; that it is no RMS value is told by {1000 * direct.mean:.4g} V, near a nominal"
@@ -114,13 +118,9 @@ def _is_direct_alone(mean: float) -> bool:
     """Whether a mean [kV] is near a nominal direct voltage, and near none of an alternating one
     that it may be the RMS of.
     """
-    near = any(abs(mean / nominal - 1) <= FROM_NOMINAL / 4 for nominal in NOMINAL)
-    return near and not any(abs(mean / other - 1) <= FROM_NOMINAL / 4 for other in ALTERNATING_NEAR)
-
-
-def _is_railway(mean: float) -> bool:
-    """Whether a mean [kV] is near a nominal direct voltage of railways."""
-    return any(abs(mean / nominal - 1) <= FROM_NOMINAL for nominal in NOMINAL)
+    most = FROM_NOMINAL_DIRECT / 4
+    near = any(abs(mean / nominal - 1) <= most for nominal in NOMINAL_DIRECT)
+    return near and not any(abs(mean / other - 1) <= most for other in ALTERNATING_NEAR)
 
 
 def check_alternating(
@@ -133,7 +133,7 @@ def check_alternating(
     """
     t, U, P, Q = (columns[key] for key in "tUPQ")
     level = float(np.nanmedian(U))
-    direct = None if declared or not _is_railway(level) else _find_direct(t, U)
+    direct = None if declared or not is_near_direct_nominal(level) else _find_direct(t, U)
     if direct is None:
         return []
     pulses = _find_pulses(U, _sampling_rate(t))

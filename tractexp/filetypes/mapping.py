@@ -39,6 +39,10 @@ OF: Mapping[str, tuple[str, ...]] = {  # {quantity as data.units names it: units
     "angle": ("deg", "rad"),
 }
 QUANTITIES = tuple(OF)
+MEAN = re.compile(
+    r"(?<![a-z])(?:avg|average|mean|mittel|mittelwert|moy)(?![a-z])|平均", re.IGNORECASE
+)
+EXTREME = re.compile(r"(?<![a-z])(?:min|max|minimum|maximum)(?![a-z])|最[大小]", re.IGNORECASE)
 BY_UNIT_ALONE = {"U": "voltage", "I": "current", "P": "power", "Q": "reactive"}
 
 
@@ -288,7 +292,18 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
         if key not in numbers and (key not in exact or name == key):
             options.setdefault(key, []).append(_named_column(k, name, key, one))
     unnamed = [k for k in find_other_columns(table, numbers.values()) if k not in roles]
-    return _find_time_columns(table, _add_by_unit(heading, unnamed, options))
+    return _find_time_columns(table, _add_by_unit(heading, unnamed, _prefer_means(options)))
+
+
+def _prefer_means(options: dict[str, list[MappedColumn]]) -> dict[str, list[MappedColumn]]:
+    """The options, of the least, mean and largest value of a quantity the mean."""
+    preferred = dict(options)
+    for key, several in options.items():
+        means = [one for one in several if MEAN.search(one.name)]
+        rest = [one for one in several if one not in means]
+        if len(means) == 1 and all(EXTREME.search(one.name) for one in rest):
+            preferred[key] = means
+    return preferred
 
 
 def _add_by_unit(

@@ -178,10 +178,15 @@ def column(cells: Sequence[Any], kind: str, decimal: str, group: str = "") -> Ta
     """Cells as what is wanted of them; raises `BadCell`."""
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
         return TableColumn(cells)
-    if kind == "time" and any(is_time(cell) and not is_number(cell, decimal) for cell in cells[:1]):
+    if kind == "time" and any(_is_clock(cell, decimal) for cell in cells[:1]):
         read = times(cells)
         return TableColumn(read.values, read.start, True, read.begin, read.remarks)
     return TableColumn(numbers(cells, decimal, kind == "gaps", group))
+
+
+def _is_clock(cell: Any, decimal: str) -> bool:
+    """Whether a cell of times is a clock's, or was meant as one: it has hours with a colon."""
+    return not is_number(cell, decimal) and (is_time(cell) or ":" in str(cell))
 
 
 def instrument_of(path: Path | str) -> ModuleType | None:

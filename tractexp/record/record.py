@@ -439,7 +439,10 @@ class Record:
             )
         if self.step > LONGEST_STEP:
             in_ms = self.step >= LEAST_STEP_OF_MS
-            hint = f"; t must be in seconds (where it is in ms: {DATA.units}={{t: ms}})"
+            hint = (
+                f"; t must be in seconds (where it is in ms: {DATA.units}={{t: ms}}; where it"
+                f" counts samples, the time of one: {DATA.units}={{t: '20 ms'}})"
+            )
             raise UserError(
                 f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a"
                 f" dip within 50 to 300 ms, so at least {1 / LONGEST_STEP:g} samples per second are"

@@ -21,6 +21,7 @@ MOST_KNOWN_NAMES = 8192  # whose reading is kept: each load of a file asks for i
 QUANTITY = "uvie"  # letters before a phase's: U, V, E of a voltage, I of a current
 GROUND = r"n|g|e|pe|gnd|neutral|ground|earth|neutro|tierra|terre|erde"
 ONE_OR_TWO_MARKS = "(?:[abcrstuvwy]{1,2}|l?[123]{1,2})"
+START_OR_LETTER = "(?:(?<![a-z])|(?<=(?<![a-z])[uv]))"  # of a word, or after a voltage's letter
 SAID = (  # what is said in words, and the word that stands for it
     (r"^(?:phase[- ]?voltage|voltage[- ]phase|[uv][ _]?(?:phase|ф))$", "voltage ln"),
     (r"^[uv][ _]?(?:line|лин|л)$", "voltage ll"),
@@ -32,11 +33,16 @@ SAID = (  # what is said in words, and the word that stands for it
     (r"(?<![a-z])phv(?![a-z])", "voltage ln"),
     (r"(?<![a-z])ppv(?![a-z])", "voltage ll"),
     (r"(?<![a-z])phs?[ _.]?(?=[abc]{1,2}(?![a-z]))", "phase "),
-    (r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:l|line|ph|phase)(?![a-z\d])", " ll "),
     (
-        r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:n|g|neutral|ground|earth)(?![a-z\d])",
+        rf"{START_OR_LETTER}(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:l|line|ph|phase)(?![a-z\d])",
+        " ll ",
+    ),
+    (
+        rf"{START_OR_LETTER}(?:l|line|ph|phase)[- ]?(?:to[- ])?"
+        r"(?:n|g|pe|e|neutral|ground|earth)(?![a-z\d])",
         " ln ",
     ),
+    (r"(?<![a-z])to[- ](?:neutral|ground|earth)(?![a-z\d])", " ln "),
     (r"линейн\w*|междуфазн\w*|compuesta|compos[ée]e|verkettet\w*", " ll "),
     (r"фазн\w*|strang\w*|stern|(?<=tension )simple|(?<=tensión )simple", " ln "),
     ("線間電圧", " ll 電圧 "),

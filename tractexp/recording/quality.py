@@ -1,7 +1,7 @@
 """How well a channel was recorded, and what it is fit for."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from tractexp.record.change import runs
 from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel, Recording, Segment
 from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
+from tractexp.text.wording import list_first
 
 CLIPPED = 3  # samples in a row at the greatest or least value
 FLAT_TOP = 1e-4  # of the span: values so near each other are one value
@@ -28,6 +29,7 @@ LARGEST_REPEAT_DIFFERENCE = 0.2
 LARGEST_RMS_DIFFERENCE = 0.05  # by which their RMS differs at most
 # of the RMS of the largest calm: less is a dead line's, and not the state before an event
 AT_WORK = {"voltage": 0.5}
+MOST_CLIPPED_TOLD = 3  # that are told
 IDLE = 0.005  # the same of a current, which a fault multiplies
 
 
@@ -94,6 +96,33 @@ def quality(
         thd,
         _fit(segment, f, channel.form, gaps, clipped, level, max(noise, step)),
     )
+
+
+def describe_clipped(recording: Recording, shares: Mapping[int, float]) -> str:
+    """Which channels {number: share of its samples} stop at a limit, one clause; "" where none
+    does.
+    """
+    clipped = [k for k, share in shares.items() if share > FEW_CLIPPED]
+    if not clipped:
+        return ""
+    names = list_first(
+        [f"'{recording.channels[k].name.strip()}'" for k in clipped], MOST_CLIPPED_TOLD
+    )
+    most = 100 * max(shares[k] for k in clipped)
+    return f"clipped: {names}, up to {most:.2g} % of the samples: there U, P and Q are too small"
+
+
+def measure_clipped_shares(recording: Recording, numbers: Sequence[int]) -> dict[int, float]:
+    """{channel: the largest share of its samples in a segment that stop at a limit}."""
+    shares = {}
+    for number in numbers:
+        channel, several = recording.channels[number], [0.0]
+        for segment in recording.segments:
+            x = channel.values(segment.first, segment.stop)
+            step, _ = _step(channel, x[np.isfinite(x)])
+            several.append(_measure_clipped_share(channel, x, segment, recording.frequency, step))
+        shares[number] = max(several)
+    return shares
 
 
 def measure_stamp_jitter(recording: Recording, segment: Segment) -> tuple[float, int]:

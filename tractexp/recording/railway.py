@@ -42,7 +42,12 @@ DIRECT = 3.0  # times what alternates: a greater mean is a direct voltage
 RIPPLE_SECONDS = 0.02  # s over which its ripple is averaged out
 LEAST_DC_DIP = 0.03  # of it: a dip
 LONGEST = 1 << 20  # samples that are looked at
+MAGNITUDES = "the power of a load does not follow without angles, or P and Q"
 ALTERNATING = "the models here are those of loads at alternating voltage"
+NOMINAL_DIRECT = (0.6, 0.75, 1.5, 3.0)  # kV of direct-current railways (EN 50163)
+FROM_NOMINAL_DIRECT = 0.2  # of it, by which the mean may differ
+LEAST_DIRECT_RIPPLE = 5e-3  # of the mean: what ripples less may as well be an RMS value
+USUAL_RIPPLE = 0.9  # of the windows: what has more in others is a step, or alternated for a while
 
 
 def opposite_pairs(phasors: Snapshots, volts: Sequence[int]) -> list[tuple[int, int]]:
@@ -166,7 +171,7 @@ def direct_voltage(recording: Recording) -> str:
         if seen is not None and seen.alternates:
             return ""
         if seen is not None and seen.is_direct:
-            said = said or f"{seen.describe(channel.name.strip(), start)}; {ALTERNATING}"
+            said = said or f"{seen.describe(channel.name.strip(), start)}; {seen.why_no_load}"
     return said
 
 
@@ -212,7 +217,7 @@ class DirectVoltage:
             return None
         smooth = np.convolve(x, np.full(n, 1 / n), "valid")
         rest = (x[n // 2 : len(x) - n // 2] - smooth)[: len(smooth) // n * n]
-        ripple = float(np.sqrt(np.median(rest.reshape(-1, n).var(axis=1))))
+        ripple = float(np.sqrt(np.quantile(rest.reshape(-1, n).var(axis=1), USUAL_RIPPLE)))
         found = cls(float(np.median(smooth)), ripple, float(np.abs(x).max()))
         if not found.is_direct:
             return found
@@ -232,15 +237,38 @@ class DirectVoltage:
         """Whether it is a direct voltage."""
         return abs(self.mean) > DIRECT * max(self.alternating, self.greatest / 20)
 
+    @property
+    def is_magnitude(self) -> bool:
+        """Whether it may as well be an RMS value: steady, and no nominal voltage of railways."""
+        steady = self.alternating < LEAST_DIRECT_RIPPLE * self.mean
+        return steady and not is_near_direct_nominal(self.mean)
+
+    @property
+    def why_no_load(self) -> str:
+        """Why no load at it is fitted, one clause."""
+        return MAGNITUDES if self.is_magnitude else ALTERNATING
+
     def describe(self, name: str, start: float = 0.0) -> str:
         """One clause, times counted from `start` [s] at the first sample."""
         dip = (
-            f", and falls to {1000 * self.mean * (1 - self.fall):.4g} V ({self.fall:.1%}) at"
+            f", and falls to {_volts(self.mean * (1 - self.fall))} ({self.fall:.1%}) at"
             f" {start + self.begin:.3f} s for {1000 * self.seconds:.0f} ms"
             if self.fall > LEAST_DC_DIP
             else ""
         )
+        what = "keeps its sign, as RMS values do" if self.is_magnitude else "is direct"
         return (
-            f"the voltage '{name}' is direct: {1000 * self.mean:.4g} V in the mean with a ripple of"
+            f"the voltage '{name}' {what}: {_volts(self.mean)} in the mean with a ripple of"
             f" {self.alternating / abs(self.mean):.1%} RMS{dip}"
         )
+
+
+def _volts(kilovolts: float) -> str:
+    """A voltage as it is said of direct ones: in V, and in kV above those of railways."""
+    large = abs(kilovolts) > 2 * max(NOMINAL_DIRECT)
+    return f"{kilovolts:.4g} kV" if large else f"{1000 * kilovolts:.4g} V"
+
+
+def is_near_direct_nominal(mean: float) -> bool:
+    """Whether a mean [kV] is near a nominal direct voltage of railways."""
+    return any(abs(mean / nominal - 1) <= FROM_NOMINAL_DIRECT for nominal in NOMINAL_DIRECT)

@@ -30,6 +30,7 @@ from tractexp.recording.feeder import Feeder, can_be_named, explain_unrecognized
 from tractexp.recording.joined import join_recordings
 from tractexp.recording.label import order, shared_name
 from tractexp.recording.measure import FeederWaves, phasors_of
+from tractexp.recording.quality import describe_clipped, measure_clipped_shares
 from tractexp.recording.recording import Recording
 from tractexp.recording.unit import check_doubt, check_units, in_units
 from tractexp.text import quoting
@@ -335,13 +336,17 @@ class WaveformReader(Reader):
         if slow:
             spans = ", ".join(f"{s.rate:g} Hz from {s.start:.3f} s" for s in slow)
             notes.append(f"segments without waveform not used: {spans}")
-        chosen = [recording.channels[i] for i in (*feeder.voltages, *feeder.currents)]
+        used = (*feeder.voltages, *feeder.currents)
+        chosen = [recording.channels[i] for i in used]
         skew = max(abs(channel.skew) for channel in chosen)
         if skew > 0 and not self.skew:
             notes.append(
                 f"time skew of up to {1e6 * skew:.3g} microseconds not corrected (data.skew=true"
                 " does)"
             )
+        notes += filter(
+            None, [describe_clipped(recording, measure_clipped_shares(recording, used))]
+        )
         return tuple(notes)
 
 

@@ -55,7 +55,7 @@ def unit_of(text: str) -> tuple[str, float]:
     Parameters
     ----------
     text : str
-        As a file writes it: "V", "[kA]", "кВ".
+        As a file writes it: "V", "[kA]", "кВ", "kV rms".
 
     Returns
     -------
@@ -69,6 +69,7 @@ def unit_of(text: str) -> tuple[str, float]:
     """
     text = unicodedata.normalize("NFKC", text).strip(" .")
     text = text[1:-1].strip() if (text[:1], text[-1:]) in (("[", "]"), ("(", ")")) else text
+    text = re.sub(r"(?<=[VA]) ?(?:rms|RMS|eff)$", "", text)
     latin = text.translate(CYRILLIC)
     return MEGA.get(latin) or UNITS.get(text.lower()) or UNITS.get(latin.lower(), ("", 1.0))
 

@@ -139,8 +139,9 @@ def _answer(files: Sequence[Entry]) -> str:
         best = next(feeder for feeder in promising if feeder["command"] == best["command"])
         first = _worth(best)[0]
         command = f"; to fit it: {best['command']}" if best["command"] else ""
-        secondary = f"; {SECONDARY}" if best.get("secondary") else ""
-        worth = f"is worth fitting{_reservation(first['why'])}{secondary}"
+        secondary = SECONDARY if best.get("secondary") else ""
+        told = [f"is worth fitting{_reservation(first['why'])}", secondary, best.get("clipped")]
+        worth = "; ".join(filter(None, told))
         own = (entry for entry in files if best in entry["feeders"])
         beside = "".join(f"; {entry['proposed']}" for entry in own if entry.get("proposed"))
         return f"{_event(first)} of {best['name']} {worth}{beside}{command}"
