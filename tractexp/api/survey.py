@@ -128,6 +128,28 @@ def _cell(value: Any) -> Any:
     return quoting.cell(value) if isinstance(value, str) else value
 
 
+def _look_at_all(
+    place: Path,
+    paths: Sequence[Path],
+    keep: str | Path | None,
+    cores: int | None,
+    progress: Progress,
+) -> tuple[dict[str, list[dict[str, Any]]], int]:
+    """{file: rows} in the order of the files, and how many files were looked at: those of which
+    `keep` has no rows.
+    """
+    store, names = Store(ROWS, folder=Path(keep or "")), keys(place, paths)
+    entries = {name: store.read_json(key) for name, key in names.items()} if keep else {}
+    rows = {name: entry for name, entry in entries.items() if entry is not None}
+    fresh = [name for name in names if name not in rows]
+    with count_parts("files", len(fresh), progress) as count:
+        for name, fresh_rows in look_at_files(place, fresh, cores or -1):
+            rows[name] = files.plain(fresh_rows)
+            store.write_json(names[name] if keep else "", rows[name])
+            count()
+    return {name: rows[name] for name in names}, len(fresh)
+
+
 @public
 def survey(
     folder: str | Path,
@@ -181,21 +203,13 @@ def survey(
     paths = list(find_records(place))
     if not paths:
         raise UserError(f"{DATA.path}={folder} holds no file that can be read")
-    store, names = Store(ROWS, folder=Path(keep or "")), keys(place, paths)
-    entries = {name: store.read_json(key) for name, key in names.items()} if keep else {}
-    rows = {name: entry for name, entry in entries.items() if entry is not None}
-    fresh = [name for name in names if name not in rows]
-    with count_parts("files", len(fresh), progress) as count:
-        for name, fresh_rows in look_at_files(place, fresh, cores or -1):
-            rows[name] = files.plain(fresh_rows)
-            store.write_json(names[name] if keep else "", rows[name])
-            count()
+    rows, looked_at = _look_at_all(place, paths, keep, cores, progress)
     content = {
         "folder": str(folder),
-        "files": len(names),
-        "looked_at": len(fresh),
+        "files": len(rows),
+        "looked_at": looked_at,
         "about": ABOUT,
-        "rows": [row for name in names for row in rows[name]],
+        "rows": [row for own in rows.values() for row in own],
         "informative": [],
         "command": "",
     }

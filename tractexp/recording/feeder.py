@@ -1,7 +1,7 @@
 """Which channels show one load, and how they are connected."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -88,6 +88,26 @@ class Feeder:
         return result | ({"reverse_current": True} if self.reverse_current else {})
 
 
+def _find_options(
+    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int]
+) -> list[list[Feeder]]:
+    """The feeders that currents may be, each with the voltages that may be its own, the likeliest
+    first.
+    """
+    buses = _groups(recording, phasors, volts)
+    # without them two currents are two feeders
+    three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)
+    loads = [g for g in _groups(recording, phasors, amps) if len(g.numbers) == 3 or three]
+    level = max(phasors.size(each) for each in (*(g.numbers for g in loads), *((i,) for i in amps)))
+    # with which two currents are enough
+    two = any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)
+    fitting = [load for load in loads if buses and (two or len(load.numbers) == 3)]
+    options = [_feeders(recording, phasors, load, buses, level) for load in fitting]
+    options += _conductors(recording, phasors, volts, amps, [*buses, *loads], level)
+    currents = [Group(f.channels["I"], False, "", False, "") for each in options for f in each]
+    return options + _single(recording, phasors, volts, amps, [*buses, *loads, *currents], level)
+
+
 def propose(recording: Recording) -> list[Feeder]:
     """The feeders that a recording of any number of channels shows; loaded ones first, [] where
     there are none.
@@ -102,26 +122,22 @@ def propose(recording: Recording) -> list[Feeder]:
     phasors = snapshots(recording, sorted(waves), f)
     if not volts or not amps or phasors is None or direct_voltage(recording):
         return []
-    buses = _groups(recording, phasors, volts)
-    # without them two currents are two feeders
-    three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)
-    loads = [g for g in _groups(recording, phasors, amps) if len(g.numbers) == 3 or three]
-    level = max(phasors.size(each) for each in (*(g.numbers for g in loads), *((i,) for i in amps)))
-    # with which two currents are enough
-    two = any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)
-    fitting = [load for load in loads if buses and (two or len(load.numbers) == 3)]
-    options = [_feeders(recording, phasors, load, buses, level) for load in fitting]
-    options += _conductors(recording, phasors, volts, amps, [*buses, *loads], level)
-    taken = [
-        *buses,
-        *loads,
-        *(Group(f.channels["I"], False, "", False, "") for each in options for f in each),
-    ]
-    options += _single(recording, phasors, volts, amps, taken, level)
+    options = _find_options(recording, phasors, volts, amps)
     feeders = _with_others(closed_sums(phasors, [each[0] for each in options]), options)
     level = max((phasors.size(f.currents) for f in feeders), default=0.0)
     marked = [_mark_unloaded(recording, phasors, feeder, level, strange) for feeder in feeders]
     return sorted(mark_other_sides(recording, phasors, marked), key=lambda f: not f.loaded)
+
+
+def _select_free(
+    recording: Recording, phasors: Snapshots, numbers: Sequence[int], used: Collection[int]
+) -> list[int]:
+    """Those of channels that turn as a network does, are no residual and belong to no group."""
+    return [
+        i
+        for i in numbers
+        if i not in used and not residual(recording.channels[i]) and phasors.pure(i)
+    ]
 
 
 def buses_alone(recording: Recording) -> list[Feeder]:
@@ -139,11 +155,7 @@ def buses_alone(recording: Recording) -> list[Feeder]:
         g for g in _groups(recording, phasors, volts) if any(phasors.pure(i) for i in g.numbers)
     ]
     taken = {i for g in grouped for i in g.numbers}
-    alone = [
-        i
-        for i in volts
-        if i not in taken and not residual(recording.channels[i]) and phasors.pure(i)
-    ]
+    alone = _select_free(recording, phasors, volts, taken)
     feeders = [_bus_alone(recording, phasors, group) for group in grouped]
     return feeders + [
         Feeder(
@@ -225,12 +237,14 @@ def explain_unrecognized(recording: Recording) -> str:
         )
     if direct := direct_voltage(recording):
         return direct
-    for wanted in ("voltage", "current"):
-        if wanted not in kinds:
-            units = ", ".join(sorted({f"'{c.unit.strip()}'" for c in recording.channels}))
-            return (
-                f"no channel is a {wanted} by its unit, of which there are {units}, or by its name"
-            )
+    if lacking := next((each for each in ("voltage", "current") if each not in kinds), ""):
+        units = ", ".join(sorted({f"'{c.unit.strip()}'" for c in recording.channels}))
+        return f"no channel is a {lacking} by its unit, of which there are {units}, or by its name"
+    return _explain_voltages(recording)
+
+
+def _explain_voltages(recording: Recording) -> str:
+    """The same where there are voltages and currents."""
     volts = [i for i, c in enumerate(recording.channels) if kind(c) == "voltage"]
     f = frequency(recording, volts)
     if f is not None and nearest_nominal(f) is None:
@@ -283,16 +297,20 @@ def _groups(recording: Recording, phasors: Snapshots, numbers: Sequence[int]) ->
     residuals = find_residuals([recording.channels[i] for i in numbers])
     left_out = {*taken, *(numbers[k] for k in residuals)}
     free = [i for i in numbers if i not in left_out and phasors.pure(i)]
-    k = 0
-    while k + 3 <= len(free):
-        ordered = _symmetric(phasors, free[k : k + 3])
+    result += _group_by_angles(phasors, free)
+    return sorted(result, key=lambda g: g.numbers[0])
+
+
+def _group_by_angles(phasors: Snapshots, numbers: Sequence[int]) -> list[Group]:
+    """Threes of channels, one after the other, that are equal and 120 degrees apart."""
+    found, k = [], 0
+    while k + 3 <= len(numbers):
+        ordered = _symmetric(phasors, numbers[k : k + 3])
         if ordered:
             name = f"channels {', '.join(map(str, ordered))}"
-            result.append(Group(ordered, False, name, False, "equal, 120 degrees apart"))
-            k += 3
-        else:
-            k += 1
-    return sorted(result, key=lambda g: g.numbers[0])
+            found.append(Group(ordered, False, name, False, "equal, 120 degrees apart"))
+        k += 3 if ordered else 1
+    return found
 
 
 def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
@@ -391,9 +409,9 @@ def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
         connection = usual(2, len(load.numbers), bus.pairs)
     settings: dict[str, Any] = {} if isinstance(connection, str) else {**connection}
     if load.missing not in (None, 1):
-        settings["phases"] = "".join(p for k, p in enumerate("abc") if k != load.missing)
+        settings["phases"] = "abc".replace("abc"[load.missing], "")
     if bus.missing not in (None, 2):
-        settings["pairs"] = [pair for k, pair in enumerate(("ab", "bc", "ca")) if k != bus.missing]
+        settings["pairs"] = [["bc", "ca"], ["ab", "ca"]][bus.missing]
     if bus.backward:
         pairs = settings.get("pairs", ["ab", "bc"])
         down = (number in bus.backward for number in voltages)
@@ -535,7 +553,8 @@ def _conductors(
         [i for i in numbers if i not in used and phasors.pure(i)] for numbers in (volts, amps)
     )
     arms = [contact_first(recording, pair) for pair in opposite_pairs(phasors, volts)]
-    arms = arms or ([(volts[0],)] if len(volts) == 1 else [])
+    if not arms and len(volts) == 1:
+        arms = [(volts[0],)]
     if not arms or usual(len(arms[0]), 2) is None:
         return []
     buses = [Group(arm, False, "", False, "") for arm in arms]
@@ -584,15 +603,9 @@ def _single(
     with several.
     """
     used = {i for group in taken for i in group.numbers}
-    free = [
-        i
-        for i in volts
-        if i not in used and not residual(recording.channels[i]) and phasors.pure(i)
-    ]
+    free = _select_free(recording, phasors, volts, used)
     single = []
-    for i in amps:
-        if i in used or residual(recording.channels[i]) or not free or not phasors.pure(i):
-            continue
+    for i in _select_free(recording, phasors, amps, used) if free else ():
         group = Group((i,), False, recording.channels[i].name.strip(), False, "")
         buses = _buses(
             recording, phasors, group, [Group((v,), False, "", False, "") for v in free], level
@@ -685,32 +698,32 @@ def _mark_unloaded(
     recording: Recording, phasors: Snapshots, feeder: Feeder, level: float, strange: str
 ) -> Feeder:
     """The feeder, marked as unloaded where it carries no load."""
-    if not feeder.loaded:
-        return feeder
+    why = _explain_no_load(recording, phasors, feeder, level, strange) if feeder.loaded else ""
+    return replace(feeder, why=(*feeder.why, why), loaded=False) if why else feeder
+
+
+def _explain_no_load(
+    recording: Recording, phasors: Snapshots, feeder: Feeder, level: float, strange: str
+) -> str:
+    """Why a feeder carries no load, one sentence; "" where it does."""
     if _dead(phasors, feeder.voltages):
-        why = (
-            strange
-            or "the voltages are no three phases: the line is dead, or they were named otherwise"
-        )
-        return replace(feeder, why=(*feeder.why, why), loaded=False)
+        dead = "the voltages are no three phases: the line is dead, or they were named otherwise"
+        return strange or dead
     if named := COUPLER.search(feeder.name.lower()):
-        said = (
+        return (
             f"no load here: a bus coupler, as its name says ('{named[0]}'): its current is that of"
             " other feeders"
         )
-        return replace(feeder, why=(*feeder.why, said), loaded=False)
     if not any(phasors.pure(i) for i in feeder.currents):
-        said = "no load here: the currents are no more than noise or harmonics"
-        return replace(feeder, why=(*feeder.why, said), loaded=False)
+        return "no load here: the currents are no more than noise or harmonics"
     size = phasors.size(feeder.currents)
     step = max(
         abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents)
     )
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)
     if size > UNLOADED * level and not (integral and size < STEPS_LOADED * step):
-        return feeder
-    said = (
+        return ""
+    return (
         f"unloaded: {1000 * size:.3g} A where the greatest current of the file is"
         f" {1000 * level:.3g} A"
     )
-    return replace(feeder, why=(*feeder.why, said), loaded=False)

@@ -208,26 +208,25 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     # with the level that it leads to
     until = e.end + 2 * e.new_level * round(trace.cycle / trace.step)
     if e.dead or _dead(trace, e)[e.start : until].any():
-        return (
-            [("interruption", e)]
-            if e.returned and not e.dead
-            else [("dead line", _until_alive(trace, e))]
-        )
+        if e.returned and not e.dead:
+            return [("interruption", e)]
+        return [("dead line", _until_alive(trace, e))]
     opened = _open(trace, e)
-    if opened is not None:
-        fault = replace(e, end=opened.start, cleared=False)
-        return (
-            [("dip", fault), ("open pole", opened)]
-            if fault.end - fault.start >= 3
-            else [("open pole", opened)]
-        )
-    if not e.returned and abs(e.worst) <= LARGEST_SWITCHING_STEP and e.new_level:
-        return [("step" if e.sudden else "ramp", e)]
+    if opened is None:
+        return [(_name_change(e), e)]
+    fault = replace(e, end=opened.start, cleared=False)
+    lasts = fault.end - fault.start >= 3
+    return [("dip", fault), ("open pole", opened)] if lasts else [("open pole", opened)]
+
+
+def _name_change(e: Excursion) -> str:
+    """The kind of an excursion in which no pole opens and no line is dead."""
     if not e.sudden:
-        return [("ramp", e)]
-    if not e.returned and e.new_level and e.worst > 0:
-        return [("step", e)]
-    return [("dip" if e.worst < 0 else "swell", e)]
+        return "ramp"
+    stays = e.new_level and not e.returned
+    if stays and (e.worst > 0 or abs(e.worst) <= LARGEST_SWITCHING_STEP):
+        return "step"
+    return "dip" if e.worst < 0 else "swell"
 
 
 def _until_alive(trace: Trace, e: Excursion) -> Excursion:
@@ -272,10 +271,18 @@ def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
     )
     left = np.median(trace.phases[:, inside], axis=1) / voltage
     lasts = (end - e.start) * trace.step > UNCLEARED
-    gone, others = left < (LOST_VOLTAGE if lasts else BLOWN), np.abs(left - 1) < UNTOUCHED
-    alone = gone.any() and not gone.all() and ((gone | others).all() or lasts)
-    blown = stays.mean() > 1 - CARRIES and ((left < DEAD_VOLTAGE_SHARE).all() or alone)
+    blown = stays.mean() > 1 - CARRIES and _is_fuse_pattern(left, lasts)
     return replace(e, end=min(end, len(trace.t) - 1)) if blown else None
+
+
+def _is_fuse_pattern(left: np.ndarray, lasts: bool) -> bool:
+    """Whether shares (3,) left of the voltages are those of blown fuses: all gone, or some, and the
+    others as they were unless it `lasts` longer than a fault.
+    """
+    if (left < DEAD_VOLTAGE_SHARE).all():
+        return True
+    gone, others = left < (LOST_VOLTAGE if lasts else BLOWN), np.abs(left - 1) < UNTOUCHED
+    return bool(gone.any() and not gone.all() and (lasts or (gone | others).all()))
 
 
 def _open(trace: Trace, e: Excursion) -> Excursion | None:
@@ -500,6 +507,40 @@ def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
     )
 
 
+def _describe_depth(trace: Trace, e: Excursion, depth: float, first: int) -> str:
+    """By how much the voltage falls, and which phases do."""
+    if len(trace.phases) != 3:
+        return f"the voltage falls by {100 * depth:.3g} %"
+    phases = _measure_phases(trace, e, first, e.start)
+    fallen = name_fallen_phases(phases)
+    return (
+        f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to"
+        f" {100 * min(phases):.3g} %{f' ({fallen})' if fallen else ''}"
+    )
+
+
+def _find_lack_of_load(
+    trace: Trace,
+    e: Excursion,
+    first: int,
+    before: tuple[float, float],
+    after: tuple[float, float],
+) -> str:
+    """Why a dip tells nothing of the motors of a load, by P and Q before and after it; "" where it
+    does.
+    """
+    if not np.isfinite(trace.P).any():
+        return "no current is recorded with it, and without one no load"
+    noise = len(trace.I) and not np.median(_clean(trace)[:, first : e.start], axis=1).any()
+    if not np.isfinite(before[0]) or np.hypot(*before) == 0 or noise:
+        return "no load current flows before it"
+    if np.hypot(*after) < CARRIES * np.hypot(*before):
+        return "the load is switched off in it: nothing is left of it after"
+    if not e.sudden:
+        return "slowly: it determines only the static part of the load"
+    return f"{NEGATIVE}{_explain_negative_power(trace)}" if before[0] < 0 else ""
+
+
 def _worth(
     trace: Trace,
     kind: str,
@@ -511,19 +552,10 @@ def _worth(
     """Whether a load model can be fitted to it, and why (not); `powers` are P and Q before and
     after.
     """
-    before, after = powers
     if kind != "dip":
         return False, NO_FIT[kind]
     lead = (e.start - first) * trace.step
-    size = f"the voltage falls by {100 * depth:.3g} %"
-    if len(trace.phases) == 3:
-        phases = _measure_phases(trace, e, first, e.start)
-        size = (
-            f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to"
-            f" {100 * min(phases):.3g} %"
-        )
-        fallen = name_fallen_phases(phases)
-        size += f" ({fallen})" if fallen else ""
+    size = _describe_depth(trace, e, depth, first)
     if lead < FEWEST_BEFORE * 1e-3 or e.start - first < 2:
         return False, f"{size}, but only {1000 * lead:.0f} ms of steady state come before it"
     if not e.cleared:
@@ -532,17 +564,8 @@ def _worth(
         return False, f"{size}, but the record ends before the voltage is back"
     if depth < SHALLOWEST:
         return False, f"{size}: too little to separate a load's answer from its noise"
-    noise = len(trace.I) and not np.median(_clean(trace)[:, first : e.start], axis=1).any()
-    if not np.isfinite(trace.P).any():
-        return False, f"{size}, but no current is recorded with it, and without one no load"
-    if not np.isfinite(before[0]) or np.hypot(*before) == 0 or noise:
-        return False, f"{size}, but no load current flows before it"
-    if np.hypot(*after) < CARRIES * np.hypot(*before):
-        return False, f"{size}, but the load is switched off in it: nothing is left of it after"
-    if not e.sudden:
-        return False, f"{size}, but slowly: it determines only the static part of the load"
-    if before[0] < 0:
-        return False, f"{size}, but {NEGATIVE}{_explain_negative_power(trace)}"
+    if lack := _find_lack_of_load(trace, e, first, *powers):
+        return False, f"{size}, but {lack}"
     short = (
         f"; only the {1000 * lead:.0f} ms before it tell voltage and power before"
         if lead < REFERENCE

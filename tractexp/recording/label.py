@@ -215,14 +215,24 @@ def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
 
     What the file's phases say comes first, then what the names share.
     """
+    return _order_by_phases(channels) or _order_by_names(channels)
+
+
+def _order_by_phases(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
+    """The same by what the file calls the phases."""
     for letters in ORDERS:
         labels = [phase(c, (letters,)) for c in channels]
         for two, reading in ((False, "abc".find), (True, lambda mark: PLACE.get(mark, -1))):
             places = tuple(reading(mark) for mark in labels)
             if all(len(mark) == 1 + two for mark in labels) and len(set(places)) == len(places):
                 return places, two
-    for counters in (True, False):
-        texts = [plain(c.name) if counters else COUNTER.sub("", plain(c.name)) for c in channels]
+    return None
+
+
+def _order_by_names(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
+    """The same by marks at one place of all names, as they stand, else without counting numbers."""
+    names = [plain(c.name) for c in channels]
+    for texts in (names, [COUNTER.sub("", name) for name in names]):
         read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]
         if len(channels) == 2:  # of which one may count down: AB and CB
             read = [{(k[0].removesuffix("-"), *k[1:]): v for k, v in r.items()} for r in read]
@@ -242,6 +252,16 @@ def backward(channels: Sequence[Channel]) -> bool:
     return all(any(key.endswith("-") for key, *_ in _marks(plain(f"{c.name}"))) for c in channels)
 
 
+def _compare_phase(channel: Channel, letters: str, place: int) -> int:
+    """1 where the phase that the file tells of a channel is that of a mark, -1 where it is another
+    one, 0 where it tells none or two.
+    """
+    own = phase(channel, (letters,)) or phase(channel)
+    if own in (("ab", "bc", "ca")[place], "abc"[place]):
+        return 1
+    return -1 if len(own) == 1 else 0
+
+
 def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: bool) -> list[Group]:
     """Groups of names that are equal but for the mark; with their circuits where `full`."""
     buckets: dict[tuple[str, str, bool], dict[int, list[int]]] = defaultdict(
@@ -254,11 +274,8 @@ def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: b
         for key, letters, two, place, score in _marks(text):
             label = (f"{key} {plain(channel.circuit)}" if full else key, letters, two)
             buckets[label][place].append(i)
-            own = phase(channel, (letters,)) or phase(channel)
-            agrees = own == ("ab", "bc", "ca")[place] or own == "abc"[place]
-            worth[label] = max(
-                worth[label], score + 4 * agrees - 4 * (bool(own) and not agrees and len(own) == 1)
-            )
+            agreement = _compare_phase(channel, letters, place)
+            worth[label] = max(worth[label], score + 4 * agreement)
     result = []
     used = set()
     for label in sorted(buckets, key=lambda each: -worth[each]):
@@ -383,23 +400,22 @@ def _sets(
             yield have, next((k for k in range(3) if numbers[k] is None), None)
 
 
+def _find_common_start(texts: Sequence[str]) -> str:
+    """The letters that all texts begin with."""
+    alike = itertools.takewhile(lambda letters: len({*letters}) == 1, zip(*texts, strict=False))
+    return "".join(letters[0] for letters in alike)
+
+
 def shared_name(channels: list[Channel]) -> str:
     """What the group is called: its circuit where the names say no more, else what the
     names share.
     """
     names = [c.name.strip() for c in channels]
-    start = 0
-    while start < min(map(len, names)) and len({n[start] for n in names}) == 1:
-        start += 1
-    stop = 0
-    while stop < min(map(len, names)) - start and len({n[-1 - stop] for n in names}) == 1:
-        stop += 1
-    head = names[0][:start]
-    tail = names[0][len(names[0]) - stop :]
+    head = _find_common_start(names)
+    rests = [name.removeprefix(head) for name in names]
+    tail = _find_common_start([rest[::-1] for rest in rests])[::-1]
     if len({*map(len, names)}) == 1:  # the mark may stand in several places
-        tail = "".join(
-            c for c, *others in zip(*(n[start:] for n in names), strict=True) if {c} == {*others}
-        )
+        tail = "".join(letters[0] for letters in zip(*rests, strict=True) if len({*letters}) == 1)
     counters = [COUNTER.match(plain(n)) for n in names]
     head = "" if counters[0] and len({counter and counter[0] for counter in counters}) > 1 else head
     head = re.sub(r"(?i)(?:^|(?<=[^a-z]))[uvi]l?$", "", head)

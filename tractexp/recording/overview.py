@@ -29,7 +29,7 @@ from tractexp.recording.quality import Quality, measure_stamp_jitter, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
 from tractexp.recording.snapshot import network_frequency
-from tractexp.recording.trace import join_traces, of_waves
+from tractexp.recording.trace import Trace, join_traces, of_waves
 from tractexp.recording.type_test import Course, TypeTest, find_type_test
 from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
 
@@ -70,6 +70,15 @@ class LoadEvent:
     def worth(self) -> bool:
         """Whether it is worth fitting, and a reader makes a record of it."""
         return self.what.worth and self.event is not None
+
+
+def _find_first_powers(record: Record) -> tuple[float, float, float]:
+    """Voltage [kV], P [MW] and Q [Mvar] at the beginning of a record; nan of what it has not."""
+    first = slice(0, max(1, record.samples // 20))
+    rows = (record.U[first], record.P[first], record.Q[first])
+    known = (row[np.isfinite(row)] for row in rows)
+    U, P, Q = (float(np.median(row)) if len(row) else float("nan") for row in known)
+    return U * record.base.voltage, P * record.base.power, Q * record.base.power
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,15 +150,7 @@ class Sight:
                 base = event.record.base
                 return event.U0 * base.voltage, event.P0 * base.power, event.Q0 * base.power
         if self.record is not None:
-            first = slice(0, max(1, self.record.samples // 20))
-            base = self.record.base
-            U, P, Q = (
-                float(np.median(v[first][np.isfinite(v[first])]))
-                if np.isfinite(v[first]).any()
-                else float("nan")
-                for v in (self.record.U, self.record.P, self.record.Q)
-            )
-            return U * base.voltage, P * base.power, Q * base.power
+            return _find_first_powers(self.record)
         if not self.phasors:
             return None
         p = self.phasors[0]
@@ -305,6 +306,50 @@ def _refuse_events(shown: Sight, reason: str) -> Sight:
     return replace(shown, events=tuple(events))
 
 
+def _find_doubt(recording: Recording, feeder: Feeder) -> str:
+    """Why the units of a load's voltages and currents are not known; "" where they are."""
+    channels = (recording.channels[i] for i in (*feeder.voltages, *feeder.currents))
+    if not (feeder.currents and any(map(in_doubt, channels))):
+        return ""
+    try:
+        check_doubt(recording, feeder.channels)
+    except UserError as error:
+        return str(error)
+    return ""
+
+
+def _measure_stretch(
+    recording: Recording, feeder: Feeder, stretch: Sequence[Segment], events: bool, bus: _Bus
+) -> tuple[list[Phasors], Trace | None, list[str]]:
+    """The phasors of a stretch without gaps, at most one; its trace, where `events` are sought; and
+    why segments could not be measured.
+    """
+    parts, traces, said = [], [], []
+    for segment in stretch:
+        try:
+            measured = bus.measure(recording, feeder, segment)
+        except UserError as error:
+            said.append(str(error))
+            continue
+        parts.append(measured)
+        if events:
+            waves = FeederWaves.from_recording(recording, feeder, segment)
+            trace = of_waves(waves, segment.rate, segment.start, recording.frequency, measured)
+            traces.append(trace if feeder.currents else trace.without_currents())
+    return [join_phasors(parts)] if parts else [], join_traces(traces) if traces else None, said
+
+
+def _cut_dips(
+    reader: WaveformReader, recording: Recording, feeder: Feeder, phasors: Sequence[Phasors]
+) -> tuple[list[FileDip], str]:
+    """The dips that the reader cuts out of a recording for a load, and why it cuts none."""
+    streams = [(p, ()) for p in phasors]
+    try:
+        return reader.dips(feeder, streams, recording.frequency, recording.find_triggers()), ""
+    except UserError as error:
+        return [], str(error)
+
+
 def sight(
     reader: WaveformReader,
     recording: Recording,
@@ -319,50 +364,27 @@ def sight(
     What loads of the same `bus` share is measured once.
     """
     bus = bus or _Bus()
-    phasors, changes, said, dead, brief = [], [], [], list[int](), list[bool]()
     settings = {**feeder.settings, "reverse_current": feeder.reverse_current}
     blank = Sight(feeder.name or "load", feeder=feeder, settings=settings)
-    if feeder.currents and any(
-        in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)
-    ):
-        try:
-            check_doubt(recording, feeder.channels)
-        except UserError as error:
-            return replace(blank, unexamined=str(error))  # no kV, no MW
+    if doubt := _find_doubt(recording, feeder):
+        return replace(blank, unexamined=doubt)  # no kV, no MW
     try:
         stretches = recording.stretches()
     except UserError as error:
-        return replace(blank, unexamined=str(error), said=(*said, str(error)))
+        return replace(blank, unexamined=str(error), said=(str(error),))
+    phasors, changes, said, dead, brief = [], [], [], list[int](), list[bool]()
     for stretch in stretches:
-        parts = []
-        traces = []
-        for segment in stretch:
-            try:
-                measured = bus.measure(recording, feeder, segment)
-            except UserError as error:
-                said.append(str(error))
-                continue
-            parts.append(measured)
-            if events:
-                waves = FeederWaves.from_recording(recording, feeder, segment)
-                trace = of_waves(waves, segment.rate, segment.start, recording.frequency, measured)
-                traces.append(trace if feeder.currents else trace.without_currents())
-        phasors += [join_phasors(parts)] if parts else []
-        if traces:
-            trace = join_traces(traces)
+        measured, trace, refusals = _measure_stretch(recording, feeder, stretch, events, bus)
+        phasors += measured
+        said += refusals
+        if trace is not None:
             within = (x for x in recording.find_triggers() if trace.t[0] <= x <= trace.t[-1])
             changes += happenings_in(trace, next(within, None))
             dead = dead or find_dead_phases(trace)
             brief.append(len(trace.t) < FEWEST_HALF_CYCLES)
-    dips = []
-    refused = ""
-    try:
-        streams = [(p, ()) for p in phasors]
-        if changes and feeder.currents:
-            triggers = recording.find_triggers()
-            dips = reader.dips(feeder, streams, recording.frequency, triggers)
-    except UserError as error:
-        refused = str(error)
+    dips, refused = [], ""
+    if changes and feeder.currents:
+        dips, refused = _cut_dips(reader, recording, feeder, phasors)
     numbered = _number_events(changes, dips, reader.path, refused)
     said += [TOO_SHORT] if brief and all(brief) else []
     unexamined = "; ".join(said) if said and (not phasors or TOO_SHORT in said) else ""

@@ -5,7 +5,7 @@ which one is a load's.
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -82,6 +82,35 @@ def _size(phasors: Snapshots, feeder: "Feeder") -> float:
     return phasors.size(feeder.currents)
 
 
+class _Likeness(NamedTuple):
+    """How alike the currents of two feeders are: what the ratio leaves, by how much they are turned
+    [degrees], and whether the two are the only ones of their bus.
+    """
+
+    rest: float
+    turned: float
+    only: bool
+
+
+def _judge_sides(
+    recording: Recording, phasors: Snapshots, sides: "tuple[Feeder, Feeder]", likeness: _Likeness
+) -> bool | None:
+    """Whether feeders (high, low) are surely sides of one transformer; None where they are not."""
+    small, large = (_size(phasors, side) for side in sides)
+    steps = round(likeness.turned / 30)
+    named = _find_sides(recording, *sides) is not None
+    alike = likeness.rest < LARGEST_REST[named]
+    alike &= abs(likeness.turned - 30 * steps) < LARGEST_TURN[named]
+    if not (alike and UNLOADED * large < small < large / LEAST_RATIO):
+        return None
+    texts = [recording.channels[side.currents[0]].name.lower() for side in sides]
+    windings = all(WINDING.search(text) for text in texts)
+    if named or steps % 2 or (windings and steps % 6 == 0):
+        return True
+    called = any(FEEDER.search(text) for text in texts)
+    return False if likeness.only and not called else None
+
+
 def _find_same_currents(
     recording: Recording, phasors: Snapshots, feeders: "Sequence[Feeder]"
 ) -> list[tuple[int, int, bool]]:
@@ -101,17 +130,9 @@ def _find_same_currents(
         rest, turned = _compare_currents(phasors, [feeders[k] for k in bus])
         for a, b in zip(*np.nonzero(rest < LARGEST_REST[True]), strict=True):
             high, low = int(bus[a]), int(bus[b])
-            small, large = (_size(phasors, feeders[k]) for k in (high, low))
-            steps = round(float(turned[a, b]) / 30)
-            named = _find_sides(recording, feeders[high], feeders[low]) is not None
-            alike = rest[a, b] < LARGEST_REST[named]
-            alike &= abs(turned[a, b] - 30 * steps) < LARGEST_TURN[named]
-            if not (alike and UNLOADED * large < small < large / LEAST_RATIO):
-                continue
-            texts = [recording.channels[feeders[k].currents[0]].name.lower() for k in (high, low)]
-            windings = all(WINDING.search(text) for text in texts)
-            sure = bool(named or steps % 2 or (windings and steps % 6 == 0))
-            if sure or (len(bus) == 2 and not any(FEEDER.search(text) for text in texts)):
+            likeness = _Likeness(float(rest[a, b]), float(turned[a, b]), len(bus) == 2)
+            sure = _judge_sides(recording, phasors, (feeders[high], feeders[low]), likeness)
+            if sure is not None:
                 pairs.append((high, low, sure))
     return pairs
 

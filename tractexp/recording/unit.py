@@ -61,6 +61,28 @@ def check_units(units: Mapping[str, Any], quantities: Sequence[str] = tuple(PLAI
             )
 
 
+def _select_channels(
+    channels: Sequence[Channel], quantity: str, chosen: Sequence[int]
+) -> list[int]:
+    """The numbers of the channels that are of a quantity, or are called so by the user and of no
+    other.
+    """
+    called = [i for i, c in enumerate(channels) if kind(c) == quantity or i in chosen]
+    return [i for i in called if channels[i].quantity in (quantity, "")]
+
+
+def _find_bare(
+    channels: Sequence[Channel], numbers: Sequence[int], letter: str, voltage: str
+) -> list[int]:
+    """Those of channels of one quantity without a unit, where their size tells it; else none.
+    `voltage` is the unit of the file's voltages.
+    """
+    stated = {channels[i].unit for i in numbers if not in_doubt(channels[i])}
+    bare = [i for i in numbers if not channels[i].unit.strip()]
+    size = max((_size(channels[i]) for i in bare), default=0.0)
+    return bare if bare and _plain(letter, size, stated, voltage) else []
+
+
 def in_units(
     recording: Recording, units: Mapping[str, Any], chosen: Mapping[str, Sequence[int]]
 ) -> Recording:
@@ -72,18 +94,13 @@ def in_units(
     """
     channels, taken, voltage = [*recording.channels], {}, ""
     for letter, (quantity, small, _) in PLAIN.items():
-        ours = [
-            i for i, c in enumerate(channels) if kind(c) == quantity or i in chosen.get(letter, ())
-        ]
-        ours = [i for i in ours if channels[i].quantity in (quantity, "")]
+        ours = _select_channels(channels, quantity, chosen.get(letter, ()))
         if letter in units:
             number, unit = amount(units[letter])
             for i in ours:
                 channels[i] = _of_unit(channels[i], quantity, unit, number)
             continue
-        stated = {channels[i].unit for i in ours if not in_doubt(channels[i])}
-        bare = [i for i in ours if not channels[i].unit.strip()]
-        if bare and _plain(letter, max(_size(channels[i]) for i in bare), stated, voltage):
+        if bare := _find_bare(channels, ours, letter, voltage):
             for i in bare:
                 channels[i] = _of_unit(channels[i], quantity, small)
             taken |= {letter: bare}
