@@ -79,6 +79,16 @@ class Parameter:
                 raise UserError(
                     f"{where}: the parameter has no {what}; say it ('1' where a number has no unit)"
                 )
+        if not isinstance(self.power_exponent, int):
+            raise UserError(
+                f"{where}: power_exponent={self.power_exponent!r} must be a whole number: 1 of a"
+                " power or an"
+                " admittance, -1 of an impedance, 0 of what no base of power changes"
+            )
+        self._check_numbers(where)
+
+    def _check_numbers(self, where: str) -> None:
+        """The same of the bounds, and of the numbers that lie within them."""
         low, high = self.bounds
         if not (np.isfinite([low, high]).all() and low < high):
             raise UserError(
@@ -97,12 +107,6 @@ class Parameter:
             raise UserError(
                 f"{where}: the physical range {list(self.physical)} must lie within the bounds"
                 f" [{low:g}, {high:g}], the lower end first"
-            )
-        if not isinstance(self.power_exponent, int):
-            raise UserError(
-                f"{where}: power_exponent={self.power_exponent!r} must be a whole number: 1 of a"
-                " power or an"
-                " admittance, -1 of an impedance, 0 of what no base of power changes"
             )
 
 

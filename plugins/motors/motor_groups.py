@@ -32,7 +32,7 @@ class MotorGroups(Motor):
 
     listed = "of"
 
-    def __post_init__(self):
+    def _check_names(self):
         if len(self.of) < 2:
             raise UserError(
                 f"several motor groups are two or more, and model/motor={self.of} names"
@@ -43,6 +43,9 @@ class MotorGroups(Motor):
                 raise UserError(
                     f"model/motor={self.of} has '{member}' in it, which is no motor by itself"
                 )
+
+    def __post_init__(self):
+        self._check_names()
         members: tuple[Motor, ...] = tuple(
             build("model/motor", m if isinstance(m, Mapping) else {"name": m}) for m in self.of
         )
@@ -53,8 +56,8 @@ class MotorGroups(Motor):
             ),
             "reads": tuple(dict.fromkeys(channel for one in members for channel in one.reads)),
             "within_a_cycle": any(one.within_a_cycle for one in members),
-            "phasors_only": next((one.phasors_only for one in members if one.phasors_only), ""),
-            "waves_only": next((one.waves_only for one in members if one.waves_only), ""),
+            "phasors_only": next(filter(None, (one.phasors_only for one in members)), ""),
+            "waves_only": next(filter(None, (one.waves_only for one in members)), ""),
         }
         for key, value in fields.items():  # of these groups; the class knows of none
             object.__setattr__(self, key, value)

@@ -273,6 +273,18 @@ def _unfit(folder: Path, private: bool = False) -> str:
     return "" if os.access(folder, os.W_OK | os.X_OK) else "it cannot be written to"
 
 
+def _find_stranger(folder: Path, name: str, state: os.stat_result, entry: os.stat_result) -> str:
+    """Why others have or could put something there by a name, in a folder that they can write to;
+    "" where only its owner can.
+    """
+    if not state.st_mode & stat.S_ISVTX:
+        who = "every user" if state.st_mode & stat.S_IWOTH else "a group"
+        return f"{who} can put another in its place, since {who} can write to {folder}"
+    if entry.st_uid not in (0, os.geteuid()):
+        return f"another user has put {folder / name} there"
+    return ""
+
+
 def _reachable_by_others(folder: Path) -> str:
     """Why others could put another folder in this one's place, "" where nobody can: of all that its
     path leads through.
@@ -285,12 +297,8 @@ def _reachable_by_others(folder: Path) -> str:
         state, entry = here.stat(), (here / part).lstat()
         if state.st_uid not in (0, os.geteuid()):
             return f"another user can put another in its place, since {here} is theirs"
-        shared = _others_write(state)
-        if shared and not state.st_mode & stat.S_ISVTX:
-            who = "every user" if state.st_mode & stat.S_IWOTH else "a group"
-            return f"{who} can put another in its place, since {who} can write to {here}"
-        if shared and entry.st_uid not in (0, os.geteuid()):
-            return f"another user has put {here / part} there"
+        if _others_write(state) and (why := _find_stranger(here, part, state, entry)):
+            return why
         if stat.S_ISLNK(entry.st_mode):
             links += 1
             if links > MOST_LINKS:

@@ -238,7 +238,7 @@ def _read_text(cell: str, row: int) -> _Moment | None:
         raise BadCell(row, f"{quote_cell(cell)} is no time of a day")
     if match["half"]:
         hours = hours % 12 + 12 * (match["half"] in "Pp")
-    day = match["day"].strip() if match["day"] else None
+    day = (match["day"] or "").strip() or None
     if day and not is_date(day):
         raise BadCell(row, f"{quote_cell(day)} is no date; write it as 2024-03-31")
     total = hours * 3600 + minutes * 60 + second - _offset(match["zone"])

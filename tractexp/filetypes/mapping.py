@@ -228,27 +228,25 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
             f"{DATA.columns}: {key} must be the name of a column of {table.source}, or its number"
         )
     if isinstance(choice, int) or (str(choice).isdigit() and str(choice) not in names):
-        if 0 <= int(choice) < len(names):
-            return int(choice)
-        raise UserError(
-            f"{DATA.columns}: {key}={choice}: {table.source} has {len(names)} columns, counted"
-            " from 0"
-        )
+        if int(choice) not in range(len(names)):
+            raise UserError(
+                f"{DATA.columns}: {key}={choice}: {table.source} has {len(names)} columns, counted"
+                " from 0"
+            )
+        return int(choice)
     with_units = list(map(operator.add, names, units))
     matches = _match_names(str(choice), names) or _match_names(str(choice), with_units)
     if len(matches) == 1:
         return matches[0]
-    if not matches:
-        fitting = itertools.compress(names, map(_suits, itertools.repeat(key), names, units))
+    if matches:
         raise UserError(
-            f"{DATA.columns}: {key}={choice}: {table.source} has no such"
-            f" column{nearest(str(choice), fitting) or '.'} "
-            f"Columns: {', '.join(names)}"
+            f"{DATA.columns}: {key}={choice}: {table.source} has that column {len(matches)} times;"
+            f" give its number, one of {', '.join(map(str, matches))}"
         )
+    fitting = itertools.compress(names, map(_suits, itertools.repeat(key), names, units))
     raise UserError(
-        f"{DATA.columns}: {key}={choice}: {table.source} has that column {len(matches)} times;"
-        " give its number, "
-        f"one of {', '.join(map(str, matches))}"
+        f"{DATA.columns}: {key}={choice}: {table.source} has no such"
+        f" column{nearest(str(choice), fitting) or '.'} Columns: {', '.join(names)}"
     )
 
 
@@ -277,11 +275,9 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
     names = _spell_out_names(heading.names)
     order = order_of(names, heading.units)
     options = {key: [_chosen_column(table, key, k, order)] for key, k in numbers.items()}
-    roles = {
-        k: one
-        for k in find_other_columns(table, numbers.values())
-        if (one := role(names[k], heading.units[k], order))
-    }
+    others = find_other_columns(table, numbers.values())
+    read = {k: role(names[k], heading.units[k], order) for k in others}
+    roles = {k: one for k, one in read.items() if one}
     exact = set(CONTRACT).intersection(map(heading.names.__getitem__, roles))
     if "U" not in {*exact, *numbers}:
         exact.discard("U2")  # of U1, U2, U3
@@ -291,7 +287,7 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
         key = name if name in exact else renamed.get(one.key, one.key)
         if key not in numbers and (key not in exact or name == key):
             options.setdefault(key, []).append(_named_column(k, name, key, one))
-    unnamed = [k for k in find_other_columns(table, numbers.values()) if k not in roles]
+    unnamed = [k for k in others if k not in roles]
     return _find_time_columns(table, _add_by_unit(heading, unnamed, _prefer_means(options)))
 
 

@@ -248,11 +248,9 @@ def join_phasors(parts: Sequence[Phasors]) -> Phasors:
     """
     if len(parts) == 1:
         return parts[0]
-    turned, angle = [], 1.0 + 0j
-    for part in parts:
-        if turned:
-            last, first = turned[-1].V1[-1], part.V1[0]
-            angle = np.exp(1j * (np.angle(last) - np.angle(first)))
+    turned = [parts[0]]
+    for part in parts[1:]:
+        angle = np.exp(1j * (np.angle(turned[-1].V1[-1]) - np.angle(part.V1[0])))
         turned.append(replace(part, V=part.V * angle, I=part.I * angle))
     at = np.concatenate([part.t for part in turned])
     step = max(float(part.t[1] - part.t[0]) for part in turned if len(part.t) > 1)

@@ -181,11 +181,9 @@ def _align_moments(sampled: Sequence[SampledFile]) -> Alignment:
             " event overlap in time; name others, or correct the clock that is wrong"
         )
     places = [begin - shift for shift in shifts]
-    firsts = [
-        min(max(round(place), 0), each.count - count)
-        for place, each in zip(places, sampled, strict=True)
-    ]
-    late = [place - first for place, first in zip(places, firsts, strict=True)]
+    last = np.array([each.count for each in sampled]) - count
+    firsts = np.clip(np.rint(places), 0, last).astype(int).tolist()
+    late = np.subtract(places, firsts).tolist()
     named = name_files(each.source for each in sampled)
     said = [f"{named} are joined by their clocks, at the samples of {Path(one.source).name}"]
     if any(abs(shift) > SAME_INSTANT for shift in shifts):

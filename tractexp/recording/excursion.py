@@ -55,6 +55,15 @@ class Excursion:
     cleared: bool = True  # a fault that ends otherwise than by opening one pole
 
 
+def _find_dead_beginning(trace: Trace, first: int) -> list[Excursion]:
+    """That no voltage is there before the sample `first`; [] where it is the first of all."""
+    if first == 0:
+        return []
+    end = min(first + round(2 * trace.cycle / trace.step), len(trace.t) - 1)
+    level = max(float(trace.U.max()), 1e-12)
+    return [Excursion(0, end, -1.0, True, False, False, level, True)]
+
+
 def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
     """All excursions, in order of time; `trigger` [s] is that of the recorder."""
     levels, limits = _levels(trace)
@@ -63,14 +72,9 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
     alive = levels.max(axis=0) > DEAD_VOLTAGE_SHARE * np.percentile(levels.max(axis=0), 95)
     # what is gone does not change
     levels = np.maximum(levels, DEAD_VOLTAGE_SHARE * levels.max(axis=1, keepdims=True))
-    events: list[Excursion] = []
-    k = int(np.argmax(alive))
+    events = _find_dead_beginning(trace, int(np.argmax(alive)))
+    k = events[-1].end if events else 0
     count = max(2, round(REFERENCE / trace.step))
-    if k > 0:
-        k = min(k + round(2 * trace.cycle / trace.step), len(trace.t) - 1)
-        events.append(
-            Excursion(0, k, -1.0, True, False, False, max(float(trace.U.max()), 1e-12), True)
-        )
     reference = starting_level(trace.t[k:], levels[:, k:], limits, count, trigger)
     reference = np.maximum(reference, DEAD_VOLTAGE_SHARE * levels.max(axis=1))
     while k < len(trace.t):

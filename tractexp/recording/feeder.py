@@ -115,11 +115,9 @@ def propose(recording: Recording) -> list[Feeder]:
     By what the names share, else by magnitudes and angles; each with the voltages its name or its
     behaviour says.
     """
-    waves = {i: c for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c)}
-    volts = [i for i in waves if kind(waves[i]) == "voltage"]
-    amps = [i for i in waves if kind(waves[i]) == "current"]
+    volts, amps = (_list_waves(recording, quantity) for quantity in ("voltage", "current"))
     f, strange = _frequency(recording, volts, amps)
-    phasors = snapshots(recording, sorted(waves), f)
+    phasors = snapshots(recording, sorted([*volts, *amps]), f)
     if not volts or not amps or phasors is None or direct_voltage(recording):
         return []
     options = _find_options(recording, phasors, volts, amps)
@@ -140,13 +138,18 @@ def _select_free(
     ]
 
 
+def _list_waves(recording: Recording, quantity: str) -> list[int]:
+    """The numbers of the channels that are waveforms of a quantity."""
+    return [
+        i for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c) == quantity
+    ]
+
+
 def buses_alone(recording: Recording) -> list[Feeder]:
     """The buses of a recording that shows no load, by their voltages; [] where none turns as a
     network does.
     """
-    volts = [
-        i for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c) == "voltage"
-    ]
+    volts = _list_waves(recording, "voltage")
     f, strange = _frequency(recording, volts, [])
     phasors = snapshots(recording, volts, f)
     if not volts or phasors is None or strange or direct_voltage(recording):

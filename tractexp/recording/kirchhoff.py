@@ -19,15 +19,20 @@ LARGEST_TIE_DIFFERENCE = 0.1  # of a tie's current, by which it is off the sum o
 CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
 
 
+def _find_loaded(phasors: Snapshots, feeders: "list[Feeder]") -> list[int]:
+    """The numbers of the feeders of three currents that are not small beside the greatest."""
+    sizes = {k: phasors.size(f.currents) for k, f in enumerate(feeders) if len(f.currents) == 3}
+    level = max(sizes.values(), default=0.0)
+    return [k for k, size in sizes.items() if size > UNLOADED * level]
+
+
 def closed_sums(phasors: Snapshots, feeders: "list[Feeder]") -> "list[Feeder]":
     """The feeders, with a note where the sum of their currents is zero, as they are or with one
     reversed.
 
     The whole station first, then the feeders of each bus.
     """
-    sizes = {k: phasors.size(f.currents) for k, f in enumerate(feeders) if len(f.currents) == 3}
-    level = max(sizes.values(), default=0.0)
-    loaded = [k for k, size in sizes.items() if size > UNLOADED * level]
+    loaded = _find_loaded(phasors, feeders)
     if closed := _find_closed_sum(phasors, feeders, loaded):
         return _describe_closure(phasors, feeders, loaded, *closed)
     for bus in sorted({feeders[k].voltages for k in loaded}):
@@ -125,10 +130,8 @@ def _describe_closure(
             f"the currents of {np.count_nonzero(signs)} feeders {CLOSED_SUM} {100 * closes:.2g} %"
             " of their magnitudes"
         )
-        if out:
-            said += f", without {' and '.join(out)}" + (
-                ": a bus tie, or one of another bus" if sign == 0 else ""
-            )
+        said += f", without {' and '.join(out)}" if out else ""
+        said += ": a bus tie, or one of another bus" if sign == 0 else ""
         if sign < 0:
             said += " once this one's polarity is reversed"
         alone = sign == 0 and len(out) == 1

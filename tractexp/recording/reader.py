@@ -152,20 +152,22 @@ class WaveformReader(Reader):
         if not file_dips:
             # raises, and says what there is instead
             detect(max(wholes, key=lambda whole: whole.samples))
-        records = [dip.result for dip in file_dips if isinstance(dip.result, Record)]
-        if not records:
+        first = next((dip.result for dip in file_dips if isinstance(dip.result, Record)), None)
+        if first is None:
             return file_dips
-        U, S = level(records[0])
+        base = self._measure_base(first, frequency)
+        return [replace(dip, result=_per_unit(dip.result, base)) for dip in file_dips]
+
+    def _measure_base(self, record: Record, frequency: float) -> Base:
+        """Voltage and apparent power before a dip. Raises `UserError` for a load without power."""
+        U, S = level(record)
         if S < 1e-6:
             raise UserError(
                 f"{self.path}: {DATA.currents} carry no power before the first dip ({1e6 * S:.2g}"
                 " VA)"
             )
         check_load(self.path, U, S)
-        return [
-            replace(dip, result=_per_unit(dip.result, Base(U, S, frequency, LOAD)))
-            for dip in file_dips
-        ]
+        return Base(U, S, frequency, LOAD)
 
     def _whole(self, feeder: Feeder, stream: Stream, frequency: float) -> Record:
         """All of one segment, in kV, MW and Mvar."""
@@ -188,39 +190,46 @@ class WaveformReader(Reader):
         )
         return leave_out(whole, phasors.bridged, window.length / 2)
 
+    def _numbers(
+        self, recording: Recording, key: str, connection: str, wanted: int
+    ) -> tuple[int, ...]:
+        """The numbers of the `wanted` channels that a setting names.
+
+        Raises `UserError` for fewer or more, for one named twice and for one of another quantity.
+        """
+        named, channels = getattr(self, key), recording.channels
+        where = setting(f"data.{key}")
+        if len(named) != wanted:
+            there = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(channels))
+            raise UserError(
+                f"{where}={[*named]} must name {COUNT[wanted]} channels"
+                f" ({DATA.connection}={connection}); {recording.source} has {there}"
+            )
+        numbers = tuple(recording.number(each, f"data.{key}") for each in named)
+        if len(set(numbers)) < wanted:
+            raise UserError(
+                f"{where}={[*named]} names a channel twice; {wanted} different ones are needed"
+            )
+        for i in numbers:
+            if channels[i].quantity not in (key.removesuffix("s"), ""):
+                raise UserError(
+                    f"{where}: channel {i} '{channels[i].name}' of {recording.source} is in"
+                    f" {channels[i].unit}; choose {key}"
+                )
+        return numbers
+
     def feeder(self, recording: Recording) -> Feeder:
         """The chosen channels, or those of the only load that the file shows."""
         if not (self.voltages or self.currents):
             return self._only(recording)
         name = self.connection or self._usual(recording)
         connection = plugin.chosen("connection", name)
-        numbers = {}
-        for key, wanted in (("voltages", connection.voltages), ("currents", connection.currents)):
-            channels = getattr(self, key)
-            where = setting(f"data.{key}")
-            if len(channels) != wanted:
-                raise UserError(
-                    f"{where}={[*channels]} must name {COUNT[wanted]} channels"
-                    f" ({DATA.connection}={connection.name}); "
-                    f"{recording.source} has "
-                    + ", ".join(
-                        f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels)
-                    )
-                )
-            numbers[key] = tuple(recording.number(each, f"data.{key}") for each in channels)
-            if len(set(numbers[key])) < wanted:
-                raise UserError(
-                    f"{where}={[*channels]} names a channel twice; {wanted} different ones are"
-                    " needed"
-                )
-            for i in numbers[key]:
-                if recording.channels[i].quantity not in (key.removesuffix("s"), ""):
-                    raise UserError(
-                        f"{where}: channel {i} '{recording.channels[i].name}' of {recording.source}"
-                        " is in "
-                        f"{recording.channels[i].unit}; choose {key}"
-                    )
-        feeder = Feeder(**numbers, connection=name, reverse_current=self.reverse_current)
+        feeder = Feeder(
+            self._numbers(recording, "voltages", connection.name, connection.voltages),
+            self._numbers(recording, "currents", connection.name, connection.currents),
+            connection=name,
+            reverse_current=self.reverse_current,
+        )
         check_doubt(recording, feeder.channels)
         return arrange_feeder(recording, feeder)
 
@@ -331,11 +340,7 @@ class WaveformReader(Reader):
             *recording.notes,
             *feeder.why,
         ]
-        fast = recording.waveforms()
-        slow = [s for s in recording.segments if s not in fast]
-        if slow:
-            spans = ", ".join(f"{s.rate:g} Hz from {s.start:.3f} s" for s in slow)
-            notes.append(f"segments without waveform not used: {spans}")
+        notes += _describe_slow(recording)
         used = (*feeder.voltages, *feeder.currents)
         chosen = [recording.channels[i] for i in used]
         skew = max(abs(channel.skew) for channel in chosen)
@@ -389,3 +394,11 @@ def _per_unit(record: Record | UserError, base: Base) -> Record | UserError:
         ).check()
     except UserError as error:
         return error
+
+
+def _describe_slow(recording: Recording) -> list[str]:
+    """Which segments are too slow for waveforms and are not used; [] where all are used."""
+    fast = recording.waveforms()
+    slow = [s for s in recording.segments if s not in fast]
+    spans = ", ".join(f"{s.rate:g} Hz from {s.start:.3f} s" for s in slow)
+    return [f"segments without waveform not used: {spans}"] if slow else []

@@ -29,11 +29,10 @@ def find_records(folder: Path) -> Iterator[Path]:
     if files.is_archive(folder):
         yield from find_packed(folder)
         return
+    if folder.is_file():
+        raise UserError(f"{DATA.path}={folder} is a file; give the folder it lies in")
     if not folder.is_dir():
-        kind = (
-            "a file; give the folder it lies in" if folder.exists() else "no folder that is there"
-        )
-        raise UserError(f"{DATA.path}={folder} is {kind}")
+        raise UserError(f"{DATA.path}={folder} is no folder that is there")
     readable = endings()
     for place, below, names in os.walk(folder):
         # a converted file may still be opened by its own path
@@ -42,11 +41,9 @@ def find_records(folder: Path) -> Iterator[Path]:
             continue
         below[:] = sorted(name for name in below if not name.startswith("."))
         beside = {name.lower() for name in names}
-        for name in sorted(names):
-            path = Path(place, name)
-            if name.startswith("."):
-                continue
-            if files.is_archive(path) or _is_wanted(path, readable, beside):
+        for path in (Path(place, name) for name in sorted(names)):
+            seen = not path.name.startswith(".")
+            if seen and (files.is_archive(path) or _is_wanted(path, readable, beside)):
                 yield path
 
 

@@ -111,6 +111,18 @@ def _judge_sides(
     return False if likeness.only and not called else None
 
 
+def _list_buses(feeders: "Sequence[Feeder]") -> list[np.ndarray]:
+    """Of each bus the numbers of its loaded feeders of three phases whose currents do not close,
+    where there are several.
+    """
+    buses: dict[tuple[int, ...], list[int]] = {}
+    for k, f in enumerate(feeders):
+        closes = CLOSED_SUM in " ".join(f.why)
+        if f.loaded and len(f.currents) == 3 == len(f.voltages) and not closes:
+            buses.setdefault(f.voltages, []).append(k)
+    return [np.array(bus) for bus in buses.values() if len(bus) > 1]
+
+
 def _find_same_currents(
     recording: Recording, phasors: Snapshots, feeders: "Sequence[Feeder]"
 ) -> list[tuple[int, int, bool]]:
@@ -120,13 +132,8 @@ def _find_same_currents(
     Where no name says the sides, nor calls them windings, a turn of 30 degrees tells them from
     feeders of like loads. The only two of a bus that no name calls feeders may be either.
     """
-    buses: dict[tuple[int, ...], list[int]] = {}
-    for k, f in enumerate(feeders):
-        closes = CLOSED_SUM in " ".join(f.why)
-        if f.loaded and len(f.currents) == 3 == len(f.voltages) and not closes:
-            buses.setdefault(f.voltages, []).append(k)
     pairs = []
-    for bus in (np.array(bus) for bus in buses.values() if len(bus) > 1):
+    for bus in _list_buses(feeders):
         rest, turned = _compare_currents(phasors, [feeders[k] for k in bus])
         for a, b in zip(*np.nonzero(rest < LARGEST_REST[True]), strict=True):
             high, low = int(bus[a]), int(bus[b])

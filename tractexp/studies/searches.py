@@ -1,6 +1,6 @@
 """Many searches on the cores of this computer, without composing a configuration for each."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,6 +63,19 @@ def run(
     return made  # type: ignore[return-value]
 
 
+def _cut_chunks(
+    missing: Mapping[str, Sequence[int]],
+    variants: Mapping[str, Variant],
+    recipe: Recipe,
+    limits: Limits,
+) -> Iterator[_Chunk]:
+    """The searches of each variant under the seeds that it misses, `CHUNK` at a time."""
+    for label, seeds in missing.items():
+        for k in range(0, len(seeds), CHUNK):
+            optimizer = build("optimizer", variants[label])
+            yield _Chunk(label, seeds[k : k + CHUNK], optimizer, recipe, limits)
+
+
 def attempt(
     recipe: Recipe,
     variants: Mapping[str, Variant],
@@ -95,17 +108,12 @@ def attempt(
             f"  {earlier} of them were made before by the same code on the same records, and are"
             " read back"
         )
-    chunks = [
-        _Chunk(label, part[k : k + CHUNK], build("optimizer", variants[label]), recipe, limits)
-        for label, part in missing.items()
-        for k in range(0, len(part), CHUNK)
-    ]
+    chunks = list(_cut_chunks(missing, variants, recipe, limits))
     if chunks:  # compiled once, for all
         problem.objective(problem.space.from_unit(np.full((1, problem.space.dimension), 0.5)))
     for chunk, outcome in Workers(workers or -1).results(_search_chunk, chunks, TRIES):
-        for seed, one in zip(
-            chunk.seeds, outcome or [FailedSearch(KILLED)] * len(chunk.seeds), strict=True
-        ):
+        ends = outcome or [FailedSearch(KILLED)] * len(chunk.seeds)
+        for seed, one in zip(chunk.seeds, ends, strict=True):
             results[chunk.label][seed] = one
             if isinstance(one, SearchResult):
                 stored.store_result(variants[chunk.label], seed, one)

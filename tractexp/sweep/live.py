@@ -88,14 +88,18 @@ class LivePage:
         self.ends |= ended
         return bool(ended)
 
-    def report(self, ended: str = "") -> Report:
-        """The page; it loads itself again unless the sweep has `ended`, which says how."""
-        common = find_shared_overrides([*self.jobs.values()])
-        failures = [
+    def _list_failures(self) -> list[str]:
+        """The jobs that failed, each with why, one sentence each."""
+        return [
             f"{self.jobs[folder].name}: {end.message}"
             for folder, end in self.ends.items()
             if end.status == FAILED
         ]
+
+    def report(self, ended: str = "") -> Report:
+        """The page; it loads itself again unless the sweep has `ended`, which says how."""
+        common = find_shared_overrides([*self.jobs.values()])
+        failures = self._list_failures()
         page = Report(
             f"Sweep {self.folder.name}",
             " ".join(sorted(common)),

@@ -229,11 +229,7 @@ def _about(values: Sequence[float]) -> tuple[float, float]:
 
 def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
     """The parameters at which every run ended, a panel for each, and where the floor's lie."""
-    variants = [
-        variant
-        for variant in variants
-        if any(run in polished.reached for run in variant.finished_runs)
-    ]
+    variants = [v for v in variants if not polished.reached.keys().isdisjoint(v.finished_runs)]
     names = list(polished.parameters)
     labels = [
         f"{name} [{polished.units[name]}]" if polished.units[name] != "1" else name

@@ -65,11 +65,18 @@ def _jobs(folder: Path) -> list[Path]:
     """
     found = (config.parents[1] for config in folder.rglob(".hydra/config.yaml"))
     own = [job for job in found if job != folder and folder_of(job) == folder]
-    names = {job: job.relative_to(folder).parts for job in own}
-    return sorted(
-        (job for job in own if not any(name.startswith(".") for name in names[job])),
-        key=lambda job: [(int(n) if n.isdigit() else np.inf, n) for n in names[job]],
-    )
+    seen = [job for job in own if not _is_hidden(job, folder)]
+    return sorted(seen, key=lambda job: [*map(_order_name, job.relative_to(folder).parts)])
+
+
+def _is_hidden(job: Path, folder: Path) -> bool:
+    """Whether a part of the path from one folder to another begins with a dot."""
+    return any(name.startswith(".") for name in job.relative_to(folder).parts)
+
+
+def _order_name(name: str) -> tuple[float, str]:
+    """By which names are sorted: numbers by size, then others by their letters."""
+    return (int(name) if name.isdigit() else np.inf, name)
 
 
 def _job(folder: Path) -> SearchRun | None:

@@ -99,6 +99,11 @@ def table1(sheet: Report, study: Study) -> None:
         sheet.items(verdicts)
 
 
+def _list_values(study: Study, reading: str, place: int | None) -> list[float]:
+    """What the searches of a reading found for the parameter at a place; [] where it has none."""
+    return [] if place is None else [one.values[place] for one in study.run_searches(reading)]
+
+
 def _rows_of_parameters(study: Study, columns: Sequence[tuple[str, str]]) -> list[list[str]]:
     """One row for each parameter and error; a column is a reading and "paper", "one" (seed 0) or
     "median" of it.
@@ -109,11 +114,7 @@ def _rows_of_parameters(study: Study, columns: Sequence[tuple[str, str]]) -> lis
     for k, parameter in enumerate(printed.NAMES):
         row = [parameter, bounds[parameter] if parameter in index else "-"]
         for name, what in columns:
-            values = (
-                [f.values[index[parameter]] for f in study.run_searches(name)]
-                if parameter in index
-                else []
-            )
+            values = _list_values(study, name, index.get(parameter))
             row.append(f"{printed.TABLE_3[name][k]:g}" if what == "paper" else _one(values, what))
         rows.append(row)
     for error, table in (("epsilon_p", printed.EPSILON_P), ("epsilon_q", printed.EPSILON_Q)):
