@@ -15,9 +15,13 @@ STEP = 5e-3
 @pytest.fixture(scope="module")
 def swinging():
     """A load whose network swings by 0.2 Hz from the dip on, with f as it was."""
+    return record(0.2)
+
+
+def record(swing):
     t = np.arange(700) * STEP
     U = np.where((t > 0.5) & (t < 0.75), 0.65, 1.0)
-    f = 50 + 0.2 * np.sin(2 * np.pi * 0.7 * np.maximum(t - 0.5, 0))
+    f = 50 + swing * np.sin(2 * np.pi * 0.7 * np.maximum(t - 0.5, 0))
     still = np.ones(len(t))
     event = Excitation(STEP, U, still, still, 1.0, 1.0, 0.6, omega_s=2 * np.pi * (f - 50))
     load = compose(
@@ -30,10 +34,10 @@ def swinging():
     return {"t": t, "U": U, "P": P + noise[0], "Q": Q + noise[1], "f": f}
 
 
-def fit(columns, **settings):
+def fit(columns, model="third_order_impedance", **settings):
     return tractexp.identify(
         tractexp.read(columns),
-        "third_order_impedance",
+        model,
         optimizer="multistart_least_squares",
         progress=False,
         **settings,
@@ -81,6 +85,26 @@ def test_a_row_says_what_the_swing_moves_and_what_to_record(blind):
     table = blind.table()
     assert table.columns[-1] == "0.2 Hz of f moves"
     assert any(line.startswith("record f or U_angle") for line in blind.advice)
+
+
+def test_a_course_of_the_frequency_that_explains_what_is_left_is_a_candidate(blind):
+    """It is fitted beside the parameters, which it brings near the truth that they miss without."""
+    course = blind.result.unrecorded["course"]
+    assert course["error"] < 0.25 * course["error_without"]
+    assert 0.1 < course["strays"] < 0.3
+    T_m = course["parameters"]["T_m"]
+    assert abs(T_m - TRUTH["T_m"]) < 0.3 * abs(blind.parameters["T_m"].value - TRUTH["T_m"])
+    assert blind.advice[0].startswith("record f or U_angle: a frequency that nobody recorded")
+    assert "a candidate of the measurement, and no effect of the load" in blind.advice[0]
+
+
+def test_what_a_load_has_and_the_model_lacks_is_no_course_of_the_frequency():
+    """A motor whose flux decays, fitted by one whose flux follows at once."""
+    plain = {name: x for name, x in record(0.0).items() if name != "f"}
+    found = fit(plain, "second_order_exponential", check_intervals=False)
+    assert not found.adequate
+    assert found.result.unrecorded["course"] == {}
+    assert not any("nobody recorded" in line for line in found.advice)
 
 
 def test_a_frequency_that_stood_still_moves_nothing(still):

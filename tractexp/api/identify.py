@@ -731,7 +731,10 @@ def _conclude_identification(
     starts = [s.to_dict(problem.space.names) for s in graded.estimation.starts]
     structures = [rival.to_dict() for rival in uncertainty.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
+    unrecorded = uncertainty.unrecorded
+    by_course = unrecorded is not None and unrecorded.course is not None
     advice = [
+        *(_with_frequency(uncertainty) if by_course else []),
         *advise(
             uncertainty,
             adequacy,
@@ -739,7 +742,7 @@ def _conclude_identification(
             data=data,
         ),
         *_hold_to_machines(setup, result),
-        *_with_frequency(uncertainty),
+        *([] if by_course else _with_frequency(uncertainty)),
     ]
     beside = yardstick(fits, result.model_error)
     result = replace(
@@ -752,20 +755,25 @@ def _conclude_identification(
         rival_structures=structures,
         free_optimum=free.to_dict() if free else {},
         share_bound=share.to_dict() if share else {},
-        unrecorded=uncertainty.unrecorded.to_dict() if uncertainty.unrecorded else {},
+        unrecorded=unrecorded.to_dict() if unrecorded else {},
         advice=advice,
     )
     return result, FitDetails(fits, graded.estimation, uncertainty, together, adequacy)
 
 
 def _with_frequency(uncertainty: "Uncertainty") -> list[str]:
-    """To record what moves parameters beyond their intervals; [] where nothing does."""
+    """To record what moves parameters beyond their intervals, or would explain most of what is
+    left; [] where nothing does.
+    """
     missing = uncertainty.unrecorded
-    if missing is None or not missing.beyond:
+    if missing is None or not (missing.beyond or missing.course):
         return []
+    still = "(task.frequency_swing=0 where it stood still)"
+    if missing.course:
+        return [f"record f or U_angle: {missing.course} {still}"]
     return [
         f"record f or U_angle: without it a swing of {missing.swing:g} Hz moves"
-        f" {join_words(missing.beyond)} (task.frequency_swing=0 where it stood still)"
+        f" {join_words(missing.beyond)} {still}"
     ]
 
 

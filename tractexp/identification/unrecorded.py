@@ -7,20 +7,23 @@ networks have them after a fault, to first order. A course that the fit would sh
 it no parameter takes up is no louder than what the fit leaves.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from tractexp.identification.frequency_course import (
+    FrequencyCourse,
+    drive_by_frequency,
+    find_course,
+    list_falls,
+    list_swings,
+)
 from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import IDENTIFIED_SHARE, UNIDENTIFIED, ParameterVerdict, size
 from tractexp.inference.information import Information
-from tractexp.record import Event
-
-# Hz: swings of one machine against others, and of areas against each other (Kundur 1994, ch. 12)
-SWINGS = (0.3, 0.7, 1.5)
-FALL = 1.0  # s: within which the frequency follows a lost balance of power
+from tractexp.inference.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -33,10 +36,12 @@ class UnrecordedInput:
     swing: float
     moves: dict[str, float]
     beyond: tuple[str, ...] = ()
+    course: FrequencyCourse | None = None  # that explains most of what is left
 
     def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
-        return {**vars(self), "beyond": list(self.beyond)}
+        course = self.course.to_dict() if self.course else {}
+        return {**vars(self), "beyond": list(self.beyond), "course": course}
 
 
 def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
@@ -53,11 +58,9 @@ def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
     moves = dict(zip(uncertainty.names, moved.max(axis=0).tolist(), strict=True))
     beside = replace(uncertainty, unrecorded=UnrecordedInput("f", swing, moves))
     objections = dict(_find_moved(uncertainty, beside))
-    return replace(
-        beside,
-        unrecorded=UnrecordedInput("f", swing, moves, tuple(objections)),
-        verdicts=uncertainty.verdicts | objections,
-    )
+    course = find_course(uncertainty, swing)
+    told = UnrecordedInput("f", swing, moves, tuple(objections), course)
+    return replace(beside, unrecorded=told, verdicts=uncertainty.verdicts | objections)
 
 
 def _find_moves(uncertainty: Uncertainty, swing: float) -> np.ndarray:
@@ -66,8 +69,8 @@ def _find_moves(uncertainty: Uncertainty, swing: float) -> np.ndarray:
     problem = likelihood.problem
     left, sensitivities = uncertainty.sensitivities
     driven = [
-        replace(likelihood, problem=problem.driven_by(events)).rows(unit[None])[0]
-        for events in _courses(problem.events, swing)
+        replace(likelihood, problem=driven_problem).rows(unit[None])[0]
+        for driven_problem in _drive_by_courses(problem, swing)
     ]
     changes = np.array([rows for rows in driven if np.isfinite(rows).all()]) - left
     if not len(changes):
@@ -81,19 +84,11 @@ def _find_moves(uncertainty: Uncertainty, swing: float) -> np.ndarray:
     return shares[:, None] * seen_by.find_steps(-changes)
 
 
-def _courses(events: Sequence[Event], swing: float) -> Iterator[list[Event]]:
-    """The events with each course of the frequency: one that falls from the dip on, and swings."""
-    since = [np.maximum(event.record.t - event.t_start, 0.0) for event in events]
-    shapes = [[1 - np.exp(-t / FALL) for t in since]]
-    shapes += [[np.sin(2 * np.pi * rate * t) for t in since] for rate in SWINGS]
-    for shape in shapes:
-        yield [_with_frequency(e, swing * x) for e, x in zip(events, shape, strict=True)]
-
-
-def _with_frequency(event: Event, deviation: np.ndarray) -> Event:
-    """An event whose frequency deviates so [Hz] from the nominal one."""
-    nominal = event.record.base.frequency
-    return replace(event, record=replace(event.record, f=nominal + deviation), f0=nominal)
+def _drive_by_courses(problem: Problem, swing: float) -> Iterator[Problem]:
+    """The problem with each course of the frequency: one that falls from the dip on, and swings."""
+    shapes = [[*list_falls(event), *list_swings(event)] for event in problem.events]
+    for of_events in zip(*shapes, strict=True):
+        yield drive_by_frequency(problem, [swing * shape for shape in of_events])
 
 
 def _find_moved(own: Uncertainty, beside: Uncertainty) -> Iterator[tuple[str, ParameterVerdict]]:
