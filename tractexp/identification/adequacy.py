@@ -49,11 +49,19 @@ class Grade(StrEnum):
 
 @dataclass(frozen=True)
 class Surprise:
-    """How often noise alone leaves as much as the estimate does: `p` by the most surprised test,
-    corrected for all.
+    """How often noise alone leaves as much as an estimate does.
 
-    `ratio` is the loudest stretch of the whitened residual over what noise leaves there. None: not
-    judged, for too few samples are quiet.
+    Attributes
+    ----------
+    p : float or None
+        By the most significant test, corrected for all; None: not judged, for too few samples are
+        quiet.
+    loudest : str
+        What that test looks for.
+    ratio : float or None
+        The loudest stretch of the whitened residual over what noise leaves there.
+    where : str
+        Which stretch that is.
     """
 
     p: float | None
@@ -69,7 +77,7 @@ class Surprise:
 
 @dataclass(frozen=True)
 class Adequacy:
-    """The grade of an estimate and its sentence; `p` as in `Surprise`."""
+    """The grade of an estimate, its sentence, and `p` as in `Surprise`."""
 
     grade: Grade
     sentence: str
@@ -87,10 +95,25 @@ def surprise(
     squares: Likelihood | None = None,
     least: float = np.inf,
 ) -> Surprise:
-    """How surprising what the fit at coordinates (D,) leaves is; not judged where there is too
-    little quiet.
+    """How often noise alone leaves as much as a fit does.
 
-    `least` is the least sum of squares, over those of `squares`, Eq. (8).
+    Parameters
+    ----------
+    observed : Observed
+        The problem, driven by smoothed voltages.
+    likelihood : Likelihood
+        That of the noise.
+    unit : (D,)
+        Coordinates of the fit.
+    squares : Likelihood or None
+        That of Eq. (8), which the likelihood is compared with; None: it is not.
+    least : float
+        The least sum of squares of Eq. (8), in the units of `squares`.
+
+    Returns
+    -------
+    Surprise
+        Not judged where too little is quiet.
     """
     if likelihood.noise.mix is None or not observed.problem.quiet:
         return Surprise(None, "", None, "")
@@ -131,8 +154,18 @@ def surprise(
 
 
 def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
-    """What `steady` shared coordinates (k,) of their own for each event could change beside the
-    event's own.
+    """The basis of what parameters of their own for each event could change.
+
+    Parameters
+    ----------
+    J : Sensitivities
+        To the shared coordinates and those of each event.
+    steady : (k,) bools
+        Shared coordinates that may differ from event to event.
+
+    Returns
+    -------
+    SeparableBasis
     """
     shared = J.without_own.T
     columns = np.concatenate([shared[~steady], shared[steady]])
@@ -143,11 +176,20 @@ def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
 
 @dataclass(frozen=True, eq=False)
 class Excess:
-    """What the likelihood leaves of Eq. (8) over what least squares leave: `of_records` (1,), and
-    of draws of noise.
+    """What the likelihood leaves of Eq. (8) over what least squares leave.
 
-    `J` are whitened sensitivities to the coordinates inside, `inside` and `plain` those of Eq. (8)
-    to the same and to all; `squares` is what least squares reach.
+    Attributes
+    ----------
+    of_records : (1,)
+        That ratio for the records.
+    likelihood : Likelihood
+        Eq. (8) with P0 and Q0 free.
+    J : Sensitivities
+        Whitened by the noise, to the coordinates off their bounds.
+    plain, inside : Sensitivities
+        Those of Eq. (8), to all coordinates and to those off their bounds.
+    squares : SeparableBasis
+        What least squares reach.
     """
 
     of_records: np.ndarray
@@ -161,7 +203,9 @@ class Excess:
     def from_fit(
         cls, squares: Likelihood, unit: np.ndarray, J: Sensitivities, least: float
     ) -> "Excess":
-        """Of the fit at coordinates (D,), where `least` is the least sum of squares."""
+        """The excess of a fit at coordinates (D,), where `least` is the least sum of squares of
+        Eq. (8).
+        """
         likelihood = squares.with_initial_power
         rows, plain = likelihood.jacobian(unit)
         inside = off_walls(unit)
@@ -170,7 +214,7 @@ class Excess:
         return cls(of_records, likelihood, J, plain, plain.only(inside), free.basis())
 
     def of_draws(self, white: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-        """Of draws (b, C, N), whitened (b, R): (b,)."""
+        """The excess (b,) of draws of noise (b, C, N) [pu], which whitened are `white` (b, R)."""
         raw = self.likelihood.whiten(drawn)
         k = self.plain.k
         likely = raw - self.inside.times(self.J.fit(white))
@@ -212,8 +256,21 @@ def _linear(likelihood: Likelihood) -> np.ndarray:
 
 
 def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]:
-    """The loudest window of the whitened residual (2, N): how many times the noise, and where it
-    is.
+    """The loudest window of a whitened residual.
+
+    Parameters
+    ----------
+    channels : (C, N)
+        The residual, in standard deviations.
+    problem : Problem
+        Whose windows count.
+
+    Returns
+    -------
+    float
+        Its rms: how many times the noise.
+    str
+        Where it is: channel, event and times [s].
     """
     windows = goodness_of_fit.residual_windows(problem)
     row = problem.drive.labels.index
@@ -230,9 +287,22 @@ def grade_errors(
     held_out: ModelError | None = None,
     active_bounds: Sequence[str] = (),
 ) -> Adequacy:
-    """The grade of an estimate that leaves this of the fitted and of held-out events.
+    """The grade of an estimate, by what it leaves.
 
-    `active_bounds` say which bounds hold a parameter.
+    Parameters
+    ----------
+    surprise : Surprise
+        How often noise leaves as much.
+    fitted, held_out : ModelError, ModelError or None
+        The model's error on the fitted and on the held-out events.
+    active_bounds : texts
+        The bounds that hold a parameter.
+
+    Returns
+    -------
+    Adequacy
+        A wrong model where an error is `WRONG` or more of the response; adequate where noise may
+        leave as much; else an effect is missing.
     """
     errors = [error for error in (fitted, held_out) if error]
     noise = surprise.adequate

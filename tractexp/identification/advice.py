@@ -30,11 +30,26 @@ def advise(
     odd: Sequence[str] = (),
     data: str = "",
 ) -> list[str]:
-    """Sentences, the most pressing first. `odd` events do not fit with the rest; `data` is the
-    choice of data that holds further events of the load, where one is known.
+    """What to do next, from what an identification leaves open.
 
     Of a model that does not describe the load nothing is said that would only hold if it did. What
     is missing is looked for in the domain that tells more, where there is one.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        Values, intervals and verdicts.
+    adequacy : Adequacy
+        The grade of the model.
+    odd : names
+        Events that do not fit with the rest.
+    data : str
+        The choice of data that holds further events of the load; "" where none is known.
+
+    Returns
+    -------
+    list of str
+        Sentences, the most pressing first; never empty.
     """
     better = [
         f"{why}: {suggest_run('domain=waves')}"

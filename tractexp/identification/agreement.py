@@ -21,8 +21,16 @@ SUSPECTS = 4  # events that are fitted by themselves, and the others without the
 
 @dataclass(frozen=True, eq=False)
 class EventAgreement:
-    """What each of several events adds. `gains` {event: {name: width of the interval without it
-    over with it}}.
+    """What each of several events adds to an estimate.
+
+    Attributes
+    ----------
+    gains : {event: {name: float}}
+        Width of the parameter's interval without the event, over that with it.
+    odd : list of str
+        Events that do not fit with the rest.
+    notes : list of str
+        A sentence on each of them.
     """
 
     gains: dict[str, dict[str, float]]
@@ -30,15 +38,23 @@ class EventAgreement:
     notes: list[str]
 
     def fields(self) -> dict[str, Any]:
-        """What `result.json` gains; None where a parameter is not identifiable
-        without the event.
+        """What is added to `result.json`; None where a parameter is not identifiable without the
+        event.
         """
         return {"gains": files.plain(self.gains), "odd_events": self.odd}
 
 
 def compare_events(uncertainty: Uncertainty) -> EventAgreement:
-    """Each event's share in the precision, and the events that do not fit with the rest (deviance
-    test).
+    """The share of each event in the precision, and the events that do not fit with the rest.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The estimate from all events.
+
+    Returns
+    -------
+    EventAgreement
     """
     likelihood, width = uncertainty.likelihood, uncertainty.upper - uncertainty.lower
     _, J = uncertainty.sensitivities
@@ -60,8 +76,27 @@ def compare_events(uncertainty: Uncertainty) -> EventAgreement:
 
 
 def without_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
-    """Triangles (k, k) with the products of all rows (R_e, k) but those of each, and
-    of all rows.
+    """Triangles that stand for all rows but those of each event.
+
+    The products of a triangle's rows are those of the rows it stands for: T'T = R'R.
+
+    Parameters
+    ----------
+    rows : E arrays (R_e, k)
+        Rows of each event.
+
+    Returns
+    -------
+    list of arrays, at most k rows each
+        Without each event.
+    array, at most (k, k)
+        Of all rows.
+
+    Examples
+    --------
+    >>> others, whole = without_each([np.array([[3.0]]), np.array([[4.0]])])
+    >>> [abs(float(t[0, 0])) for t in (*others, whole)]
+    [4.0, 3.0, 5.0]
     """
     joined = lambda above, below: np.linalg.qr(np.concatenate([above, below])).R  # noqa: E731
     nothing = rows[0][:0]
@@ -71,13 +106,24 @@ def without_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarr
 
 
 def find_disagreeing_events(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
-    """Events that separate parameters fit much better than shared ones do, the worst first, one at
-    a time.
+    """The events that parameters of their own fit much better than shared ones, the worst first.
 
-    Compares the deviance of all events fitted together with that of the rest plus that of the event
-    alone; the difference is chi-squared with as many degrees of freedom as there are identifiable
-    parameters. Fits are made without and of the `SUSPECTS` events alone for which it is largest
-    where the model is linear.
+    The deviance of all events fitted together is compared with that of the rest plus that of the
+    event alone; the difference is chi-squared with as many degrees of freedom as there are
+    identifiable parameters. An event is taken out and the rest is tested again. Fits are made for
+    the `SUSPECTS` events for which the difference is largest in the linearized model.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The estimate from all events.
+
+    Returns
+    -------
+    list of str
+        Names of the events.
+    list of str
+        A sentence on each.
     """
     from scipy.special import chdtri
 
@@ -119,8 +165,8 @@ def _linear(rows: np.ndarray, J: Sensitivities) -> list[np.ndarray]:
 
 
 def _excess(linear: Sequence[np.ndarray]) -> np.ndarray:
-    """By how much the deviance of all events is above that of all but each and of each, (E,), in a
-    linear model.
+    """By how much the deviance of all events is above that of the rest plus that of each, (E,), in
+    the linearized model.
 
     The last number of a triangle is the root of the deviance that is left.
     """
@@ -135,8 +181,8 @@ def _excess(linear: Sequence[np.ndarray]) -> np.ndarray:
 def _deviances(
     likelihood: Likelihood, unit: np.ndarray, groups: Sequence[Sequence[int]]
 ) -> np.ndarray:
-    """What the best fits to groups of events alone leave, from coordinates (D,), as many at once as
-    memory allows.
+    """The deviances (groups,) of the best fits to groups of events, from coordinates (D,); as many
+    at once as memory allows.
     """
     together = max(1, MOST_NUMBERS // (2 * likelihood.problem.drive.measurements.size))
     parts = [groups[k : k + together] for k in range(0, len(groups), together)]
@@ -149,7 +195,7 @@ def _deviances(
 
 
 def only(likelihood: Likelihood, groups: Sequence[Sequence[int]]) -> Rows:
-    """Rows in which lane k counts the events of `groups[k]` alone."""
+    """The function of rows in which lane k counts the events of `groups[k]` alone."""
     drive = likelihood.problem.drive
     masks = np.zeros((len(groups), *drive.measurements.shape), dtype=bool)
     for mask, group in zip(masks, groups, strict=True):

@@ -33,9 +33,18 @@ UNKNOWN_SPREAD = 0.1  # pu: of one dip alone nobody knows how far the next is fr
 
 @dataclass(frozen=True, eq=False)
 class Composition:
-    """What is known of a quantity: `coefficients` (p,) of the columns of `describe_times`, the mean
-    first, with their `covariance`; `spread` from dip to dip beside them; `start` from which years
-    count, None where too few dips have a time.
+    """What is known of a quantity of a load, such as the share of its motors.
+
+    Attributes
+    ----------
+    coefficients : (p,)
+        Of the columns of `describe_times`, the mean first.
+    covariance : (p, p)
+        Of the coefficients.
+    spread : float
+        Standard deviation from dip to dip beside them.
+    start : datetime or None
+        From when years count; None where too few dips have a time.
     """
 
     coefficients: np.ndarray
@@ -44,14 +53,37 @@ class Composition:
     start: datetime.datetime | None
 
     def predict(self, times: Sequence[datetime.datetime | None]) -> tuple[np.ndarray, np.ndarray]:
-        """Expected values (n,) at such times, and their standard errors (n,); None is the mean."""
+        """The values to be expected.
+
+        Parameters
+        ----------
+        times : n times
+            None stands for a time that is not known: the mean.
+
+        Returns
+        -------
+        (n,) array
+            Expected values.
+        (n,) array
+            Their standard errors.
+        """
         X = describe_times(times, self.start)[:, : len(self.coefficients)]
         errors = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", X, self.covariance, X), 0.0))
         return X @ self.coefficients, errors
 
     def tabulate(self, term: str) -> list[dict[str, Any]]:
-        """Rows of a term: `at`, the expected `value` with everything else in the mean, and its 95 %
-        interval, `low` and `high`.
+        """The rows of a term.
+
+        Parameters
+        ----------
+        term : str
+            "hour", "weekday", "season" or "year".
+
+        Returns
+        -------
+        list of dict
+            `at`, the expected `value` with everything else in the mean, and its 95 % interval,
+            `low` and `high`.
         """
         labels, X = _describe_grid(term)
         X = X[:, : len(self.coefficients)]
@@ -66,8 +98,26 @@ class Composition:
 def describe_times(
     times: Sequence[datetime.datetime | None], start: datetime.datetime | None
 ) -> np.ndarray:
-    """Columns (n, 15) of times: 1; two harmonics of the day; the seven weekdays; that of the year;
-    years since `start`. A time that is not known is in the mean of all.
+    """The columns of times by which a quantity is told.
+
+    Parameters
+    ----------
+    times : n times
+        None: not known, so that it counts as the mean of all.
+    start : datetime or None
+        From when years count.
+
+    Returns
+    -------
+    (n, 15) array
+        1; two harmonics of the day; the seven weekdays; one harmonic of the year; years since
+        `start`.
+
+    Examples
+    --------
+    >>> monday = datetime.datetime(2024, 1, 1, 6)
+    >>> describe_times([monday], monday)[0, :7].round(6).tolist()
+    [1.0, 0.0, -1.0, 1.0, 0.0, 1.0, 0.0]
     """
     return np.array([_describe_time(moment, start) for moment in times])
 
@@ -117,7 +167,19 @@ def _describe_grid(term: str) -> tuple[Sequence[str], np.ndarray]:
 def estimate_composition(
     values: np.ndarray, errors: np.ndarray, times: Sequence[datetime.datetime | None]
 ) -> Composition:
-    """The composition of values (n,) with standard errors (n,) at such times."""
+    """Estimate how a quantity differs from dip to dip.
+
+    Parameters
+    ----------
+    values, errors : (n,)
+        The quantity at each dip, and its standard errors.
+    times : n times
+        When the dips were; None: not known.
+
+    Returns
+    -------
+    Composition
+    """
     seen = _Seen.from_values(values, errors, times)
     _, deviations, spread = seen.find_most_likely(seen.terms)
     coefficients, covariance = seen.solve(deviations, spread)
@@ -132,7 +194,18 @@ def estimate_composition(
 def find_terms(
     values: np.ndarray, errors: np.ndarray, times: Sequence[datetime.datetime | None]
 ) -> list[str]:
-    """The terms that such values show: each makes them more likely by more than chance does."""
+    """The names of the terms that values show: each makes them more likely by more than chance
+    does.
+
+    Parameters
+    ----------
+    values, errors, times
+        As of `estimate_composition`.
+
+    Returns
+    -------
+    list of str
+    """
     seen = _Seen.from_values(values, errors, times)
     whole = seen.find_most_likely(seen.terms)[0]
     without = {
@@ -144,8 +217,29 @@ def find_terms(
 def shrink(
     values: np.ndarray, errors: np.ndarray, expected: np.ndarray, spread: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Values (n,) drawn towards what is expected of them, as far as their errors (n,) are larger
-    than the spread; and their standard errors.
+    """Draw values towards what is expected of them, as far as their errors exceed the spread.
+
+    Parameters
+    ----------
+    values, errors : (n,)
+        Of each dip by itself.
+    expected : (n,)
+        By all dips together.
+    spread : float
+        Standard deviation from dip to dip.
+
+    Returns
+    -------
+    (n,) array
+        The values drawn.
+    (n,) array
+        Their standard errors.
+
+    Examples
+    --------
+    >>> drawn, error = shrink(np.array([0.8]), np.array([0.1]), np.array([0.6]), 0.1)
+    >>> drawn.round(3).tolist(), error.round(4).tolist()
+    ([0.7], [0.0707])
     """
     own = spread**2 / np.maximum(spread**2 + errors**2, 1e-30)
     drawn = expected + own * (values - expected)
@@ -154,7 +248,10 @@ def shrink(
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """Values (n,) with their errors and columns X (n, p); `scatter` is how far they are apart."""
+    """Values (n,) that were seen, with their errors and columns X (n, p).
+
+    `scatter` is their standard deviation, which all other deviations are told in.
+    """
 
     values: np.ndarray
     errors: np.ndarray

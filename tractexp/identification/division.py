@@ -16,7 +16,28 @@ MOTOR_POWER_FACTOR = 0.8
 
 
 def doubt_division(load: complex, motor: complex, units: tuple[str, str]) -> str:
-    """Why no load draws P + jQ by such a motor, in words; "" where one may. Powers in `units`."""
+    """Why no load draws its power by such a motor.
+
+    Parameters
+    ----------
+    load, motor : complex
+        P + jQ that the load and its motor draw before a dip, both in `units`.
+    units : (str, str)
+        Of P and of Q, as the sentence tells them.
+
+    Returns
+    -------
+    str
+        A sentence; "" where a load may be so: the motor draws, at most `LARGEST_MOTOR_SHARE` of P,
+        and has a usual power factor.
+
+    Examples
+    --------
+    >>> doubt_division(1 + 0.5j, 0.6 + 0.4j, ("pu", "pu"))
+    ''
+    >>> doubt_division(1 + 0.5j, -0.2 + 0.4j, ("pu", "pu")).partition(" of a load")[0]
+    'the motor generates 0.2 pu and the static part draws 1.2 pu'
+    """
     p, q = units
     static = load - motor
     of_load = f"of a load of {load.real:.4g} {p} and {load.imag:.4g} {q}"
@@ -34,7 +55,7 @@ def doubt_division(load: complex, motor: complex, units: tuple[str, str]) -> str
 
 
 def doubt_estimate(problem: Problem, values: np.ndarray) -> str:
-    """As `doubt_division`, of free values (d,) in the first event; "" where the model has no motor
+    """As `doubt_division`, for free values (d,) in the first event; "" where the model has no motor
     in P and Q.
     """
     full = problem.full(values)[0]

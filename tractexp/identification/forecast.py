@@ -33,8 +33,16 @@ Calculate = Callable[[np.ndarray], np.ndarray]  # values (d,) -> P and Q (2, N) 
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """The band that a model at values (d,) promises; `root` (k, d) are rows whose products add up
-    to the covariance of the values.
+    """The band that a model promises for a dip that it has not seen.
+
+    Attributes
+    ----------
+    values : (d,)
+        Parameters of the model.
+    root : (k, d)
+        Rows whose products add up to the covariance of the values.
+    band : PredictionBand
+        What the width hangs on.
     """
 
     values: np.ndarray
@@ -45,8 +53,21 @@ class Forecast:
     def from_content(
         cls, content: Mapping[str, Any], names: Sequence[str], values: np.ndarray
     ) -> "Forecast | None":
-        """Of `next_dip` as `result.json` has it, for the parameters `names` (d,); None of a result
-        that has none.
+        """The forecast of a stored result.
+
+        Parameters
+        ----------
+        content : mapping
+            `next_dip` of `result.json`.
+        names : names
+            The d parameters, in the order of the values.
+        values : (d,)
+            Their values.
+
+        Returns
+        -------
+        Forecast or None
+            None of a result that promises nothing.
         """
         if not content:
             return None
@@ -59,9 +80,29 @@ class Forecast:
     def find_half_width(
         self, calculate: Calculate, drawn: complex, t: np.ndarray, start: int, frequency: float
     ) -> np.ndarray:
-        """Half the band of P and Q (2,) [pu] of an event at times t (N,) [s] from sample `start`
-        on, before which the load drew S = `drawn` [pu]. Raises `UserError` where there is no
-        steady state.
+        """Half the band of P and Q for one event.
+
+        Parameters
+        ----------
+        calculate : (d,) -> (2, N) [pu]
+            P and Q of the event for values of the parameters.
+        drawn : complex [pu]
+            P + jQ before the event.
+        t : (N,) [s]
+            Times of the samples.
+        start : int
+            First sample of the event.
+        frequency : float [Hz]
+            Of the network: over a cycle of it changes are averaged.
+
+        Returns
+        -------
+        (2,) array [pu]
+
+        Raises
+        ------
+        UserError
+            Where the model has no steady state before the event.
         """
         power = calculate(self.values)
         change = power[0] + 1j * power[1] - drawn
@@ -72,10 +113,20 @@ class Forecast:
 
 
 def forecast_next_dip(graded: "GradedModel") -> dict[str, Any]:
-    """The content of `next_dip`: what the band hangs on, and its half widths P and Q, as shares of
-    S before it, for a dip of 40 % as long as the known ones in the mean.
+    """The content of `next_dip` of `result.json`.
 
-    {} where the motor stalls on a known event; no P and Q where it does so on this dip.
+    It holds what the band hangs on, and for a dip of 40 %, as long as the known ones in the mean,
+    half the bands of P and Q as shares of S before it, with a sentence.
+
+    Parameters
+    ----------
+    graded : GradedModel
+        The model, played over all events.
+
+    Returns
+    -------
+    dict
+        {} where the motor stalls on a known event; P and Q are None where it does so on this dip.
     """
     band = measure_band(graded.fits)
     if band is None:
@@ -108,8 +159,24 @@ def forecast_next_dip(graded: "GradedModel") -> dict[str, Any]:
 def tell_of_dip(
     model: Model, first: Event, forecast: Forecast, duration: float
 ) -> tuple[list[float] | None, str]:
-    """Half the bands of a dip of 40 % as shares of S, and the sentence, where the load draws what
-    it did before the event `first`; None where there are none.
+    """Half the bands of a dip of 40 %, and the sentence on it.
+
+    Parameters
+    ----------
+    model : Model
+        The equations of the load.
+    first : Event
+        The load draws before the dip what it drew before this event.
+    forecast : Forecast
+        The band.
+    duration : float [s]
+        Of the dip.
+
+    Returns
+    -------
+    [P, Q] or None
+        As shares of S; None where the motor stalls or there is no steady state.
+    str
     """
     before = {"U0": first.U0, "P0": first.P0, "Q0": first.Q0, "frequency": first.f0}
     t, U, start = draw_dip(first.U0, duration, first.record.step)
@@ -142,7 +209,32 @@ def _find_root(J: np.ndarray) -> np.ndarray:
 
 
 def draw_dip(U0: float, duration: float, step: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """Times (N,) [s], voltage (N,) [pu] and first sample of the dip that is told of."""
+    """A dip of 40 % with straight edges.
+
+    Parameters
+    ----------
+    U0 : float [pu]
+        Voltage before it.
+    duration : float [s]
+        From edge to edge.
+    step : float [s]
+        Between samples.
+
+    Returns
+    -------
+    (N,) array [s]
+        Times.
+    (N,) array [pu]
+        Voltage.
+    int
+        First sample of the dip.
+
+    Examples
+    --------
+    >>> t, U, start = draw_dip(1.0, 0.2, 0.01)
+    >>> len(t), round(float(U.min()), 3), start
+    (200, 0.6, 30)
+    """
     t = np.arange(round((CALCULATED_BEFORE + duration + CALCULATED_AFTER) / step)) * step
     edge = max(EDGE, step)
     fall, back = (

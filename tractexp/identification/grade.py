@@ -34,8 +34,18 @@ from tractexp.text.wording import join_words
 
 @dataclass(frozen=True, eq=False)
 class GradedModel:
-    """A model's estimate, as it fits some events and predicts others; `fits` has the fitted events
-    first.
+    """The estimate of a model, with what it calculates of the fitted and the held-out events.
+
+    Attributes
+    ----------
+    problem : Problem
+        The model and the fitted events.
+    estimation : EstimationResult
+        The estimate.
+    fits : tuple of Fit
+        What it calculates of each event, the fitted ones first.
+    adequacy : Adequacy
+        The grade.
     """
 
     problem: Problem
@@ -75,8 +85,17 @@ class GradedModel:
         ]
 
     def find_curves(self, event: Event) -> np.ndarray | None:
-        """What it calculates of an event (C, N) [pu]: P and Q, or the currents of waveforms; None
-        where it cannot be simulated there.
+        """What the model calculates of an event.
+
+        Parameters
+        ----------
+        event : Event
+            One of those of `fits`, by its name.
+
+        Returns
+        -------
+        (C, N) array [pu] or None
+            P and Q, or the currents of waveforms; None where it cannot be simulated there.
         """
         named = (fit for fit in self.fits if fit.event.record.name == event.record.name)
         fit = next(named, None)
@@ -93,16 +112,24 @@ class GradedModel:
 
     @functools.cached_property
     def next_dip(self) -> dict[str, Any]:
-        """What it promises of a dip that it has not seen, as `result.json` has it."""
+        """The band that the model promises for a dip that it has not seen, as `result.json` has
+        it.
+        """
         return forecast_next_dip(self)
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far a model is off some events: the model's error, and the relative errors of Eq. (20),
-    as fractions.
+    """How far a model is off some events.
 
-    `epsilon_i` is that of the currents, over several events the rms of theirs; None of phasors.
+    Attributes
+    ----------
+    error : ModelError
+        Its error as a share of the response.
+    epsilon_p, epsilon_q : float
+        The relative errors of Eq. (20), as fractions.
+    epsilon_i : float or None
+        That of the currents, over several events the rms of theirs; None of phasors.
     """
 
     error: ModelError
@@ -112,7 +139,7 @@ class Misfit:
 
     @classmethod
     def from_fits(cls, fits: Sequence[Fit]) -> "Misfit":
-        """Of some events together."""
+        """The misfit of some events together."""
         currents = [fit.epsilon_i**2 for fit in fits if fit.epsilon_i is not None]
         of_currents = float(np.sqrt(np.mean(currents))) if currents else None
         return cls(model_error(fits), *relative_errors(fits), of_currents)
@@ -124,10 +151,27 @@ def grade_model(
     searched: np.ndarray | None = None,
     shown: Collection[str] = (),
 ) -> GradedModel:
-    """The estimate for a problem, and its grade on the fitted events and on `validate`.
+    """Estimate a model's parameters, and grade it.
 
-    `searched` (d,) are free values that a search ended at, `shown` effects that the model has
-    because its records show them. Raises `UserError` where nothing of the box can be simulated.
+    Parameters
+    ----------
+    problem : Problem
+        The model and the fitted events.
+    validate : sequence of Event
+        Events held out, which the grade counts, too.
+    searched : (d,) or None
+        Free values that a search ended at; None: there was no search.
+    shown : names
+        Effects that the model has because its records show them: their bounds tell nothing.
+
+    Returns
+    -------
+    GradedModel
+
+    Raises
+    ------
+    UserError
+        Where nothing of the box can be simulated.
     """
     estimation = (
         estimate_without_search(problem) if searched is None else estimate(problem, searched)
@@ -141,7 +185,7 @@ def grade_playable(
     searched: np.ndarray | None = None,
     shown: Collection[str] = (),
 ) -> GradedModel:
-    """As `grade_model`, where a held-out event without a steady state makes a wrong model and no
+    """As `grade_model`; but a held-out event without a steady state makes a wrong model and no
     refusal.
     """
     estimation = (
@@ -170,7 +214,21 @@ def grade_estimate(
     validate: Sequence[Event] = (),
     shown: Collection[str] = (),
 ) -> GradedModel:
-    """The grade of an estimate that is there already."""
+    """The graded model of an estimate.
+
+    Parameters
+    ----------
+    problem : Problem
+        The model and the fitted events.
+    estimation : EstimationResult
+        The estimate.
+    validate, shown
+        As of `grade_model`.
+
+    Returns
+    -------
+    GradedModel
+    """
     values = estimation.uncertainty.values
     fits = play(problem, values, validate)
     errors = model_errors(fits)

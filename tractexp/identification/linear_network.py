@@ -32,15 +32,21 @@ CRITERION = "the Bayesian information criterion"
 
 @dataclass(frozen=True, eq=False)
 class LinearNetwork:
-    """Poles (n,) [rad/s] in the port's frame, and the linear part (k,): g_k, C, and G where the
-    port leaves it open.
+    """A linear network.
+
+    Attributes
+    ----------
+    poles : (n,) complex [rad/s]
+        In the port's frame.
+    coefficients : (k,) complex [pu]
+        g_k, C, and G where the port leaves it open.
     """
 
     poles: Complex
     coefficients: Complex
 
     def response(self, port: Port) -> Complex:
-        """The current's deviation (N,) [pu]."""
+        """The deviation (N,) [pu] of a port's current that it calculates."""
         return port.steady_response + basis(port, self.poles) @ self.coefficients
 
     def squares(self, ports: Sequence[Port]) -> float:
@@ -48,14 +54,26 @@ class LinearNetwork:
         return sum(float(np.nansum(np.abs(rest) ** 2)) for rest in map(self.residual, ports))
 
     def residual(self, port: Port) -> Complex:
-        """What it leaves from the dip on (n,) [pu]; nan where the current is not compared."""
+        """What it leaves of a port's current (n,) [pu] from the dip on; nan where that is not
+        compared.
+        """
         return (port.i - self.response(port))[port.start :]
 
 
 @dataclass(frozen=True, eq=False)
 class BlackBox:
-    """A linear network for each port of a domain, and by what the number of its
-    poles was chosen.
+    """A linear network for each port of a domain.
+
+    Attributes
+    ----------
+    domain : Domain
+        Whose ports they are.
+    networks : tuple of LinearNetwork
+        That of the vectors, and that of the zero sequence where there is one.
+    turns : float [Hz]
+        Frequency of the frame.
+    chosen_by : str
+        The criterion by which the number of poles was chosen.
     """
 
     domain: Domain
@@ -96,10 +114,25 @@ class BlackBox:
 def black_boxes(
     domain: Domain, train: Sequence[Event], most: int = MOST_VECTOR_POLES
 ) -> list[BlackBox]:
-    """The best ones for events of a domain together, of no pole, one, and so on.
+    """The best networks of no pole, of one, and so on, for events together.
 
-    Raises `UserError` where the voltage does not move, or the samples are too few for a network
-    without poles.
+    Parameters
+    ----------
+    domain : Domain
+        Whose ports are fitted.
+    train : sequence of Event
+        The events.
+    most : int
+        The largest number of poles of the vectors.
+
+    Returns
+    -------
+    list of BlackBox
+
+    Raises
+    ------
+    UserError
+        Where the voltage does not move, or the samples are too few for a network without poles.
     """
     vectors, *zeros = zip(*map(domain.ports, train), strict=False)
     _refuse(vectors, ", ".join(e.record.name for e in train))
@@ -108,7 +141,7 @@ def black_boxes(
 
 
 def choose_network(boxes: Sequence[BlackBox], train: Sequence[Event]) -> BlackBox:
-    """The one of the least information criterion for the events that all were fitted to."""
+    """The network of the least information criterion for the events that all were fitted to."""
     vectors = [box.networks[0] for box in boxes]
     ports = [boxes[0].domain.ports(event)[0] for event in train]
     by = information(vectors, ports)
@@ -116,9 +149,20 @@ def choose_network(boxes: Sequence[BlackBox], train: Sequence[Event]) -> BlackBo
 
 
 def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
-    """The best network of no pole, one, and so on, up to `most` or to what the samples allow.
+    """The best networks of no pole, of one, and so on.
 
-    They depend on the records alone, so the store keeps them for the next model of these.
+    They depend on the records alone, so that the store keeps them for the next model of these.
+
+    Parameters
+    ----------
+    ports : sequence of Port
+        Fitted together.
+    most : int
+        The largest number of poles; there are fewer where the samples do not allow so many.
+
+    Returns
+    -------
+    list of LinearNetwork
     """
 
     def compute() -> tuple[Complex, ...]:
@@ -139,9 +183,24 @@ def _fit(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
 
 
 def information(networks: Sequence[LinearNetwork], ports: Sequence[Port]) -> np.ndarray:
-    """The Bayesian information criterion of each (b,); samples count as what the last one leaves is
-    correlated in time.
+    """The Bayesian information criterion of networks.
 
+    Samples count as much as the residual of the last network, which is correlated in time, allows.
+
+    Parameters
+    ----------
+    networks : b networks
+        Of more and more poles.
+    ports : sequence of Port
+        What they are fitted to.
+
+    Returns
+    -------
+    (b,) array
+        The least is the best.
+
+    Notes
+    -----
     Source: Schwarz 1978; Bayley and Hammersley 1946 (the effective number of samples).
     """
     squares = np.array([one.squares(ports) for one in networks])
@@ -154,7 +213,7 @@ def information(networks: Sequence[LinearNetwork], ports: Sequence[Port]) -> np.
 
 
 def unknowns(poles: int, port: Port) -> int:
-    """Real unknowns of a network."""
+    """The number of real unknowns of a network with so many poles."""
     linear = poles if port.series else poles + 1 + (port.steady is None)
     return 2 * (poles + linear)
 

@@ -75,6 +75,15 @@ class Evaluate(Protocol):
 class Optimizer(Plugin):
     """Base of the optimizer plugins, chosen by `optimizer=NAME`. Its fields are settings of every
     optimizer.
+
+    Attributes
+    ----------
+    plain : str
+        The optimizer that this one is, bit for bit, with all its switches off.
+    space : str
+        "unit": it searches the unit cube; "raw": the parameters' own units.
+    polish : bool
+        Whether bounded least squares from the best points end the search, inside the same budget.
     """
 
     group: ClassVar[str] = "optimizer"
@@ -128,8 +137,14 @@ class Optimizer(Plugin):
 
 @dataclass(frozen=True, kw_only=True)
 class Iterative(Optimizer):
-    """Base of the optimizers that repeat one step: so often as is set, or as the
-    budget lasts for.
+    """Base of the optimizers that repeat one step, as often as is set, or as the budget lasts for.
+
+    Attributes
+    ----------
+    usual : int
+        Iterations where neither they nor a budget are set.
+    iterations : int or None
+        How many there are; None: as many as the budget lasts for.
     """
 
     # where nothing else says: sections 4.2 and 4.3 of the traction load paper

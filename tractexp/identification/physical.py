@@ -33,8 +33,16 @@ FREE_ITERATIONS = 25
 
 @dataclass(frozen=True)
 class FreeOptimum:
-    """What a fit gives whose machine is held to no range: `parameters` that leave theirs, the
-    model's error beside that of the fit that is held, of the events fitted and held out.
+    """The fit whose machine is held to no range, beside the one that is held.
+
+    Attributes
+    ----------
+    parameters : {name: value}
+        Those that leave their range, in their units.
+    error, held_error : float
+        The model's error on the fitted events, as a share of the response: free, and held.
+    predicted, held_predicted : float or None
+        Those errors on the events held out, where there are some.
     """
 
     parameters: dict[str, float]
@@ -65,8 +73,23 @@ def find_free_optimum(
     fits: Sequence[Fit],
     validate: Sequence[Event],
 ) -> FreeOptimum | None:
-    """The optimum without the ranges `held` {parameter: range}; None where none of these holds the
-    estimate, or where a free fit stays within them.
+    """The optimum without the ranges of machines.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The estimate within them.
+    held : {name: (lower, upper)}
+        The ranges, in each parameter's unit.
+    fits : sequence of Fit
+        What the held model calculates, the fitted events first.
+    validate : sequence of Event
+        The events held out.
+
+    Returns
+    -------
+    FreeOptimum or None
+        None where no range holds the estimate, or where a free fit stays within all of them.
     """
     if not _names_at_range(uncertainty, held):
         return None
@@ -100,7 +123,10 @@ def find_free_optimum(
 
 
 def say_ranges(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) -> Uncertainty:
-    """The judgement that tells nobody to widen the range of what stands at its end."""
+    """The judgement in which a parameter at the end of what machines have is called so.
+
+    Nobody is told to widen that range, as with other bounds.
+    """
     told = {
         name: ParameterVerdict(END_OF_RANGE, f"{value:.4g}")
         for name, value in zip(uncertainty.names, uncertainty.values.tolist(), strict=True)

@@ -24,8 +24,17 @@ ROUGH, ROUGH_TRIALS = 1e-2, 12
 
 
 class Elite:
-    """The best points a search has met that lie apart from each other, best first: where a polish
+    """The best points of a search that lie apart from each other, best first: where a polish
     starts.
+
+    Attributes
+    ----------
+    box : Box
+        Bounds (d,) of the points.
+    x : (n, d)
+        The points, at most `ELITE` of them.
+    f : (n,)
+        Their objectives.
     """
 
     def __init__(self, box: Box):
@@ -34,8 +43,14 @@ class Elite:
         self.x, self.f = np.empty((0, box.dimension)), np.empty(0)
 
     def add(self, x: np.ndarray, f: np.ndarray) -> None:
-        """Consider points (n, d) with objectives (n,); those refused or worse than a full elite are
-        passed over.
+        """Consider further points; those refused or worse than a full elite are passed over.
+
+        Parameters
+        ----------
+        x : (n, d)
+            Points of the box.
+        f : (n,)
+            Their objectives.
         """
         better = f < (self.f[-1] if len(self.f) == ELITE else REFUSED)
         if better.any():
@@ -66,9 +81,9 @@ class _Residuals:
         return self.value
 
     def jacobian(self, unit: np.ndarray) -> np.ndarray:
-        """(m, d). A difference steps away from the nearer wall.
+        """The Jacobian (m, d) at a point (d,), by differences away from the nearer bound.
 
-        One that cannot be simulated steps the other way, and is left at zero where that fails as
+        A difference that cannot be simulated steps the other way, and is zero where that fails as
         well: the parameter then rests for one step.
         """
         h = np.where(unit > 0.5, -UNIT_DIFFERENCE, UNIT_DIFFERENCE)
@@ -88,17 +103,34 @@ def least_squares_from(
     tolerance: float = 1e-8,
     trials: int = 100,
 ) -> tuple[np.ndarray, float]:
-    """Bounded least squares (SciPy's trust region reflective) from `start` (d,), whose objective is
-    known.
+    """Bounded least squares from one start, by SciPy's trust region reflective.
 
-    Works in the unit cube and on residuals scaled to a sum of squares of one, so that `tolerance`
-    is relative: the descent ends when the objective, the step or the gradient is below it, or after
-    `trials` trials. Returns the point (d,) it ended at and its objective; a start that cannot be
-    simulated is left at once.
+    It works in the unit cube and on residuals scaled to a sum of squares of one, so that the
+    tolerance is relative. Not `inference.least_squares.descend`: here each simulation is counted
+    and the search loop may stop it anywhere, and the method is a library's; there hundreds of lanes
+    share each simulation call.
 
-    Not `inference.least_squares.descend`: here each simulation is counted and the search loop may
-    stop it anywhere, and the method is a library's; there hundreds of lanes share each simulation
-    call.
+    Parameters
+    ----------
+    evaluate : Evaluate
+        The batch objective and its residuals.
+    box : Box
+        Bounds (d,).
+    start : (d,)
+        Where it begins.
+    objective : float
+        The objective there.
+    tolerance : float
+        It ends where the relative change of objective or step, or the gradient, is below this.
+    trials : int
+        It ends after so many at the latest.
+
+    Returns
+    -------
+    (d,) array
+        The point it ended at: the start, where that cannot be simulated.
+    float
+        Its objective.
     """
     from scipy.optimize import least_squares  # its annotations know `jac` as a string only
 
@@ -126,12 +158,27 @@ def race(
     tolerance: float = 1e-8,
     trials: int = 100,
 ) -> Iterator[None]:
-    """Descend briefly from each start (point, objective), and to the end from each that comes out
-    lowest so far.
+    """Descend briefly from each start, and to the end from each that comes out lowest so far.
 
-    In the right valley a descent is soon below the bottoms of the wrong ones, which take most of
+    At the right minimum a descent is soon below the bottoms of the wrong ones, which take most of
     the simulations where every descent is finished. What was left is finished at last, lowest
-    first. An iteration is one descent.
+    first.
+
+    Parameters
+    ----------
+    evaluate : Evaluate
+        The batch objective and its residuals.
+    box : Box
+        Bounds (d,).
+    starts : iterable of (point (d,), objective)
+        In the order in which they are tried.
+    tolerance, trials : float, int
+        Of a descent to the end, as of `least_squares_from`.
+
+    Yields
+    ------
+    None
+        After each descent.
     """
     left, best = [], np.inf
     for start, objective in starts:

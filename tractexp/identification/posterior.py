@@ -18,7 +18,23 @@ ENOUGH = 50.0  # autocorrelation times that a chain should last (emcee's own adv
 
 @dataclass(frozen=True, eq=False)
 class PosteriorSample:
-    """Draws (n, d) of the free parameters under a flat prior within their bounds."""
+    """A sample of the posterior of d free parameters under a flat prior within their bounds.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the parameters.
+    draws : (n, d)
+        In physical units.
+    steps : int
+        Length of each chain.
+    autocorrelation : float
+        Steps that a chain remembers, the largest over the coordinates.
+    acceptance : float
+        Share of the proposed moves that were taken.
+    simulations : int
+        What it cost.
+    """
 
     names: tuple[str, ...]
     draws: np.ndarray
@@ -29,7 +45,7 @@ class PosteriorSample:
 
     @property
     def intervals(self) -> np.ndarray:
-        """(d, 2) between the outer quantiles."""
+        """The 95 % intervals (d, 2) in physical units, between the outer quantiles."""
         tails = (1 - INTERVAL_LEVEL) / 2
         return np.quantile(self.draws, [tails, 1 - tails], axis=0).T
 
@@ -46,11 +62,31 @@ def sample(
     seed: int,
     parts: Callable[[int], Counting] = make_silent_counter,
 ) -> PosteriorSample:
-    """Goodman and Weare's affine-invariant ensemble (emcee), all walkers of a half-step in one
-    simulation call.
+    """Sample the posterior by Goodman and Weare's affine-invariant ensemble (emcee).
 
-    P0 and Q0 of each event are sampled along; `parts` counts the steps. Raises `UserError` where
-    emcee is missing.
+    All walkers of a half-step are one simulation call. P0 and Q0 of each event are sampled along.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The estimate around which the walkers start.
+    walkers : int
+        At least twice the number of coordinates.
+    steps : int
+        Of each walker; the first 30 % are thrown away.
+    seed : int
+        The same seed gives the same draws.
+    parts : int -> counter
+        Counts the steps.
+
+    Returns
+    -------
+    PosteriorSample
+
+    Raises
+    ------
+    UserError
+        Where emcee is missing, and for too few walkers.
     """
     try:
         import emcee
@@ -96,7 +132,7 @@ def sample(
 
 
 def _spread(uncertainty: Uncertainty) -> np.ndarray:
-    """Standard deviation of the start (D,), in ranges: that of the information matrix, at most a
+    """The standard deviations (D,) of the start, in ranges: the standard errors, at most a
     tenth.
     """
     wide = uncertainty.information.standard_errors / (uncertainty.upper - uncertainty.lower)

@@ -39,7 +39,21 @@ INTERVAL_NEIGHBORHOOD = 0.04  # of the range: places closer than this to an inte
 
 @dataclass(frozen=True, eq=False)
 class Profiles:
-    """All profiles, the judgement they are drawn around, and what turned up on the way."""
+    """The profiles of some parameters.
+
+    Attributes
+    ----------
+    uncertainty : Uncertainty
+        The judgement they are drawn around.
+    profiles : tuple of LikelihoodProfile
+        One a parameter.
+    threshold : float
+        What the deviance may rise by within an interval.
+    simulations, restarts : int
+        What they cost, and how often a better optimum restarted them.
+    region : Region
+        All points that were passed.
+    """
 
     uncertainty: Uncertainty
     profiles: tuple[LikelihoodProfile, ...]
@@ -50,8 +64,8 @@ class Profiles:
 
     @property
     def wider(self) -> np.ndarray:
-        """(d,) Whether points of the profiles that the records do not rule out lie beyond the
-        interval by curvature.
+        """Whether points that the records do not rule out lie beyond the interval by curvature,
+        (d,).
         """
         uncertainty = self.uncertainty
         ends = zip(
@@ -102,10 +116,25 @@ def revise_verdict(
     high: float,
     elsewhere: bool = False,
 ) -> ParameterVerdict:
-    """A verdict in the light of a profile: its width decides; an open side or a second minimum is a
-    weakness.
+    """A verdict in the light of a profile.
 
-    So is another valley, `elsewhere`.
+    The profile's width decides; an open side, a second minimum or another local minimum of the fit
+    is a weakness.
+
+    Parameters
+    ----------
+    verdict : ParameterVerdict
+        By curvature.
+    profile : LikelihoodProfile
+        Of the same parameter.
+    low, high : float
+        Its bounds, in its unit.
+    elsewhere : bool
+        Whether another local minimum has another value.
+
+    Returns
+    -------
+    ParameterVerdict
     """
     a, b = profile.interval
     if verdict.word == UNIDENTIFIED and "leave the record unchanged" in verdict.detail:
@@ -132,11 +161,22 @@ def revise_verdict(
 def check_by_profiles(
     uncertainty: Uncertainty, parts: Callable[[int], Counting] = make_silent_counter
 ) -> Uncertainty:
-    """The judgement with profiles in place of curvature wherever the curvature may mislead.
+    """The judgement with profiles in place of curvature, wherever that may mislead.
 
-    That is for intervals wider than `DOUBTFUL` of the value, for parameters that have another value
-    in another valley, and for those that another's profile leads beyond their interval; else a
-    narrow one is a parabola. Parameters that are not identifiable by structure have no profile.
+    It may for intervals wider than `DOUBTFUL` of the value, for parameters that have another value
+    at another local minimum, and for those that another's profile leads beyond their interval; else
+    a narrow one is a parabola. Parameters that are not identifiable by structure have no profile.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The judgement by curvature.
+    parts : int -> counter
+        Counts the points of the profiles.
+
+    Returns
+    -------
+    Uncertainty
     """
     bounds = zip(uncertainty.lower, uncertainty.upper, strict=True)
     sizes = np.array([size(v, *pair) for v, pair in zip(uncertainty.values, bounds, strict=True)])
@@ -174,11 +214,24 @@ def profiles(
     names: Sequence[str] | None = None,
     parts: Callable[[int], Counting] = make_silent_counter,
 ) -> Profiles:
-    """Profiles of every free parameter (or of `names`) around `uncertainty`, of at most `points`
-    points a side.
+    """The likelihood profiles of parameters.
 
-    Where a point fits better than the optimum did, everything starts again from there. `parts`
-    counts the points.
+    Where a point fits better than the optimum did, everything starts again from there.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The judgement they are drawn around.
+    points : int
+        At most so many on either side.
+    names : names or None
+        The parameters; None: all.
+    parts : int -> counter
+        Counts the points.
+
+    Returns
+    -------
+    Profiles
     """
     simulations, restarts, names = 0, 0, names or uncertainty.names
     while True:

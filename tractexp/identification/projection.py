@@ -24,8 +24,16 @@ PARALLEL = 1e-6  # of a response: where the others leave no more of it, it is th
 
 
 class LinearPart(NamedTuple):
-    """The linear part for given poles: its best coefficients (k,), an orthonormal base (R, k), the
-    residual (R,).
+    """The best linear part for given poles.
+
+    Attributes
+    ----------
+    coefficients : (k,) complex
+        Of the responses.
+    base : (R, k) complex
+        An orthonormal base of these.
+    residual : (R,) complex
+        What they leave of the current.
     """
 
     coefficients: Complex
@@ -35,7 +43,19 @@ class LinearPart(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Ports fitted together, at the R samples of all of them that are compared."""
+    """Ports that are fitted together, at the R samples of all of them that are compared.
+
+    Attributes
+    ----------
+    ports : sequence of Port
+        Voltages and currents.
+    current : (R,) complex [pu]
+        Currents of all ports, without what is known of them.
+    slowest : float [1/s]
+        The least decay of a pole.
+    rate : float [1/s]
+        Samples per second.
+    """
 
     ports: Sequence[Port]
     current: Complex  # (R,) of all ports, without what is known of it
@@ -44,15 +64,17 @@ class Projection:
 
     @classmethod
     def from_ports(cls, ports: Sequence[Port]) -> "Projection":
-        """The projection for some ports: currents less their steady response, and decays between
-        one in the longest time recorded and one in a sample [1/s].
+        """The projection for some ports.
+
+        The currents are less their steady response; decays lie between one in the longest time
+        recorded and `FASTEST` of the sampling rate.
         """
         seconds = max((len(port.u) - port.start) * port.step for port in ports)
         current = _rows(ports, lambda port: port.i - port.steady_response)
         return cls(ports, current, 1 / seconds, 1 / max(port.step for port in ports))
 
     def linear_part(self, poles: Complex) -> LinearPart:
-        """The best linear part beside poles (n,)."""
+        """The best linear part for poles (n,) [rad/s]."""
         base, triangle = np.linalg.qr(_rows(self.ports, lambda port: basis(port, poles)))
         inside = base.conj().T @ self.current
         return LinearPart(
@@ -75,7 +97,7 @@ class Projection:
         ]
 
     def start(self, poles: Complex) -> complex:
-        """The pole of the grid that takes most of what these leave, beside them."""
+        """The pole of the grid that takes most of what other poles (n,) leave."""
         _, base, residual = self.linear_part(poles)
 
         def measure_correlation(pole: complex) -> float:
@@ -87,7 +109,17 @@ class Projection:
         return max(self.grid, key=measure_correlation)
 
     def optimum(self, poles: Complex) -> Complex:
-        """The poles that leave least, near these."""
+        """The poles that leave least, near given ones.
+
+        Parameters
+        ----------
+        poles : (n,) complex [rad/s]
+            Where the nonlinear least squares begin.
+
+        Returns
+        -------
+        (n,) complex array [rad/s]
+        """
         from scipy.optimize import least_squares
 
         n, apart = len(poles), 2 * np.pi * HIGHEST * self.rate
@@ -108,8 +140,8 @@ class Projection:
         return _poles(optimum.x, n)
 
     def jacobian(self, poles: Complex) -> np.ndarray:
-        """How what is left (2 R,) moves with the logarithms of the decays and with the
-        frequencies.
+        """The derivatives (2 R, n or 2 n) of what is left, real parts above imaginary ones, by the
+        logarithms of the decays and by the frequencies.
         """
         coefficients, base, _ = self.linear_part(poles)
         moved = _rows(
@@ -125,10 +157,20 @@ class Projection:
 
 
 def basis(port: Port, poles: Complex) -> Complex:
-    """Responses to u (N, k): of each pole, of the derivative and, where that is open, of a
-    constant.
+    """The responses of the parts of a network to the voltage.
 
-    Of a path in series those of its poles alone.
+    Parameters
+    ----------
+    port : Port
+        With N samples.
+    poles : (n,) complex [rad/s]
+        In the port's frame.
+
+    Returns
+    -------
+    (N, k) complex array
+        Of each pole, of the derivative and, where that is open, of a constant. Of a path in series
+        those of its poles alone.
     """
     columns = [of_pole(port, pole) for pole in poles]
     if not port.series:
@@ -137,21 +179,44 @@ def basis(port: Port, poles: Complex) -> Complex:
 
 
 def of_pole(port: Port, pole: complex) -> Complex:
-    """The response (N,) of s / (s - p); of a path in series that of 1 / (s - p)."""
+    """The response (N,) of s / (s - p) to a port's voltage; of a path in series that of 1 / (s -
+    p).
+    """
     x = compute_pole_response(port.u, pole, port.step)
     return x if port.series else port.u + pole * x
 
 
 def with_pole(port: Port, pole: complex) -> Complex:
-    """How that moves (N,) with the pole."""
+    """The derivative (N,) of the response of a pole by the pole."""
     x = compute_pole_response(port.u, pole, port.step)
     moved = compute_pole_response(x, pole, port.step)
     return moved if port.series else x + pole * moved
 
 
 def compute_pole_response(u: Complex, pole: complex, step: float) -> Complex:
-    """The response 1 / (s - p) (N,) to u, at rest at first; exact where u is a straight line
-    between samples.
+    """The response of 1 / (s - p) to a voltage, at rest at first.
+
+    It is exact where the voltage is a straight line between samples.
+
+    Parameters
+    ----------
+    u : (N,) complex
+        The voltage.
+    pole : complex [rad/s]
+        p.
+    step : float [s]
+        Between samples.
+
+    Returns
+    -------
+    (N,) complex array
+
+    Examples
+    --------
+    >>> response = compute_pole_response(np.ones(3, dtype=complex), -2.0 + 0j, 0.5)
+    >>> t = np.array([0.5, 1.0])
+    >>> np.allclose(response[1:] - response[0] * np.exp(-2 * t), (1 - np.exp(-2 * t)) / 2)
+    True
     """
     z = pole * step
     grown = np.expm1(z)

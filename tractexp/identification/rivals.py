@@ -29,8 +29,20 @@ RIVAL_ITERATIONS = 25
 
 @dataclass(frozen=True, eq=False)
 class RivalStructure:
-    """A structure that fits as well: its name, what it leaves over what the model leaves, and the
-    shared parameters; its own problem and all free values (d,) there.
+    """Another structure that fits as well as the model.
+
+    Attributes
+    ----------
+    name : str
+        The static load or the effect that it has.
+    squares : float
+        Its objective over the model's.
+    values : {name: value}
+        The parameters that both have, in their units.
+    problem : Problem
+        Its own problem.
+    free : (d,)
+        All its free values.
     """
 
     name: str
@@ -47,8 +59,19 @@ class RivalStructure:
 def with_rivals(
     uncertainty: Uncertainty, parts: Callable[[int], Counting] = make_silent_counter
 ) -> Uncertainty:
-    """The judgement with the rival structures that fit as well as the model, or better; `parts`
-    counts them.
+    """The judgement with the structures that fit as well as the model, or better.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The judgement so far.
+    parts : int -> counter
+        Counts the structures that were tried.
+
+    Returns
+    -------
+    Uncertainty
+        A parameter that a rival moves beyond its interval has the objection in its verdict.
     """
     structures, candidates = (
         list(_structures(uncertainty.likelihood.problem.model)),
@@ -67,8 +90,8 @@ def with_rivals(
 def _find_moved_parameters(
     own: Uncertainty, beside: Uncertainty
 ) -> Iterator[tuple[str, ParameterVerdict]]:
-    """Verdicts of the parameters that a rival moves beyond their interval, or until
-    that is wide.
+    """Yield the verdicts of the parameters that a rival moves beyond their interval, or so far that
+    the interval is wide.
     """
     for j, (name, (low, high)) in enumerate(zip(own.names, own.intervals.tolist(), strict=True)):
         value = float(own.values[j])
@@ -84,7 +107,7 @@ def _find_moved_parameters(
 
 
 def _structures(model: Model) -> Iterator[tuple[str, Model]]:
-    """Names of rivals and the models with them: another static load, or one effect more."""
+    """Yield names of rivals and the models with them: another static load, or one effect more."""
     registered = discover()
     beside = model.integration, model.domain, model.window
     for name in sorted(registered.get("model/static", {})):

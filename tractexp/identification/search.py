@@ -41,7 +41,17 @@ class Objective(Protocol):
 
 @dataclass(frozen=True)
 class Limits:
-    """When a search ends, beside its own end. None: no such limit."""
+    """When a search ends, beside its own end; None: no such limit.
+
+    Attributes
+    ----------
+    simulations : int or None
+        The budget.
+    seconds : float or None [s]
+        The time.
+    target : float or None
+        The objective at which nothing is left to search for.
+    """
 
     simulations: int | None = None
     seconds: float | None = None
@@ -50,8 +60,18 @@ class Limits:
 
 @dataclass(frozen=True)
 class History:
-    """The search, one row per iteration, shapes (n_iterations,) except `values`
-    (n_iterations, d).
+    """The course of a search, one row an iteration.
+
+    Attributes
+    ----------
+    simulations : (n,) ints
+        Spent by the end of each iteration.
+    objective : (n,)
+        The best so far.
+    values : (n, d)
+        Where that is, in physical units.
+    seconds : (n,)
+        Since the search began.
     """
 
     simulations: np.ndarray  # simulations spent by the end of the iteration
@@ -62,7 +82,23 @@ class History:
 
 @dataclass(frozen=True)
 class SearchResult:
-    """What a search found. `status` is the sentence the user reads."""
+    """What a search found.
+
+    Attributes
+    ----------
+    values : (d,)
+        The best point, in physical units.
+    objective : float
+        There.
+    simulations, refused, iterations : int
+        Simulations made, those of them that could not be made, and iterations.
+    seconds : float
+        How long it took.
+    status : str
+        The sentence that says why it ended.
+    history : History
+        Its course.
+    """
 
     values: np.ndarray  # (d,) raw
     objective: float
@@ -109,8 +145,10 @@ class _Counter:
         return self.limits.simulations
 
     def _admit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-        """The points a limit still allows, clipped, the same in raw units, and how many it cut off;
-        raises for none.
+        """The points that a limit still allows, clipped; these in physical units; and how many were
+        cut off.
+
+        Raises `_Stop` where a limit allows none.
         """
         limits = self.limits
         if limits.seconds is not None and self.seconds >= limits.seconds:
@@ -224,11 +262,31 @@ def search(
     limits: Limits = Limits(),
     progress: Callable[[int, float, int], None] | None = None,
 ) -> SearchResult:
-    """Run `optimizer` on `problem` with one seed. The same seed gives the same history, bit for
-    bit.
+    """Search the box of a problem by an optimizer.
 
-    `progress(iteration, best objective, simulations)` is called after each iteration. Ctrl-C is
-    raised as `Stopped`, with what was found so far.
+    Parameters
+    ----------
+    problem : Objective
+        Bounds, objective and residuals.
+    optimizer : Optimizer
+        What proposes points.
+    seed : int
+        The same seed gives the same history, bit for bit.
+    limits : Limits
+        When the search ends, beside its own end.
+    progress : (iteration, best objective, simulations) -> None
+        Called after each iteration.
+
+    Returns
+    -------
+    SearchResult
+
+    Raises
+    ------
+    Stopped
+        At Ctrl-C, with what was found so far.
+    UserError
+        For an optimizer that never yields, or that proposes what is not a number.
     """
     counter = _Counter(problem, optimizer.space == "unit", limits)
     rows: list[tuple[int, float, np.ndarray, float]] = []

@@ -22,8 +22,16 @@ SHARES_HELD = 9  # over the range of the torque, all else fitted again at each
 
 @dataclass(frozen=True)
 class ShareBound:
-    """The least share that the records allow, the end of the range, and the `profile`: shares with
-    the fit's error over the least.
+    """The least share of the motors in P that the records allow.
+
+    Attributes
+    ----------
+    low : float
+        That share.
+    high : float
+        The end of the range, up to which the records tell no difference.
+    profile : tuple of (share, error)
+        The fit's error over the least, at shares all over the range.
     """
 
     low: float
@@ -43,8 +51,17 @@ class ShareBound:
 
 
 def find_share_bound(uncertainty: Uncertainty) -> ShareBound | None:
-    """The share of the motors where the records bound it from below alone; None where they bound it
-    on both sides or on none, or where no profile was drawn.
+    """The share of the motors, where the records bound it from below alone.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The estimate, with a profile of the motor's torque.
+
+    Returns
+    -------
+    ShareBound or None
+        None where the records bound it on both sides or on none, and where no profile was drawn.
     """
     problem = uncertainty.likelihood.problem
     try:
@@ -69,7 +86,9 @@ def find_share_bound(uncertainty: Uncertainty) -> ShareBound | None:
 def _draw_profile(
     uncertainty: Uncertainty, c: int, drawn: float
 ) -> tuple[tuple[float, float], ...]:
-    """(share, error over the least) where coordinate c is held, of motors beside `drawn` [pu]."""
+    """Pairs (share, error over the least) with coordinate c held at values all over its range, for
+    a load of `drawn` [pu].
+    """
     held = (np.arange(SHARES_HELD) + 0.5) / SHARES_HELD
     starts = np.tile(uncertainty.unit, (SHARES_HELD, 1))
     starts[:, c] = held

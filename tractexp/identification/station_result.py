@@ -36,8 +36,31 @@ def build_result(
     node: Mapping[str, Any],
     predicted: Sequence[Fit],
 ) -> Result:
-    """The result of a load, of which the motors draw a `share` of P; on the base of its median
-    apparent power. It is graded by the dips fitted and those `predicted` by others before them.
+    """The model of a load as all its dips tell it, as a result that predicts and exports.
+
+    It is on the base of the load's median apparent power, and graded by the dips it was fitted to
+    and those that models before it predicted.
+
+    Parameters
+    ----------
+    spec : LoadSpec
+        Which load it is.
+    fit : SharedFit
+        The fit to all its dips.
+    constants : Constants
+        What all dips share, with intervals.
+    share : float
+        Share of P that the motors draw.
+    next_dip : mapping
+        The band of the next dip, as `result.json` has it.
+    node : mapping
+        The model as configured.
+    predicted : sequence of Fit
+        What models fitted to other dips calculate of each.
+
+    Returns
+    -------
+    Result
     """
     problem = fit.problem
     usual = _find_usual(fit)
@@ -128,7 +151,7 @@ def _scale_intervals(fit: SharedFit, constants: Constants, torque: float) -> dic
 
 
 def _list_records(played: Sequence[Fit]) -> list[dict[str, Any]]:
-    """Which records it stands on."""
+    """The records that a result stands on, as `result.json` lists them."""
     records = []
     for one in played:
         record = one.event.record

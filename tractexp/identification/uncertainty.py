@@ -30,7 +30,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LocalMinimum:
-    """Another minimum: coordinates (D,), free values (d,), and its deviance above the best."""
+    """Another minimum that fits as well.
+
+    Attributes
+    ----------
+    unit : (D,)
+        Its coordinates.
+    values : (d,)
+        The free values there.
+    above : float
+        Its deviance above the best.
+    """
 
     unit: np.ndarray
     values: np.ndarray
@@ -39,11 +49,41 @@ class LocalMinimum:
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """What is known about the free parameters; arrays (d,) in the order of `names`.
+    """What is known about d free parameters.
 
-    `likelihood` is what intervals, profiles and samples stand on. Where more than noise is left it
-    is that of Eq. (8), as wide as the estimate scatters: its deviance may rise by `limits`.
-    `of_noise` is the likelihood of the noise.
+    Intervals, profiles and samples stand on `likelihood`. Where more than noise is left that is Eq.
+    (8), as wide as the estimate scatters.
+
+    Attributes
+    ----------
+    likelihood : Likelihood
+        What the intervals stand on.
+    unit : (D,)
+        Coordinates of its maximum.
+    deviance : float
+        There.
+    information : Information
+        Sensitivities and covariance.
+    lower, upper : (d,)
+        Bounds, in physical units.
+    factors : (d,)
+        Half of a 95 % interval over the standard error.
+    limits : (d,)
+        What the deviance may rise by within the interval.
+    verdicts : {name: ParameterVerdict}
+        What each interval means.
+    of_noise : Likelihood
+        That of the noise.
+    notes : list of str
+        What happened on the way.
+    profiled : {name: (lower, upper)}
+        Intervals by profile, which replace those by curvature.
+    local_minima : tuple of LocalMinimum
+        Others that fit as well.
+    rivals : tuple of RivalStructure
+        Structures that fit as well.
+    unrecorded : UnrecordedInput or None
+        An input that the records lack.
     """
 
     likelihood: Likelihood
@@ -65,7 +105,7 @@ class Uncertainty:
 
     @property
     def elsewhere(self) -> np.ndarray:
-        """(d,) Whether another valley has another value than the interval by curvature holds."""
+        """Whether another local minimum has a value (d,) beyond the interval by curvature."""
         values = np.array([minimum.values for minimum in self.local_minima]).reshape(
             -1, len(self.names)
         )
@@ -73,7 +113,9 @@ class Uncertainty:
 
     @property
     def half(self) -> np.ndarray:
-        """Half of the 95 % interval by curvature, inf where not identifiable."""
+        """Half of the 95 % interval by curvature (d,), in physical units; inf where not
+        identifiable.
+        """
         return self.factors * self.information.standard_errors
 
     def judge_point(self, unit: np.ndarray) -> "Uncertainty":
@@ -87,7 +129,7 @@ class Uncertainty:
 
     @functools.cached_property
     def sensitivities(self) -> tuple[np.ndarray, Sensitivities]:
-        """What the estimate leaves of the records (R,), whitened, and its differences."""
+        """The whitened residual (R,) of the estimate, and its derivatives."""
         return self.likelihood.of_records.jacobian(self.unit)
 
     @functools.cached_property
@@ -155,11 +197,12 @@ class Uncertainty:
 
     @property
     def intervals(self) -> np.ndarray:
-        """(d, 2), 95 %, inside the bounds: by profile where there is one, else by the curvature.
+        """The 95 % intervals (d, 2) in physical units, inside the bounds: by profile where there is
+        one, else by the curvature.
 
-        Where another valley fits as well, they reach over it, too. Where more than noise is left,
-        so do they over what each rival structure makes of a parameter, as far beyond it as beyond
-        the estimate, and over what an input that was not recorded moves it by.
+        Where another local minimum fits as well, they reach over it, too. Where more than noise is
+        left, so do they over what each rival structure makes of a parameter, as far beyond it as
+        beyond the estimate, and over what an input that was not recorded moves it by.
         """
         ends = self.values[:, None] + self.half[:, None] * [-1.0, 1.0]
         for name, interval in self.profiled.items():
@@ -218,7 +261,14 @@ class Uncertainty:
 
 
 def threshold() -> float:
-    """What the deviance may rise by: the chi-squared quantile of one degree of freedom."""
+    """What the deviance may rise by within a 95 % interval: the chi-squared quantile of one degree
+    of freedom.
+
+    Examples
+    --------
+    >>> round(threshold(), 2)
+    3.84
+    """
     from scipy.special import chdtri
 
     return float(chdtri(1, 1 - INTERVAL_LEVEL))
@@ -230,10 +280,22 @@ def conclude(
     noise: Likelihood | None = None,
     notes: Sequence[str] = (),
 ) -> Uncertainty:
-    """Intervals and verdicts at the maximum `unit` (D,) of the likelihood of the noise, or at the
-    minimum of Eq. (8).
+    """The intervals and verdicts of an estimate.
 
-    Of the latter more than `noise` is left.
+    Parameters
+    ----------
+    likelihood : Likelihood
+        That of the noise, or Eq. (8) where more than noise is left.
+    unit : (D,)
+        Coordinates of its optimum.
+    noise : Likelihood or None
+        That of the noise, where `likelihood` is not.
+    notes : texts
+        What happened on the way.
+
+    Returns
+    -------
+    Uncertainty
     """
     problem = likelihood.problem
     likelihood, deviance, information, factors, limits = (

@@ -28,8 +28,18 @@ from tractexp.inference.problem import Problem
 
 @dataclass(frozen=True)
 class UnrecordedInput:
-    """A channel that was not recorded, how far it may swing [Hz], by how much that moves each
-    parameter, by name, and those that it moves beyond their intervals.
+    """A channel that was not recorded, and what it could do to the parameters.
+
+    Attributes
+    ----------
+    channel : str
+        Its name.
+    swing : float [Hz]
+        How far it may swing.
+    moves : {name: float}
+        By how much that moves each parameter, in its unit.
+    beyond : names
+        Parameters that it moves beyond their intervals.
     """
 
     channel: str
@@ -45,8 +55,19 @@ class UnrecordedInput:
 
 
 def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
-    """The judgement with what a frequency that swings by so many Hz would move each parameter by,
-    where none was recorded; an identified parameter that it moves too far is one no longer.
+    """The judgement with what a swing of the frequency could do, where none was recorded.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The judgement so far.
+    swing : float [Hz]
+        How far the frequency may swing; 0: nothing is added.
+
+    Returns
+    -------
+    Uncertainty
+        An identified parameter that the swing moves too far is weakly identified.
     """
     problem = uncertainty.likelihood.problem
     unknown = problem.domain.lacks_frequency(problem.events)
@@ -64,7 +85,7 @@ def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
 
 
 def _find_moves(uncertainty: Uncertainty, swing: float) -> np.ndarray:
-    """By how much each course of the frequency moves the parameters, (courses, d)."""
+    """The moves (courses, d) of the parameters, in their units, by each course of the frequency."""
     likelihood, unit = uncertainty.likelihood.of_records, uncertainty.unit
     problem = likelihood.problem
     left, sensitivities = uncertainty.sensitivities

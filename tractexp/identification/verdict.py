@@ -29,14 +29,29 @@ BOUND_DISTANCE = 1e-3  # of the range: closer than this is at the bound
 
 @dataclass(frozen=True)
 class ParameterVerdict:
-    """One of the five words, and what stands behind it."""
+    """What an interval means: one of the five words, and the reason."""
 
     word: str
     detail: str
 
     def add_objection(self, also: str, *, enough: bool = True) -> "ParameterVerdict":
-        """With what speaks against it as well: weak where it was identified, if that
-        is `enough`.
+        """The verdict with a further reason against it.
+
+        Parameters
+        ----------
+        also : str
+            The reason.
+        enough : bool
+            Whether it makes an identified parameter a weakly identified one.
+
+        Returns
+        -------
+        ParameterVerdict
+
+        Examples
+        --------
+        >>> str(ParameterVerdict(IDENTIFIED, "").add_objection("with zip it is 0.4"))
+        'weakly identified: with zip it is 0.4'
         """
         word = WEAK if enough and self.word == IDENTIFIED else self.word
         return replace(self, word=word, detail="; ".join(filter(None, (self.detail, also))))
@@ -47,7 +62,13 @@ class ParameterVerdict:
 
 
 def brief(verdict: str) -> str:
-    """The word of a verdict that was written, without what stands behind it."""
+    """The word of a verdict that was written, without its reason.
+
+    Examples
+    --------
+    >>> brief("weakly identified: trades against C")
+    'weakly identified'
+    """
     return verdict.partition(":")[0]
 
 
@@ -57,14 +78,35 @@ def rests_on_bound(verdict: str) -> bool:
 
 
 def size(value: float, low: float, high: float) -> float:
-    """What an interval is measured against: the value, or a tenth of the range for a small one that
-    may be zero.
+    """What the width of an interval is measured against.
+
+    Parameters
+    ----------
+    value, low, high : float
+        An estimate and its bounds, in its unit.
+
+    Returns
+    -------
+    float
+        The value without its sign; a tenth of the range for a smaller one that may be zero.
+
+    Examples
+    --------
+    >>> size(0.05, 0.0, 2.0), size(0.05, 0.01, 2.0)
+    (0.2, 0.05)
     """
     return max(abs(value), NEAR_ZERO * (high - low)) if low <= 0 <= high else abs(value)
 
 
 def format_half_width(value: float, half: float, low: float, high: float) -> str:
-    """A half-width in percent of the value, or as a number where the value is next to nothing."""
+    """Half an interval as text: in percent of the value, or as a number where that is next to
+    nothing.
+
+    Examples
+    --------
+    >>> format_half_width(0.5, 0.05, 0.1, 1.0), format_half_width(0.0, 0.05, -1.0, 1.0)
+    ('± 10 %', '± 0.05')
+    """
     if size(value, low, high) != abs(value):
         return f"± {half:.2g}"
     return f"± {100 * half / abs(value):.2g} %" if half <= abs(value) else "wider than its value"
@@ -77,8 +119,22 @@ def judge(
     half: np.ndarray,
     factors: np.ndarray,
 ) -> dict[str, ParameterVerdict]:
-    """A verdict for each parameter: `half` (d,) is half of its 95 % interval, `factors` (d,) that
-    over its error.
+    """The verdict on each parameter.
+
+    Parameters
+    ----------
+    information : Information
+        What the records say of d parameters.
+    lower, upper : (d,)
+        Their bounds, in physical units.
+    half : (d,)
+        Half of each 95 % interval.
+    factors : (d,)
+        That over the standard error.
+
+    Returns
+    -------
+    {name: ParameterVerdict}
     """
     return {
         name: _judge_parameter(information, j, (lower[j], upper[j]), half[j], factors[j])
@@ -161,8 +217,8 @@ def _number(correlation: float) -> str:
 
 
 def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
-    """Which changes leave the record unchanged, and which combinations of those parameters it does
-    see.
+    """Which changes leave the record unchanged, and which combinations of these parameters it does
+    see, in a sentence.
     """
     with_it = [row for row in unseen if abs(row[j]) > SHARE]
     direction = min(with_it, key=lambda row: np.count_nonzero(np.abs(row) > SHARE))
@@ -185,7 +241,13 @@ def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
 
 
 def combination(names: Sequence[str], exponents: np.ndarray) -> str:
-    """A product of powers as text: 'X_prime^2/M'."""
+    """A product of powers as text; powers of nearly 0 are left out.
+
+    Examples
+    --------
+    >>> combination(("X_prime", "M"), np.array([2.0, -1.0]))
+    'X_prime^2 / M'
+    """
     above = []
     below = []
     for name, exponent in zip(names, exponents, strict=True):

@@ -20,12 +20,22 @@ from tractexp.text.wording import count_noun
 
 
 def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
-    """The `linear_network` of `result.json`, for a model that leaves `error` (its `model_error`) of
-    these events.
+    """The error of a model beside that of the best linear network: `linear_network` of
+    `result.json`.
 
-    `poles` [{decay [1/s], frequency [Hz], admittance [pu]}], `chosen_by`, `model_error` and
-    `events` as those of the result, `ratio` of the errors on the events held out, else on those
-    fitted; and the `sentence`, which alone is there where no network can be fitted.
+    Parameters
+    ----------
+    fits : sequence of Fit
+        What the model calculates of all events, the fitted ones first.
+    error : mapping
+        The `model_error` of the result.
+
+    Returns
+    -------
+    dict
+        `poles` [{decay [1/s], frequency [Hz], admittance [pu]}], `chosen_by`, `model_error` and
+        `events` as those of the result, `ratio` of the errors on the events held out, else on those
+        fitted, and the `sentence`. Where no network can be fitted the sentence alone is there.
     """
     split = sum(fit.role == TRAIN for fit in fits)
     try:
@@ -53,7 +63,22 @@ def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
 def play_network(fits: Sequence[Fit]) -> tuple[BlackBox, list[Fit]]:
     """The best linear network of the fitted events, and what it calculates of all of them.
 
-    Raises `UserError` where none can be fitted.
+    Parameters
+    ----------
+    fits : sequence of Fit
+        The fitted events first.
+
+    Returns
+    -------
+    BlackBox
+        The network.
+    list of Fit
+        In the order of `fits`.
+
+    Raises
+    ------
+    UserError
+        Where none can be fitted.
     """
     events = [fit.waves or fit.event for fit in fits]
     split = sum(fit.role == TRAIN for fit in fits)
@@ -63,12 +88,24 @@ def play_network(fits: Sequence[Fit]) -> tuple[BlackBox, list[Fit]]:
 
 
 def poles_in_words(poles: Sequence[dict[str, float]]) -> str:
-    """'17.6/s at 47.5 Hz, 44.6/s at 3.66 Hz'; "none" of a network without poles."""
+    """The poles of a network as text; "none" of one without.
+
+    Examples
+    --------
+    >>> poles_in_words([{"decay": 17.6, "frequency": 47.5}])
+    '17.6/s at 47.5 Hz'
+    """
     return ", ".join(f"{p['decay']:.3g}/s at {p['frequency']:.3g} Hz" for p in poles) or "none"
 
 
 def network_in_words(poles: int) -> str:
-    """What the best network of so many poles is called."""
+    """What the best network of so many poles is called in a sentence.
+
+    Examples
+    --------
+    >>> network_in_words(0), network_in_words(2)
+    ('the best linear network without poles', 'the best linear network of 2 poles')
+    """
     return (
         f"the best linear network {'of ' + count_noun(poles, 'pole') if poles else 'without poles'}"
     )
@@ -90,7 +127,9 @@ def _sentence(ratio: float | None, model: float, poles: int, on: str) -> str:
 
 
 def _of_currents(fits: Sequence[Fit], played: Sequence[Fit]) -> str:
-    """The same of the currents themselves, which hold more than P and Q; "" of phasors."""
+    """The clause that compares the errors of the currents, which hold more than P and Q; "" of
+    phasors.
+    """
     model, left = (
         float(np.sqrt(np.mean([(one.epsilon_i or 0.0) ** 2 for one in of])))
         for of in (fits, played)

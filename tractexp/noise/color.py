@@ -24,11 +24,20 @@ FEWEST_NOISE_SAMPLES = 20  # samples to estimate a noise model from
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
-    """x[t] = a_1 x[t-1] + ... + a_p x[t-p] + e[t], and the best predictors of each lower order.
+    """A channel's noise, in which each sample follows from those before it.
 
-    `coefficients[k, :k]` predict from k known predecessors, with an error of standard deviation
-    `deviation[k]`: what the first samples of a stretch and those after a gap have. `deviation[0]`
-    is that of x itself.
+        x[t] = a_1 x[t-1] + ... + a_p x[t-p] + e[t]
+
+    The best predictors of each lower order are kept, too: the first samples of a stretch and those
+    after a gap have fewer predecessors.
+
+    Attributes
+    ----------
+    coefficients : (p + 1, p)
+        `coefficients[k, :k]` predict a sample from k known predecessors, the nearest first.
+    deviation : (p + 1,) [pu]
+        `deviation[k]` is the standard deviation of the error of that; `deviation[0]` that of x
+        itself.
     """
 
     coefficients: np.ndarray  # (p + 1, p)
@@ -36,25 +45,44 @@ class Autoregression:
 
     @property
     def order(self) -> int:
-        """How many samples before tell of the next one."""
+        """The number p of samples before that tell of the next one."""
         return len(self.deviation) - 1
 
     @property
     def white(self) -> bool:
-        """Whether none does."""
+        """Whether samples are independent: the order is 0."""
         return self.order == 0
 
     def scale_noise(self, factor: float) -> "Autoregression":
-        """The same color, `factor` times as loud."""
+        """The autoregression of the same color, `factor` times as loud."""
         return Autoregression(self.coefficients, self.deviation * factor)
 
     def whiten(
         self, rows: np.ndarray, valid: np.ndarray, out: np.ndarray | None = None
     ) -> np.ndarray:
-        """Rows (..., N) to prediction errors of unit variance (..., N), written to `out` where it
-        is given; 0 where `valid` (N,) is False.
+        """The prediction errors of rows, of unit variance.
 
         A gap ends the memory: the samples after it are predicted from fewer predecessors.
+
+        Parameters
+        ----------
+        rows : (..., N) [pu]
+            Samples at even times.
+        valid : (N,) bools
+            Which samples count.
+        out : (..., N)
+            Where the result is written; None: a new array.
+
+        Returns
+        -------
+        (..., N) array
+            0 where a sample does not count.
+
+        Examples
+        --------
+        >>> noise = Autoregression(np.array([[0.0], [0.5]]), np.array([2.0, 1.0]))
+        >>> noise.whiten(np.array([2.0, 2.0, 2.0]), np.ones(3, dtype=bool)).tolist()
+        [1.0, 1.0, 1.0]
         """
         out = np.empty_like(rows) if out is None else out
         out[..., ~valid] = 0.0
@@ -63,9 +91,7 @@ class Autoregression:
         return out
 
     def _whiten(self, rows: np.ndarray, parts: Sequence[slice], out: np.ndarray) -> None:
-        """The same of parts of rows (n, N) without gaps, each sample from its
-        predecessors there.
-        """
+        """Write the prediction errors of rows (n, N) to `out`, within parts that have no gap."""
         weights, p = np.r_[1.0, -self.coefficients[-1]] / self.deviation[-1], self.order
         if self.white or np.iscomplexobj(rows):
             for part in parts:
@@ -83,15 +109,24 @@ class Autoregression:
 
     @functools.cached_property
     def _first_rows(self) -> np.ndarray:
-        """What makes prediction errors (p,) of the first p samples."""
+        """The matrix (p, p) that makes prediction errors of the first p samples."""
         matrix = np.eye(self.order, dtype=self.coefficients.dtype)
         for k in range(1, self.order):
             matrix[k, :k] = -self.coefficients[k, k - 1 :: -1]
         return matrix / self.deviation[: self.order, None]
 
     def color_shocks(self, shocks: np.ndarray) -> np.ndarray:
-        """What the recurrence of full order makes of shocks (n, N) from rest: the banded system
-        that whitens.
+        """Noise from independent shocks: the inverse of whitening, from rest.
+
+        Parameters
+        ----------
+        shocks : (n, N) [pu]
+            Prediction errors e of n rows.
+
+        Returns
+        -------
+        (n, N) array [pu]
+            x by the recurrence of full order.
         """
         from scipy.linalg import solve_banded
 
@@ -112,7 +147,13 @@ def build_filter_stencil(order: int) -> Stencil:
 
 
 def white_noise(deviation: float) -> Autoregression:
-    """Independent samples of one standard deviation [pu]."""
+    """Independent samples of one standard deviation [pu].
+
+    Examples
+    --------
+    >>> white_noise(0.01).order
+    0
+    """
     return Autoregression(np.empty((1, 0)), np.array([max(deviation, SMALLEST_DEVIATION)]))
 
 
@@ -129,11 +170,35 @@ def check_count(samples: int) -> None:
 def fit_autoregression(
     stretches: Sequence[np.ndarray], highest: int = HIGHEST_ORDER, sparing: bool = False
 ) -> Autoregression:
-    """The autoregression of least AICc (BIC if `sparing`), by Burg's method over several stretches
-    (n_i,) of a channel.
+    """The autoregression that describes some stretches best.
 
-    The result is stationary whatever the data. Source: Burg 1975; Hurvich and Tsai 1989 (AICc);
-    Schwarz 1978 (BIC).
+    The coefficients are found by Burg's method, so that the result is stationary whatever the data;
+    the order is that of the least information criterion.
+
+    Parameters
+    ----------
+    stretches : sequence of (n_i,) arrays [pu]
+        Parts of one channel without gaps.
+    highest : int
+        The highest order that is tried; no more than a tenth of the samples.
+    sparing : bool
+        Whether the criterion is BIC in place of AICc: fewer coefficients.
+
+    Returns
+    -------
+    Autoregression
+
+    Notes
+    -----
+    Source: Burg 1975; Hurvich and Tsai 1989 (AICc); Schwarz 1978 (BIC).
+
+    Examples
+    --------
+    >>> shocks = np.random.default_rng(1).standard_normal((1, 5000))
+    >>> true = Autoregression(np.array([[0.0], [0.8]]), np.array([1.667, 1.0]))
+    >>> fitted = fit_autoregression([true.color_shocks(shocks)[0]], sparing=True)
+    >>> fitted.order, fitted.coefficients[-1].round(1).tolist()
+    (1, [0.8])
     """
     count = sum(map(len, stretches))
     power = sum(float(x @ x) for x in stretches) / max(count, 1)
@@ -161,8 +226,19 @@ def fit_autoregression(
 def of_orders(
     table: Sequence[np.ndarray], variance: np.ndarray | Sequence[float]
 ) -> Autoregression:
-    """The autoregression of the coefficients (k,) of each order k, and the variance
-    of its shocks.
+    """The autoregression of tabulated predictors.
+
+    Parameters
+    ----------
+    table : sequence of (k,) arrays
+        Coefficients of each order k from 0 on.
+    variance : one number an order [pu²]
+        Variance of the prediction error of each.
+
+    Returns
+    -------
+    Autoregression
+        Of the highest order in the table.
     """
     coefficients = np.zeros((len(table), len(table) - 1), dtype=table[-1].dtype)
     for k, row in enumerate(table):
@@ -171,5 +247,11 @@ def of_orders(
 
 
 def stretches(values: np.ndarray, valid: np.ndarray) -> list[np.ndarray]:
-    """The unbroken parts of `values` (N,)."""
+    """The parts of `values` (N,) between gaps, where `valid` (N,) is true.
+
+    Examples
+    --------
+    >>> [part.tolist() for part in stretches(np.arange(4), np.array([True, False, True, True]))]
+    [[0], [2, 3]]
+    """
     return [values[part] for part in runs(valid)]

@@ -27,10 +27,26 @@ Shrunk = tuple[np.ndarray, np.ndarray]  # orthonormal shapes (k, R), and how muc
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Residuals of each event's C channels, times `mix`, are independent autoregressions.
+    """The noise of what is compared.
 
-    `pairs` has one for each event, or a single one that holds for every event. Without `mix` the
-    channels are independent as they stand, and a sample of one counts where another is missing.
+    Residuals of each event's C channels, times `mix`, are independent autoregressions. Beside them
+    there may be shapes of known variance: a wandering load, and errors of the voltage.
+
+    Attributes
+    ----------
+    pairs : tuple of Pair
+        The autoregressions of the channels, for each event, or a single one for all.
+    mix : (C, C) or None
+        What makes the channels independent. None: they are as they stand, and a sample of one
+        counts where another is missing.
+    shocks : C times (n,) or None
+        Prediction errors of unit variance as they were seen, to draw from; None: normal ones.
+    random_walk : RandomWalk or None
+        The wandering of the load, in the mixed channels.
+    input_modes : (k, C, N) [pu] or None
+        What errors of the voltage do to what is compared, each of one standard deviation.
+    vector : bool
+        Whether the first two channels are a space vector, whose autoregression is complex.
     """
 
     pairs: tuple[Pair, ...]
@@ -46,12 +62,18 @@ class Noise:
 
     @classmethod
     def white(cls, *deviations: float) -> "Noise":
-        """Independent samples of these standard deviations [pu], one of each channel."""
+        """Independent noise of these standard deviations [pu], one a channel.
+
+        Examples
+        --------
+        >>> Noise.white(0.01, 0.02).describe()
+        'P 0.01 pu, Q 0.02 pu, white'
+        """
         return cls((tuple(map(white_noise, deviations)),))
 
     @property
     def channels(self) -> int:
-        """How many channels are compared."""
+        """The number C of channels that are compared."""
         return len(self.pairs[0])
 
     def pair(self, event: int) -> Pair:
@@ -64,8 +86,8 @@ class Noise:
 
     @functools.cached_property
     def loudest_input_mode(self) -> float:
-        """The largest variance that noise of the voltage causes at any sample, over that of the
-        power.
+        """The largest variance, at any sample, that noise of the voltage causes, over that of the
+        power's own noise.
         """
         return (
             0.0
@@ -74,7 +96,7 @@ class Noise:
         )
 
     def scale_noise(self, factor: float) -> "Noise":
-        """The same noise, `factor` times as loud."""
+        """The noise `factor` times as loud, its shapes as well."""
         random_walk = self.random_walk and replace(
             self.random_walk, intensity=self.random_walk.intensity * factor**2
         )
@@ -89,13 +111,38 @@ class Noise:
         return louder
 
     def apply_to_events(self, load: Load, input_modes: np.ndarray | None = None) -> "Noise":
-        """The same noise on other events: their power, and what errors of their voltage do."""
+        """The noise on other events.
+
+        Parameters
+        ----------
+        load : Load
+            Their power, by which the load wanders.
+        input_modes : (k, C, N) [pu] or None
+            What errors of their voltage do.
+
+        Returns
+        -------
+        Noise
+        """
         random_walk = None if self.random_walk is None else replace(self.random_walk, load=load)
         return replace(self, random_walk=random_walk, input_modes=input_modes)
 
     def whiten(self, residuals: np.ndarray, drive: Drive, valid: np.ndarray) -> np.ndarray:
-        """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `valid` (C,
-        N) are 0.
+        """Residuals as rows of independent unit variance.
+
+        Parameters
+        ----------
+        residuals : (n, C, N) [pu]
+            Of n candidates, events end to end.
+        drive : Drive
+            Where the events begin.
+        valid : (C, N) bools
+            Which samples count.
+
+        Returns
+        -------
+        (n, C N) array
+            One channel after the other; 0 where a sample does not count.
         """
         valid = self._select_common_samples(valid, drive)
         rows = np.empty(residuals.shape)
@@ -117,11 +164,11 @@ class Noise:
             self._shrinkage(valid[:, drive.part(e)], drive.part(e), e)
 
     def _select_common_samples(self, valid: np.ndarray, drive: Drive) -> np.ndarray:
-        """Samples (C, N) that count where channels are mixed: those at which all count that are
-        measured.
+        """The samples (C, N) that count: where channels are mixed, those at which every measured
+        channel does.
 
-        The mixing of currents is triangular, so that an event without the last, of zero sequence,
-        has the others.
+        The mixing of currents is triangular, so that an event without the last channel, of zero
+        sequence, has the others.
         """
         if self.mix is None:
             return valid
@@ -131,7 +178,22 @@ class Noise:
         return _all_measured(valid)
 
     def draw(self, rng: np.random.Generator, count: int, lengths: Sequence[int]) -> np.ndarray:
-        """Noise of events of these lengths end to end, (count, C, N) [pu]."""
+        """Draws of the noise.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            The source of chance.
+        count : int
+            How many draws.
+        lengths : E ints
+            Samples of each event.
+
+        Returns
+        -------
+        (count, C, N) array [pu]
+            Events end to end.
+        """
         ends = np.cumsum([0, *lengths]).tolist()
         drawn = np.empty((count, self.channels, ends[-1]))
         for e, (a, b) in enumerate(itertools.pairwise(ends)):
@@ -142,8 +204,23 @@ class Noise:
     def draw_white(
         self, rng: np.random.Generator, count: int, drive: Drive, valid: np.ndarray
     ) -> np.ndarray:
-        """Rows (count, C N) of the law that `whiten` gives to what `draw` draws: the shocks alone,
-        0 in gaps.
+        """Draws of whitened noise: of the same law as whitened results of `draw`, without its work.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            The source of chance.
+        count : int
+            How many draws.
+        drive : Drive
+            Where the events begin.
+        valid : (C, N) bools
+            Which samples count.
+
+        Returns
+        -------
+        (count, C N) array
+            Independent shocks of unit variance; 0 in gaps.
         """
         size = count, drive.samples
         shocks = [
@@ -154,8 +231,8 @@ class Noise:
         return rows.reshape(count, math.prod(rows.shape[1:]))  # of no rows, too
 
     def worth(self, samples: int) -> float:
-        """How many independent samples tell as much of the slowest of this noise, by the color's
-        gain at rest.
+        """The number of independent samples that tell as much of the slowest of this noise as so
+        many do.
         """
         channels = [channel for pair in self.pairs for channel in pair]
         gains = [1 / max(float(abs(1 - a.coefficients[-1].sum())), 1e-3) for a in channels]
@@ -164,15 +241,16 @@ class Noise:
 
     @property
     def levels(self) -> tuple[float, ...]:
-        """Standard deviations [pu] of the channels in the first event."""
+        """The standard deviations (C,) [pu] of the fast noise of the channels in the first
+        event.
+        """
         return tuple(np.sqrt(self._fast_variance(0)).tolist())
 
     def memory(self, step: float) -> float:
-        """Within which time [s] a first-order autoregression as loud at rest as P forgets, samples
-        `step` [s] apart.
+        """The time [s] within which noise that is as loud at rest as that of P forgets.
 
-        Its neighbors correlate by a, with (1 + a) / (1 - a) the square of its gain at rest over its
-        spread.
+        It is that of a first-order autoregression whose neighbors, `step` [s] apart, correlate by
+        a, with (1 + a) / (1 - a) the square of the gain at rest over the spread.
         """
         P = self.pairs[0][0]
         gain = P.deviation[-1] / max(1 - float(P.coefficients[-1].sum()), 1e-3)
@@ -191,9 +269,7 @@ class Noise:
         return f"{', '.join(f'{name} {level:.2g} pu' for name, level in levels)}, {color}"
 
     def deviation(self, drive: Drive) -> np.ndarray:
-        """Standard deviation of every sample of each channel, (C, N) [pu], with what its shapes
-        add.
-        """
+        """The standard deviation (C, N) [pu] of every sample of each channel, shapes included."""
         variance = np.empty(drive.measurements.shape)
         for e in range(drive.events):
             part = drive.part(e)
@@ -302,7 +378,7 @@ class Noise:
 
 
 def _all_measured(valid: np.ndarray) -> np.ndarray:
-    """Samples (C, n) at which every channel counts that counts at all."""
+    """The samples (C, n) at which all channels count that are measured at all."""
     measured = np.any(valid, axis=1)
     return np.all(valid[measured], axis=0) & measured[:, None]
 

@@ -32,7 +32,21 @@ QUANTILES = 20_000  # that stand for a law
 
 
 def quiet_stretches(events: Sequence[Event], drive: Drive) -> list[slice]:
-    """The samples before each dip and those at the end of the record, where little happens."""
+    """The samples in which little happens.
+
+    Parameters
+    ----------
+    events : sequence of Event
+        The events of the drive.
+    drive : Drive
+        Where they begin.
+
+    Returns
+    -------
+    list of slice
+        Of the drive's samples: those before each dip and those at the end of the record. None is
+        shorter than `SHORTEST_QUIET_STRETCH`.
+    """
     parts = []
     for e, event in enumerate(events):
         first, n = int(drive.first[e]), event.record.samples
@@ -48,10 +62,32 @@ def estimate(
     random_walk: Callable[[np.ndarray], RandomWalk | None] = lambda mix: None,
     input_modes: np.ndarray | None = None,
 ) -> Noise:
-    """Noise from residuals (C, N) in quiet stretches; `random_walk` is that of the load in channels
-    mixed by `mix`.
+    """The noise of residuals in quiet stretches.
 
-    Raises `UserError` where too few samples are quiet.
+    The channels are made independent by their covariance; each then is an autoregression of least
+    BIC, for a color that is not there would change the weight of slow differences.
+
+    Parameters
+    ----------
+    residuals : (C, N) [pu]
+        What a fit leaves.
+    valid : (C, N) bools
+        Which samples count; a channel without any is not measured.
+    quiet : sequence of slice
+        Where little happens.
+    random_walk : (C, C) -> RandomWalk or None
+        The wandering of the load, in channels mixed by this matrix.
+    input_modes : (k, C, N) [pu] or None
+        What errors of the voltage do to what is compared.
+
+    Returns
+    -------
+    Noise
+
+    Raises
+    ------
+    UserError
+        Where fewer than `FEWEST_NOISE_SAMPLES` samples are quiet.
     """
     measured = np.any(valid, axis=1)
     both = np.all(valid[measured], axis=0)
@@ -81,9 +117,26 @@ def estimate(
 
 
 def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray]) -> bool:
-    """Whether stretches `late` (n_i,) of a channel are louder than `calm` ones by more than chance.
+    """Whether stretches of a channel are louder than calm ones by more than chance explains.
 
-    An F test with as many samples as tell of the slowest of each one's color.
+    An F test, with as many samples as tell of the slowest of each one's color.
+
+    Parameters
+    ----------
+    late, calm : sequences of (n_i,) arrays [pu]
+        Stretches of the channel.
+
+    Returns
+    -------
+    bool
+        False where either has none.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> calm, loud = rng.standard_normal(200), 3 * rng.standard_normal(200)
+    >>> louder([loud], [calm]), louder([calm], [calm])
+    (True, False)
     """
     from scipy.special import fdtrc
 
@@ -94,7 +147,7 @@ def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray]) -> bool:
 
 
 def _variance(pieces: Sequence[np.ndarray]) -> tuple[float, float]:
-    """Variance of stretches, and how many independent samples it is worth."""
+    """The variance [pu²] of stretches, and the number of independent samples that it is worth."""
     count = sum(map(len, pieces))
     color = fit_autoregression(
         list(pieces), min(HIGHEST_NOISE_ORDER, max(count // 10, 0)), sparing=True

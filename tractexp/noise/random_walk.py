@@ -39,8 +39,16 @@ STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A stretch of white noise of unit variance and of modes of random amplitude, whose intensity
-    is looked for.
+    """A stretch that is white noise of unit variance and modes of random amplitude.
+
+    Attributes
+    ----------
+    values : (k,)
+        Singular values of the modes.
+    basis : (k, n)
+        Their orthonormal directions.
+    along : (k,)
+        The stretch in this basis.
     """
 
     values: np.ndarray  # (k,) singular values of the modes
@@ -49,38 +57,86 @@ class Walk:
 
     @classmethod
     def from_stretch(cls, stretch: np.ndarray, fixed: np.ndarray, modes: np.ndarray) -> "Walk":
-        """A stretch (n,) with orthonormal rows `fixed` of any amplitude, and modes of unit
-        intensity (k, n).
+        """The walk of one stretch.
+
+        Parameters
+        ----------
+        stretch : (n,)
+            Whitened samples.
+        fixed : (m, n)
+            Orthonormal rows of any amplitude, such as a mean: they tell nothing.
+        modes : (k, n)
+            Modes of unit intensity.
+
+        Returns
+        -------
+        Walk
         """
         _, values, basis = np.linalg.svd(modes - (modes @ fixed.T) @ fixed, full_matrices=False)
         return cls(values, basis, basis @ (stretch - (stretch @ fixed.T) @ fixed))
 
     def likelihood(self, grid: np.ndarray) -> np.ndarray:
-        """Logarithm of the likelihood of each intensity, up to a constant."""
+        """The logarithm of the likelihood of each intensity of a grid (g,), up to a constant."""
         spread = 1 + np.outer(grid, self.values**2)
         return -(np.log(spread) + self.along**2 / spread).sum(axis=1) / 2
 
     @property
     def likeliest(self) -> float:
-        """The intensity of most likelihood, on a wide grid."""
+        """The intensity of most likelihood on the grid `STIFF`."""
         return float(STIFF[self.likelihood(STIFF).argmax()])
 
     def share(self, intensity: float) -> np.ndarray:
-        """Share (k,) of each direction that is mode and not noise."""
+        """The share (k,) of each direction's variance that is mode and not noise.
+
+        Examples
+        --------
+        >>> walk = Walk(np.array([1.0, 3.0]), np.eye(2), np.zeros(2))
+        >>> walk.share(1.0).tolist()
+        [0.5, 0.9]
+        """
         power = intensity * self.values**2
         return power / (1 + power)
 
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """Active and reactive power of events end to end, over the apparent power before each."""
+    """The active and reactive power of events, over the apparent power before each.
+
+    Attributes
+    ----------
+    power : (2, N)
+        P and Q, events end to end.
+    before : (E, 2)
+        Their means before each event.
+    """
 
     power: np.ndarray  # (2, N)
     before: np.ndarray  # (E, 2)
 
     @classmethod
     def from_powers(cls, measured: np.ndarray, before: np.ndarray, first: np.ndarray) -> "Load":
-        """Of P and Q (2, N) with means `before` (E, 2); events begin at `first` (E + 1,)."""
+        """The load of measured powers.
+
+        Parameters
+        ----------
+        measured : (2, N) [pu]
+            P and Q, events end to end; gaps count as 0.
+        before : (E, 2) [pu]
+            Their means before each event.
+        first : (E + 1,) ints
+            The first sample of each event, and the end.
+
+        Returns
+        -------
+        Load
+
+        Examples
+        --------
+        >>> P, Q = [0.6, 0.3], [0.8, 0.4]
+        >>> load = Load.from_powers(np.array([P, Q]), np.array([[0.6, 0.8]]), np.array([0, 2]))
+        >>> load.apparent.tolist()
+        [1.0, 0.5]
+        """
         level = np.maximum(np.linalg.norm(before, axis=1), 1e-9)
         return cls(
             np.nan_to_num(measured) / np.repeat(level, np.diff(first)), before / level[:, None]
@@ -88,18 +144,26 @@ class Load:
 
     @functools.cached_property
     def apparent(self) -> np.ndarray:
-        """Apparent power (N,)."""
+        """The apparent power (N,), over that before each event."""
         return np.linalg.norm(self.power, axis=0)
 
 
 @dataclass(frozen=True, eq=False)
 class RandomWalk:
-    """Random walks of two mixed channels: `intensity` (2,) is the variance gained in a second
-    before an event.
+    """Random walks of two mixed channels.
 
     What wanders are customers, whose active and reactive power go together, in a dip and after it,
     too: what the first channel does the second follows as the load's power says. Beside that the
     second wanders by itself.
+
+    Attributes
+    ----------
+    intensity : (2,)
+        Variance that each gains in a second before an event.
+    step : float [s]
+        Between samples.
+    load : Load
+        The power by which the wandering goes.
     """
 
     intensity: np.ndarray
@@ -107,8 +171,21 @@ class RandomWalk:
     load: Load
 
     def modes(self, event: int, part: slice, mix: np.ndarray) -> np.ndarray:
-        """Cosines (2 k, 2, samples) of one event, scaled by the standard deviation of their
-        amplitudes.
+        """The modes of the walk in one event.
+
+        Parameters
+        ----------
+        event : int
+            Its number, from 0.
+        part : slice
+            Its samples.
+        mix : (2, 2)
+            What makes the channels independent.
+
+        Returns
+        -------
+        (2 k, 2, samples) array
+            Cosines, scaled by the standard deviation of their amplitudes.
         """
         n = part.stop - part.start
         walk = _random_walk(n, self.step, min(MODES, n // 8))
@@ -121,8 +198,16 @@ class RandomWalk:
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """What a fit leaves of an event (2, n), and all that something known could still explain (k, 2,
-    n).
+    """What a fit leaves of an event, and what could still explain it.
+
+    Attributes
+    ----------
+    left : (2, n)
+        Residuals of the mixed channels.
+    columns : (k, 2, n)
+        Changes that something known could make.
+    profile : (n,)
+        Apparent power over that before the event.
     """
 
     left: np.ndarray
@@ -136,14 +221,30 @@ def find(
     load: Load,
     rests: Sequence[Rest] = (),
 ) -> RandomWalk | None:
-    """The wandering of two channels in stretches (2, n_i) before the events; None where there is
-    none to be seen.
+    """The wandering of two channels before some events.
 
-    To be safe the largest intensity whose log-likelihood is at most `LESS` below the likeliest's,
-    given the fast noise; in both channels where it is seen in one, for what wanders is the load. It
-    is seen where twice the log-likelihood gains `LEAST_WANDERING`. What is left of the events
-    counts, too, where both show twice that, but no more than the stretches before them allow: what
-    answers a dip does not wander.
+    To be safe the intensity is the largest whose log-likelihood is at most `LESS` below the
+    likeliest's, given the fast noise; in both channels where it is seen in one, for what wanders is
+    the load. What is left of the events counts, too, where both show twice as much, but no more
+    than the stretches before them allow: what answers a dip does not wander.
+
+    Parameters
+    ----------
+    before : sequence of (2, n_i) arrays
+        Stretches of the mixed channels before the events.
+    step : float [s]
+        Between samples.
+    load : Load
+        The power of the events.
+    rests : sequence of Rest
+        What a fit leaves of each event.
+    seen : float
+        Gain of twice the log-likelihood from which a load is said to wander.
+
+    Returns
+    -------
+    RandomWalk or None
+        None where no wandering is seen.
     """
     stretches = [b for b in before if b.shape[1] >= 8 * (WANDERING_COSINES + 2)]
     if not stretches:
@@ -174,11 +275,30 @@ def walk_of_load(
     valid: np.ndarray,
     mix: np.ndarray,
 ) -> RandomWalk | None:
-    """How the load wanders before the events, and during them, in channels mixed by `mix`, as
-    `find` tells it.
+    """The wandering of the load before and during its events, as `find` tells it.
 
-    What a fit leaves (C, N) counts where it is there with all columns that could explain it (k, C,
-    N) and has no gap.
+    Parameters
+    ----------
+    events : sequence of Event
+        The E events of the drive.
+    drive : Drive
+        Their measurements (C, N).
+    load : Load
+        Their power.
+    left : (C, N) [pu] or None
+        What a fit leaves; it counts with all `columns` and where there is no gap.
+    columns : (k, C, N) [pu] or None
+        What could explain it.
+    valid : (C, N) bools
+        Which samples count.
+    mix : (C, C)
+        What makes the channels independent.
+    seen : float
+        Gain of twice the log-likelihood from which a load is said to wander.
+
+    Returns
+    -------
+    RandomWalk or None
     """
     parts = [drive.part(e) for e in range(drive.events)]
     before = [
@@ -196,14 +316,14 @@ def walk_of_load(
 
 
 def _last(likelihood: np.ndarray) -> int:
-    """Index of the last of the intensities that are less likely than the likeliest by no more than
-    `LESS`.
+    """The position of the largest intensity whose log-likelihood is within `LESS` of the
+    largest.
     """
     return int(np.flatnonzero(likelihood > likelihood.max() - LESS)[-1])
 
 
 def without_slow(stretch: np.ndarray) -> np.ndarray:
-    """A stretch (n,) without its mean and slowest cosines."""
+    """A stretch (n,) without its mean and its three slowest cosines."""
     basis = np.vstack([np.ones(len(stretch)), cosines(len(stretch), WANDERING_COSINES)])
     basis /= np.linalg.norm(basis, axis=1, keepdims=True)
     return stretch - (stretch @ basis.T) @ basis
@@ -212,6 +332,11 @@ def without_slow(stretch: np.ndarray) -> np.ndarray:
 def without_drift(stretches: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Stretches (n_i,) without the slope that they share: a load that drifts does so in every
     event.
+
+    Examples
+    --------
+    >>> [left.round(6).tolist() for left in without_drift([np.array([1.0, 2.0, 3.0])])]
+    [[2.0, 2.0, 2.0]]
     """
     times = [np.arange(len(s)) - (len(s) - 1) / 2 for s in stretches]
     slope = sum(t @ s for t, s in zip(times, stretches, strict=True)) / sum(t @ t for t in times)
@@ -219,7 +344,24 @@ def without_drift(stretches: Sequence[np.ndarray]) -> list[np.ndarray]:
 
 
 def cosines(samples: int, count: int) -> np.ndarray:
-    """Half a wave over a stretch, a whole one, ...: (count, samples), each of length one."""
+    """Cosines of half a wave over a stretch, a whole one, and so on.
+
+    Parameters
+    ----------
+    samples, count : int
+        Length of the stretch, and how many cosines.
+
+    Returns
+    -------
+    (count, samples) array
+        Orthonormal rows.
+
+    Examples
+    --------
+    >>> rows = cosines(50, 3)
+    >>> np.allclose(rows @ rows.T, np.eye(3))
+    True
+    """
     angle = np.pi * np.arange(1, count + 1)[:, None] / samples * (np.arange(samples) + 0.5)
     return np.sqrt(2 / samples) * np.cos(angle)
 
@@ -242,7 +384,9 @@ def _likelihood(stretches: Sequence[np.ndarray], fast: Autoregression, step: flo
 
 
 def _within(rest: Rest, channel: int, fast: Autoregression, step: float) -> np.ndarray:
-    """The same of what is left of one event, whatever its columns explain left out."""
+    """The logarithm of the likelihood of each intensity of the grid in what is left of one event,
+    without what its columns explain.
+    """
     columns = rest.columns[:, channel]
     columns = columns[np.linalg.norm(columns, axis=1) > 0]
     fixed = np.vstack([np.ones(columns.shape[1]), columns])

@@ -4,10 +4,25 @@ import numpy as np
 
 
 def compute_basis(rows: np.ndarray, distinct: float, least: float = 0.0) -> np.ndarray:
-    """Orthonormal basis (m, R) of what rows (k, R) span, each scaled to length one; those of at
-    most `least` are none.
+    """An orthonormal basis of what rows span.
 
-    Directions weaker than `distinct` times the strongest are left out.
+    Parameters
+    ----------
+    rows : (k, R)
+        Each is scaled to length one first.
+    distinct : float
+        Directions weaker than this times the strongest are left out.
+    least : float
+        Rows of at most this length do not count.
+
+    Returns
+    -------
+    (m, R) array
+
+    Examples
+    --------
+    >>> compute_basis(np.array([[2.0, 0.0], [4.0, 0.0]]), 1e-6).shape
+    (1, 2)
     """
     length = np.linalg.norm(rows, axis=1)
     rows = rows[length > least] / length[length > least, None]

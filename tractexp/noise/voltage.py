@@ -34,14 +34,19 @@ SILENT = 1e-5  # pu: less noise than this is none
 class SmoothedEvent:
     """An event with a smooth voltage, and what may still be wrong with it.
 
-    `errors` (k, N) [pu] are shapes of it, independent, each of the size of one standard deviation.
+    Attributes
+    ----------
+    event : Event
+        Its voltage smooth.
+    errors : (k, N) [pu]
+        Independent shapes of what may be wrong, each of one standard deviation.
     """
 
     event: Event
     errors: np.ndarray
 
     def off_by(self, shape: int) -> Event:
-        """The event with one of the errors, or without where there are fewer."""
+        """The event with one of the errors added to its voltage; without where there are fewer."""
         if shape >= len(self.errors):
             return self.event
         record = self.event.record
@@ -49,7 +54,21 @@ class SmoothedEvent:
 
 
 def smooth_voltage(event: Event) -> SmoothedEvent:
-    """Take the noise of the voltage out of one event."""
+    """Take the noise of the voltage out of one event.
+
+    Where the voltage is smooth a curve is put in its place, near the edges of the dip it is left as
+    recorded.
+
+    Parameters
+    ----------
+    event : Event
+        As recorded.
+
+    Returns
+    -------
+    SmoothedEvent
+        With no errors where the voltage has less than `SILENT` [pu] of noise.
+    """
     U, deviation = event.record.U, noise_of(event.record.U[event.steady])
     if deviation < SILENT:
         return SmoothedEvent(event, np.empty((0, len(U))))
@@ -82,7 +101,16 @@ def smooth_voltage(event: Event) -> SmoothedEvent:
 
 
 def noise_of(U: np.ndarray) -> float:
-    """Standard deviation of white noise on a smooth voltage (n,), from its third differences."""
+    """The standard deviation [pu] of white noise on a smooth voltage (n,), from its third
+    differences.
+
+    Examples
+    --------
+    >>> t = np.linspace(0, 1, 2000)
+    >>> noise = 0.001 * np.random.default_rng(1).standard_normal(len(t))
+    >>> round(noise_of(1 - 0.2 * t**2 + noise), 4)
+    0.001
+    """
     third = np.diff(U, 3)
     return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20)) if len(third) else 0.0
 

@@ -39,11 +39,32 @@ def of_waves(
     phases: int,
     input_modes: np.ndarray | None = None,
 ) -> Noise:
-    """Noise from residuals (3, N) in quiet stretches.
+    """The noise of sampled currents, from what a fit leaves in quiet stretches.
 
-    `answers` has, for the space vector and for the zero sequence, the currents (L,) [pu] that one
-    standard deviation of a voltage's sample causes at the samples from then on. Raises `UserError`
-    where too few samples are quiet.
+    Parameters
+    ----------
+    residuals : (3, N) [pu]
+        Of the two components of the space vector and of the zero sequence.
+    valid : (3, N) bools
+        Which samples count.
+    quiet : sequence of slice
+        Where little happens.
+    answers : two (L,) arrays [pu]
+        For the space vector and the zero sequence: the currents that one standard deviation of a
+        voltage's sample causes from then on.
+    phases : int
+        3 for a space vector, else its first component stands alone.
+    input_modes : (k, 3, N) [pu] or None
+        What errors of the record do to what is compared.
+
+    Returns
+    -------
+    Noise
+
+    Raises
+    ------
+    UserError
+        Where too few samples are quiet.
     """
     measured = np.any(valid, axis=1)
     count = sum(part.stop - part.start for part in quiet)
@@ -88,26 +109,58 @@ def _fit_wave_noise(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoreg
 
 
 def _surprise(color: Autoregression, piece: np.ndarray, per: int) -> float:
-    """Minus twice the log-likelihood of a stretch (n,)."""
+    """Minus twice the log-likelihood of a stretch (n,) whose samples have `per` components, up to a
+    constant.
+    """
     white = color.whiten(piece, np.ones(len(piece), dtype=bool))
     errors = np.log(color.deviation[np.minimum(np.arange(len(piece)), color.order)])
     return float(np.sum(np.abs(white) ** 2) + 2 * per * errors.sum())
 
 
 def covariances(answer: np.ndarray, highest: int) -> np.ndarray:
-    """E[x(t + k) x*(t)] for k = 0 ... highest of noise that is the sum of such answers (L,) to unit
-    shocks.
+    """The covariances of noise that is the sum of answers to unit shocks.
+
+    Parameters
+    ----------
+    answer : (L,)
+        What one shock causes at the samples from then on.
+    highest : int
+        The largest lag.
+
+    Returns
+    -------
+    (highest + 1,) array
+        E[x(t + k) x*(t)] for k = 0 ... highest.
+
+    Examples
+    --------
+    >>> covariances(np.array([1.0, 0.5]), 2).tolist()
+    [1.25, 0.5, 0.0]
     """
     padded = np.concatenate([answer, np.zeros(highest)])
     return np.array([np.vdot(answer, padded[k : k + len(answer)]) for k in range(highest + 1)])
 
 
 def solve_levinson(covariance: np.ndarray) -> Autoregression:
-    """The autoregression of these covariances (p + 1,), by Levinson's recursion; of less order
-    where that is as good.
+    """The autoregression of given covariances, by Levinson's recursion.
 
-    Source: Levinson 1947; Hayes 1996, Statistical Digital Signal Processing and Modeling, section
-    5.2.
+    Parameters
+    ----------
+    covariance : (p + 1,) [pu²]
+        At lags 0 ... p, real or complex.
+
+    Returns
+    -------
+    Autoregression
+        Of less order than p where that predicts as well.
+
+    Notes ----- Source: Levinson 1947; Hayes 1996, Statistical Digital Signal Processing and
+    Modeling, section 5.2.
+
+    Examples
+    --------
+    >>> solve_levinson(np.array([1.0, 0.5, 0.25])).coefficients[-1].tolist()
+    [0.5]
     """
     table, variance = [np.empty(0, dtype=covariance.dtype)], [float(covariance[0].real)]
     for m in range(1, len(covariance)):
