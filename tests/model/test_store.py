@@ -167,6 +167,26 @@ def test_a_sound_file_in_the_place_of_another_is_none(folder):
     assert not list(folder.rglob("*.part"))
 
 
+def test_beside_a_run_only_what_this_user_has_written_is_an_entry(tmp_path, monkeypatch):
+    beside = store.Store("ones", folder=tmp_path / "run")
+    monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path / "theirs"))
+    beside.write_json("one", {"made": "by others"})
+    assert beside.read_json("one") == {"made": "by others"}
+    monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path / "mine"))
+    assert beside.read_json("one") is None
+    ONES.write("one", b'"with a sum that anybody can make"')
+    os.replace(ONES.path("one"), beside.path("one"))
+    assert beside.read_json("one") is None
+    beside.write_json("one", "mine")
+    assert beside.read_json("one") == "mine"
+    secret = tmp_path / "mine" / "secret.key"
+    assert secret.stat().st_mode & 0o77 == 0
+    secret.write_bytes(b"")  # damaged: nothing is an entry, and nothing is written
+    assert beside.read_json("one") is None
+    beside.write_json("two", "mine")
+    assert not beside.path("two").exists()
+
+
 def test_planted_code_is_not_run_and_the_file_heals(folder):
     """A file whose sum is not its own is none, and is compiled anew; one of another kernel in its
     place, too.

@@ -210,6 +210,15 @@ def test_a_survey_that_was_killed_goes_on_where_it_was(tmp_path):
     assert tractexp.survey(folder, keep=keep, cores=1).content["looked_at"] == 0
 
 
+def test_what_others_kept_beside_a_survey_is_computed_again(field, tmp_path, monkeypatch):
+    keep = tmp_path / "kept"
+    looked_at = tractexp.survey(field, keep=keep, cores=1).content["looked_at"]
+    assert looked_at > 0
+    monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path / "mine"))
+    made = tractexp.survey(field, keep=keep, cores=1)
+    assert made.content["looked_at"] == looked_at
+
+
 def test_a_mistake_of_ours_is_a_row_and_no_end(field, monkeypatch):
     def fails(path):
         raise ZeroDivisionError("of nothing")

@@ -5,7 +5,9 @@ what cannot tell all of it has the key "", and nothing is stored. Some entries b
 process. Two things make that safe. Nobody but its user can write to the folder, nor put another in
 its place. And each file begins with the SHA-256 of its own name and content: one that is damaged,
 cut, exchanged or from another program is none, and is computed again. The sums alone would not keep
-anyone out, who could write them too; that is what the folder is for.
+anyone out, who could write them too; that is what the folder is for. Beside the results of a run,
+whose folder others may have made, sums are made with a secret of the user's: only what this user
+has written is an entry there.
 """
 
 import atexit
@@ -20,6 +22,7 @@ import json
 import os
 import platform
 import re
+import secrets
 import shutil
 import stat
 import sys
@@ -37,6 +40,8 @@ from tractexp.storage import files
 
 CHOICE = "TRACTEXP_CACHE_DIR"
 SUM = hashlib.sha256().digest_size  # bytes a file begins with
+SECRET = "secret.key"  # in the cache folder
+LONGEST_WAIT = 10.0  # s for another process that makes it
 ENDING, EARLIER = ".entry", ".kept"  # of its name, now and in versions before 0.2
 # nobody else's
 NAME = re.compile(rf"[0-9a-f]+{re.escape(ENDING)}|[a-z]+_[0-9a-f]+{re.escape(EARLIER)}")
@@ -64,7 +69,14 @@ class Store:
 
     def read(self, key: str) -> bytes | None:
         """The content of an entry; None where there is none, or its file is damaged."""
-        return _sound(self.path(key)) if key else None
+        try:
+            return _sound(self.path(key), self._read_secret()) if key else None
+        except (OSError, UserError):
+            return None
+
+    def _read_secret(self) -> bytes:
+        """What its sums are made with: in a folder that others may have made the user's secret."""
+        return read_secret() if self.folder else b""
 
     def write(self, key: str, content: bytes) -> None:
         """Write an entry, whole or not at all; where that is impossible, it is computed again next
@@ -75,7 +87,8 @@ class Store:
         with contextlib.suppress(OSError, UserError):
             path = self.path(key)
             path.parent.mkdir(mode=0o777 if self.folder else 0o700, parents=True, exist_ok=True)
-            files.write(path, _sum(path, content) + content, lasting=False)
+            signature = _sum(path, content, self._read_secret())
+            files.write(path, signature + content, lasting=False)
             if self.limit is not None and self._written % (1 + self.limit // 64) == 0:
                 self._forget(path.parent, self.limit)
             self._written += 1
@@ -151,19 +164,38 @@ def find_damaged_files(folder: Path) -> list[Path]:
     return [path for path in ours if path.suffix == EARLIER or _sound(path) is None]
 
 
-def _sound(path: Path) -> bytes | None:
-    """The content of a file as it was written; None where there is none, or another."""
+def _sound(path: Path, secret: bytes = b"") -> bytes | None:
+    """The content of a file as it was written with a secret; None where there is none, or
+    another.
+    """
     try:
         data = files.read(path)
     except (OSError, UserError):
         return None
     content = data[SUM:]
-    return content if hmac.compare_digest(data[:SUM], _sum(path, content)) else None
+    return content if hmac.compare_digest(data[:SUM], _sum(path, content, secret)) else None
 
 
-def _sum(path: Path, content: bytes) -> bytes:
-    """The SHA-256 of an entry's name and content."""
-    return hashlib.sha256(path.name.encode() + b"\0" + content).digest()
+def _sum(path: Path, content: bytes, secret: bytes = b"") -> bytes:
+    """The SHA-256 of an entry's name and content, with a secret the HMAC."""
+    told = path.name.encode() + b"\0" + content
+    return hmac.digest(secret, told, "sha256") if secret else hashlib.sha256(told).digest()
+
+
+def read_secret() -> bytes:
+    """What only this user has, made where there is none yet.
+
+    Raises `UserError` where the cache folder cannot keep it.
+    """
+    path = cache_folder() / SECRET
+    if not path.exists():
+        with files.lock_file(path.with_suffix(".lock"), LONGEST_WAIT):
+            if not path.exists():
+                files.write(path, secrets.token_bytes(SUM), private=True)
+    secret = files.read(path)
+    if len(secret) != SUM:
+        raise UserError(f"{path} is damaged; remove it, and what was kept is computed again")
+    return secret
 
 
 # Keys
