@@ -1,6 +1,7 @@
 """Losses, weights, gaps and parameters per event: what the search minimizes."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from tractexp.configuration.plugin import build, get
 from tractexp.errors import UserError
 from tractexp.identification.search import search
 from tractexp.inference.problem import Problem
+from tractexp.model.model import compose
 from tractexp.parameter import even
 
 
@@ -148,3 +150,25 @@ def test_a_fixed_value_that_is_no_number_is_refused_by_its_name(value):
         tractexp.identify(
             "tibet_50pct", fixed={"C": value}, optimizer="multistart_least_squares", budget=20
         )
+
+
+def contactors():
+    """A shipped dip of 50 %, 2 ms a sample."""
+    folder = Path(tractexp.__file__).parent / "data"
+    return tractexp.read(str(folder / "contactors_50pct.csv"))
+
+
+def test_what_collapses_behind_an_impedance_asks_for_no_shorter_steps():
+    """Of feeders beside a load that recovers a few in the box collapse, and 256 steps a sample do
+    not calculate them: an investigation that ended with both was refused at its grade.
+    """
+    base = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
+    names = ("exponential_recovery", "feeder_impedance")
+    model = compose(*base, [get("effect", name)() for name in names])
+    assert Problem(model, contactors()).step.substeps.tolist() == [8]
+
+
+def test_a_base_model_that_no_number_of_steps_calculates_is_refused():
+    model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+    with pytest.raises(UserError, match="Runge-Kutta steps per sample of 2 ms leave"):
+        Problem(model, contactors(), bounds={"T_prime": (1e-7, 1e-6)})

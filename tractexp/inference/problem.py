@@ -21,6 +21,9 @@ from tractexp.record import Event
 from tractexp.record.own_base import SMALLEST_BASE
 
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
+# share of them that must be calculated where a model has effects: behind an impedance some loads
+# collapse, which no number of steps calculates
+LEAST_CALCULATED_SHARE = 0.9
 
 
 def narrow_bounds(
@@ -548,6 +551,10 @@ class Problem:
         ):
             chosen, error = self.model.substeps(
                 self.drive, probes[lasting], fine, share, self._until
+            )
+        if self.model.effects and share > LEAST_CALCULATED_SHARE and not (error <= fine).all():
+            chosen, error = self.model.substeps(
+                self.drive, probes, fine, LEAST_CALCULATED_SHARE, self._until
             )
         if self.model.integration == CLASSICAL and not (error <= fine).all():
             worst = int(np.argmax(error))
