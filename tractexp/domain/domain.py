@@ -76,20 +76,45 @@ class Domain(ABC):
 
     @abstractmethod
     def event(self, event: Event) -> Event:
-        """An event as a model is compared with it. Raises `UserError` where it needs samples that
-        there are not.
+        """An event as a model is compared with it.
+
+        Parameters
+        ----------
+        event : Event
+            In phasors or waveforms.
+
+        Returns
+        -------
+        Event
+
+        Raises
+        ------
+        UserError
+            Where the domain needs samples that the record does not have.
         """
 
     def events(self, events: Sequence[Event]) -> tuple[Event, ...]:
-        """The same of several."""
+        """Several events as a model is compared with them."""
         return tuple(map(self.event, events))
 
     @abstractmethod
     def excitation(
         self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
     ) -> Excitation | WaveformDrive:
-        """What drives a model through an event of this domain; `weights` are those of an objective,
-        of P and Q.
+        """The inputs of a simulation, and what it is compared with.
+
+        Parameters
+        ----------
+        event : Event
+            Of this domain.
+        model : Model or None
+            What is simulated: it may be looked at through the recorder's window.
+        weights : (float, float)
+            Of the squared errors of P and of Q.
+
+        Returns
+        -------
+        Excitation or WaveformDrive
         """
 
     def lacks_frequency(self, events: Sequence[Event]) -> bool:
@@ -108,13 +133,13 @@ class Domain(ABC):
 
     @abstractmethod
     def longest_step(self, events: Sequence[Event], substeps: np.ndarray) -> float:
-        """Runge-Kutta step [s] that is fine enough for dips like these events, which took so many
-        per sample.
+        """The Runge-Kutta step [s] that is fine enough for dips like these events, which took
+        `substeps` (E,) per sample.
         """
 
     @abstractmethod
     def values(self, drive: Drive) -> int:
-        """How many values of an event are judged."""
+        """The number of values of a drive that are judged."""
 
     @abstractmethod
     def noise(
@@ -127,21 +152,55 @@ class Domain(ABC):
         walk: Callable[[np.ndarray], RandomWalk | None],
         shapes: np.ndarray | None,
     ) -> Noise:
-        """The noise of residuals (C, N) in quiet stretches, at free values (d,) of the problem.
+        """The noise of what a fit leaves.
 
-        `walk` tells how the load wanders in channels mixed by a matrix (C, C), `shapes` (k, C, N)
-        are what errors of the record do. Raises `UserError` where too few samples are quiet.
+        Parameters
+        ----------
+        residual : (C, N) [pu]
+            What it leaves.
+        valid : (C, N) bools
+            Which samples count.
+        quiet : sequence of slice
+            Where little happens.
+        problem : Problem
+            The model on its events.
+        values : (d,)
+            Its free values.
+        walk : (C, C) -> RandomWalk or None
+            How the load wanders, in channels mixed by a matrix.
+        shapes : (k, C, N) [pu] or None
+            What errors of the record do.
+
+        Returns
+        -------
+        Noise
+
+        Raises
+        ------
+        UserError
+            Where too few samples are quiet.
         """
 
     @abstractmethod
     def input_errors(self, problem: "Problem", values: np.ndarray) -> np.ndarray | None:
-        """What errors of the record beside the voltage's noise do at free values (d,), (k, C, N)
-        [pu], or None.
+        """The errors of the record beside the voltage's noise, as what is compared shows them.
+
+        Parameters
+        ----------
+        problem : Problem
+            The model on its events.
+        values : (d,)
+            Its free values.
+
+        Returns
+        -------
+        (k, C, N) array [pu] or None
+            One standard deviation each; None where there are none.
         """
 
     @abstractmethod
     def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
-        """What is calculated (C, N) of an event of this domain beside what was recorded."""
+        """The calculated outputs (C, N) [pu] of an event beside what was recorded."""
 
     @abstractmethod
     def ports(self, event: Event) -> tuple[Port, ...]:
@@ -149,8 +208,18 @@ class Domain(ABC):
 
     @abstractmethod
     def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
-        """What is compared (C, N), where deviations of the ports' currents are `responses`, (N,)
-        complex each [pu].
+        """What is compared, by the response of a linear network.
+
+        Parameters
+        ----------
+        event : Event
+            Of this domain.
+        responses : (N,) complex [pu] for each port
+            Deviations of the currents.
+
+        Returns
+        -------
+        (C, N) array [pu]
         """
 
     @abstractmethod
@@ -167,15 +236,15 @@ class Domain(ABC):
 
     @abstractmethod
     def shape(self, event: Event) -> dict[str, float]:
-        """What `shaped_by` names, of a recorded event."""
+        """{name: value} of what `shaped_by` names, measured on a recorded event."""
 
     def describe_shape(self, shape: "DipShape") -> str:
-        """The same of a planned dip, as its sentence goes on."""
+        """The end of a sentence on the shape of a planned dip."""
         return ""
 
     @property
     def edges(self) -> str:
-        """How a planned dip falls and comes back."""
+        """A clause on how a planned dip falls and comes back."""
         return f"straight edges of {1000 * self.edge:g} ms"
 
     @abstractmethod
@@ -204,10 +273,26 @@ class Domain(ABC):
         jump: float,
         unbalance: float,
     ) -> Excitation | WaveformDrive:
-        """The voltage of a dip at the power before a recorded event, `course` (N,) of it there: 0
-        to 1.
+        """The inputs of a dip at the power before a recorded event.
 
-        The phase turns by `jump` [degrees]; the negative sequence is `unbalance` times the depth.
+        Parameters
+        ----------
+        like : Event
+            Whose power and voltage before it are taken.
+        step : float [s]
+            Between samples.
+        course : (N,)
+            How much of the dip is there: 0 to 1.
+        depth : float
+            Share by which the voltage falls.
+        jump : float [degrees]
+            By which its phase turns.
+        unbalance : float
+            Negative sequence over the depth.
+
+        Returns
+        -------
+        Excitation or WaveformDrive
         """
 
     @abstractmethod
@@ -221,19 +306,59 @@ class Domain(ABC):
         omega_s: np.ndarray | None = None,
         omega_s0: float = 0.0,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """P and Q (N,) [pu] that a load draws from a voltage U (N,) [pu] at uniform times t (N,)
-        [s].
+        """The power that a load draws from a given voltage.
 
-        `before` has U0, P0, Q0 [pu] and the nominal `frequency` [Hz]; omega_s (N,) [rad/s] is the
-        synchronous speed relative to it, `omega_s0` that before. Raises `UserError` where there is
-        no steady state.
+        Parameters
+        ----------
+        model : Model
+            The equations of the load.
+        values : (p,)
+            All its parameters.
+        t : (N,) [s]
+            Uniform times.
+        U : (N,) [pu]
+            Voltage.
+        before : mapping
+            `U0`, `P0` and `Q0` [pu] before, and the nominal `frequency` [Hz].
+        omega_s : (N,) or None [rad/s]
+            Synchronous speed relative to nominal.
+        omega_s0 : float [rad/s]
+            That before.
+
+        Returns
+        -------
+        (N,) array [pu]
+            P.
+        (N,) array [pu]
+            Q.
+
+        Raises
+        ------
+        UserError
+            Where there is no steady state.
         """
 
 
 def simulate_compared(model: Model, values: np.ndarray, drive: Drive) -> np.ndarray:
-    """What is compared (C, N), by as many Runge-Kutta steps as it takes.
+    """What is compared (C, N) [pu], by as many Runge-Kutta steps as it takes.
 
-    Raises `UserError` where there is no steady state.
+    Parameters
+    ----------
+    model : Model
+        The equations of the load.
+    values : (p,)
+        All its parameters.
+    drive : Drive
+        The inputs.
+
+    Returns
+    -------
+    (C, N) array [pu]
+
+    Raises
+    ------
+    UserError
+        Where there is no steady state.
     """
     if refusal := model.refusal(values, drive):
         raise UserError(refusal)

@@ -22,13 +22,25 @@ AFTER = 0.15  # s after a dip's start in which the currents' error counts
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Playback:
-    """Measured and calculated power of one event, (N,) each, and the relative errors of Eq. (20),
-    as fractions.
+    """The measured and the calculated power of one event.
 
-    Of waveforms the power is that which the record's estimator sees in calculated and in recorded
-    currents, and `currents` (3, N), alpha, beta and zero, are the calculated ones [pu] on the
-    samples of the event in `waves`; `unsettled` is by how much they still change from one cycle to
-    the next before the record, a share of them.
+    Attributes
+    ----------
+    event : Event
+        In phasors.
+    P, Q : (N,) [pu]
+        As calculated. Of waveforms they are what the record's estimator sees in the calculated
+        currents.
+    epsilon_p, epsilon_q : float
+        The relative errors of Eq. (20), as fractions.
+    epsilon_i : float or None
+        That of the currents.
+    waves : WaveEvent or None
+        The event in waveforms.
+    currents : (3, N) [pu] or None
+        As calculated: alpha, beta and zero, at the samples of `waves`.
+    unsettled : float or None
+        The share by which they still change from one cycle to the next before the record.
     """
 
     event: Event
@@ -85,10 +97,22 @@ class Playback:
 
 
 def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
-    """epsilon of Eq. (20) as a fraction: RMS of the difference over RMS of the measurement, gaps
-    left out.
+    """epsilon of Eq. (20): rms of the difference over rms of the measurement.
 
-    nan where nothing was measured but zero.
+    Parameters
+    ----------
+    measured, calculated : (N,)
+        In the same unit; gaps (nan) of the measurement do not count.
+
+    Returns
+    -------
+    float
+        A fraction; nan where nothing was measured but zero.
+
+    Examples
+    --------
+    >>> relative_error(np.array([1.0, np.nan, 1.0]), np.array([1.1, 5.0, 0.9])).__round__(6)
+    0.1
     """
     valid = np.isfinite(measured)
     size = float(np.linalg.norm(measured[valid]))
@@ -98,10 +122,20 @@ def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
 
 
 def current_error(event: WaveEvent, currents: np.ndarray) -> float:
-    """epsilon_i: rms of what calculated currents (3, N) miss from the dip's start to 0.15 s after
-    it, all phases.
+    """epsilon_i: the error of calculated currents about a dip.
 
-    Over the rms of the recorded currents before the dip.
+    Parameters
+    ----------
+    event : WaveEvent
+        With the recorded currents.
+    currents : (3, N) [pu]
+        As calculated: alpha, beta and zero.
+
+    Returns
+    -------
+    float
+        rms of the difference in all phases, from the dip's start to 0.15 s after it, over the rms
+        of the recorded currents before the dip.
     """
     window = slice(event.start, event.start + round(AFTER / event.record.step))
     before = slice(event.first, event.start)
@@ -112,12 +146,22 @@ def current_error(event: WaveEvent, currents: np.ndarray) -> float:
 
 
 def measure_unsteadiness(event: WaveEvent, currents: np.ndarray) -> float:
-    """By how much calculated currents (3, N) still change from cycle to cycle before the record, a
-    share of them.
+    """The share by which calculated currents still change from cycle to cycle before the record.
 
-    The rms of the last cycle of the lead less the one before it, over the rms of the last one; nan
-    where the lead is shorter than two cycles. A cycle is no whole number of samples: the earlier
-    one is read off a cubic spline.
+    A cycle is no whole number of samples: the earlier one is read off a cubic spline.
+
+    Parameters
+    ----------
+    event : WaveEvent
+        With a lead before its record.
+    currents : (3, N) [pu]
+        As calculated.
+
+    Returns
+    -------
+    float
+        The rms of the last cycle of the lead less the one before it, over that of the last one; nan
+        where the lead is shorter than two cycles.
     """
     from scipy.interpolate import CubicSpline
 
@@ -136,11 +180,26 @@ def measure_unsteadiness(event: WaveEvent, currents: np.ndarray) -> float:
 
 
 def as_phasors(event: WaveEvent, currents: np.ndarray) -> tuple[Event, np.ndarray, np.ndarray]:
-    """The event in phasors of its recorded waveforms, and P and Q (M,) [pu] of calculated currents
-    (3, N).
+    """The event in phasors of its recorded waveforms, and the power of calculated currents.
 
     Both are measured by one estimator from the same samples, so that its window cancels when they
     are compared.
+
+    Parameters
+    ----------
+    event : WaveEvent
+        As recorded.
+    currents : (3, N) [pu]
+        As calculated.
+
+    Returns
+    -------
+    Event
+        With M phasors.
+    (M,) array [pu]
+        P of the calculated currents.
+    (M,) array [pu]
+        Q of them.
     """
     measured, calculated = (_phasors(event, i) for i in (np.nan_to_num(event.currents), currents))
     was, own = event.phasors, event.phasors.record

@@ -22,12 +22,24 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 @dataclass(frozen=True, eq=False)
 class Port:
-    """Deviations of the voltage u (N,) and of the current i (N,) [pu], complex, from the sample
-    `start` of a dip on.
+    """The deviations of voltage and current at a load's terminals from their course before a dip.
 
-    The current is nan where it is not compared. `steady` [pu] is the response to a constant
-    voltage, None where that is not known. `turns` is at how many Hz the frame turns, 0 of phasors.
-    `series`: resistance and inductance in series.
+    Attributes
+    ----------
+    u : (N,) complex [pu]
+        Of the voltage.
+    i : (N,) complex [pu]
+        Of the current; nan where it is not compared.
+    step : float [s]
+        Between samples.
+    start : int
+        First sample of the dip.
+    steady : complex or None [pu]
+        The response to a constant voltage; None where that is not known.
+    turns : float [Hz]
+        At which the frame turns; 0 of phasors.
+    series : bool
+        Whether the port is a resistance and an inductance in series.
     """
 
     u: Complex
@@ -40,12 +52,12 @@ class Port:
 
     @property
     def steady_response(self) -> Complex:
-        """What of the response (N,) [pu] the steady state tells: 0 where it does not."""
+        """The part of the response (N,) [pu] that the steady state tells: 0 where it tells none."""
         return (0.0 if self.steady is None else self.steady) * self.u
 
 
 def power_port(event: Event) -> Port:
-    """U against P - jQ, both less their means before the dip."""
+    """The port of phasors: U against P - jQ, both less their means before the dip."""
     record = event.record
     i = (record.P - event.P0) - 1j * (record.Q - event.Q0)
     return Port((record.U - event.U0).astype(complex), i, record.step, event.start, None)
@@ -71,8 +83,19 @@ def current_ports(event: WaveEvent) -> tuple[Port, ...]:
 
 
 def periodic_course(event: WaveEvent, channels: np.ndarray) -> np.ndarray:
-    """Channels (C, N) as they went before the dip, harmonics included, all along; 0 where one is
-    not compared.
+    """The course of channels before the dip, harmonics included, continued through the event.
+
+    Parameters
+    ----------
+    event : WaveEvent
+        With N samples.
+    channels : (C, N)
+        Waveforms.
+
+    Returns
+    -------
+    (C, N) array
+        0 of a channel that is not compared.
     """
     t, part = event.record.t, event.steady
     there = np.isfinite(channels[:, part]).all(axis=1)

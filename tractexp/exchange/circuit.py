@@ -18,8 +18,20 @@ Number = TypeVar("Number", float, complex)
 
 @dataclass(frozen=True)
 class TCircuit:
-    """Elements [pu of the record's base] at the nominal speed omega_n [rad/s]; `R_2`, `X_2` are
-    None in one cage.
+    """The T-circuit of a motor of one or two cages.
+
+    Attributes
+    ----------
+    omega_n : float [rad/s]
+        Nominal synchronous speed, at which the reactances are told.
+    R_s, X_s : float [pu]
+        Of the stator, on the record's base.
+    X_m : float [pu]
+        Magnetizing reactance.
+    R_1, X_1 : float [pu]
+        Of the first cage.
+    R_2, X_2 : float or None [pu]
+        Of the second cage; None where there is one only.
     """
 
     omega_n: float
@@ -35,7 +47,31 @@ class TCircuit:
     def single(
         cls, T_prime: float, X_prime: float, C: float, omega_n: float, R_s: float = 0.0
     ) -> "TCircuit":
-        """One cage, from T' [s], X' and C = (X - X')/X."""
+        """The circuit of one cage.
+
+        Parameters
+        ----------
+        T_prime : float [s]
+            Transient time constant T' = X'/X T0'.
+        X_prime : float [pu]
+            Transient reactance.
+        C : float
+            (X - X')/X, between 0 and 1.
+        omega_n : float [rad/s]
+            Nominal synchronous speed.
+        R_s : float [pu]
+            Stator resistance.
+
+        Returns
+        -------
+        TCircuit
+
+        Examples
+        --------
+        >>> circuit = TCircuit.single(0.05, 0.2, 0.9, 314.16)
+        >>> round(circuit.X, 3), round(circuit.X_prime, 3)
+        (2.0, 0.2)
+        """
         X = X_prime / (1 - C)
         X_s = X * (1 - sqrt(C))
         return cls(omega_n, R_s, X_s, X - X_s, X * (1 - C) / (omega_n * T_prime), X_s)
@@ -51,7 +87,21 @@ class TCircuit:
         omega_n: float,
         R_s: float = 0.0,
     ) -> "TCircuit":
-        """Two cages in parallel, from those and T'' [s], X'' < X'."""
+        """The circuit of two cages in parallel.
+
+        Parameters
+        ----------
+        T_prime, X_prime, C, omega_n, R_s
+            As of `single`.
+        T_second : float [s]
+            Subtransient time constant T''.
+        X_second : float [pu]
+            Subtransient reactance, less than X'.
+
+        Returns
+        -------
+        TCircuit
+        """
         X = X_prime / (1 - C)
         equal = X * (1 - sqrt(C))
         X_s = equal if equal < X_second else X_second / 2
@@ -64,17 +114,17 @@ class TCircuit:
 
     @property
     def X(self) -> float:
-        """Open-circuit reactance."""
+        """The open-circuit reactance [pu]."""
         return self.X_s + self.X_m
 
     @property
     def X_prime(self) -> float:
-        """Transient reactance."""
+        """The transient reactance [pu]."""
         return self.X_s + _parallel(self.X_m, self.X_1)
 
     @property
     def X_second(self) -> float:
-        """Subtransient reactance of two cages; of one, the transient reactance."""
+        """The subtransient reactance [pu] of two cages; of one, the transient reactance."""
         return (
             self.X_prime
             if self.X_2 is None
@@ -83,18 +133,26 @@ class TCircuit:
 
     @property
     def T0_prime(self) -> float:
-        """Open-circuit time constant of the first cage [s]."""
+        """The open-circuit time constant [s] of the first cage."""
         return (self.X_1 + self.X_m) / (self.omega_n * self.R_1)
 
     @property
     def T0_second(self) -> float:
-        """Open-circuit time constant of the second cage [s]; 0 where there is none."""
+        """The open-circuit time constant [s] of the second cage; 0 where there is none."""
         if self.X_2 is None or self.R_2 is None:
             return 0.0
         return (self.X_2 + _parallel(self.X_m, self.X_1)) / (self.omega_n * self.R_2)
 
     def parameters(self) -> dict[str, float]:
-        """What an identification finds of such a motor: the inverse of `single` and `double`."""
+        """{name: value} of what an identification finds of such a motor: the inverse of `single`
+        and `double`.
+
+        Examples
+        --------
+        >>> found = TCircuit.double(0.05, 0.2, 0.9, 0.004, 0.12, 314.16).parameters()
+        >>> {name: round(value, 6) for name, value in found.items()}
+        {'T_prime': 0.05, 'X_prime': 0.2, 'C': 0.9, 'T_second': 0.004, 'X_second': 0.12}
+        """
         X, X_prime, X_second = self.X, self.X_prime, self.X_second
         values = {
             "T_prime": self.T0_prime * X_prime / X,
@@ -106,7 +164,9 @@ class TCircuit:
         return values
 
     def impedance(self, slip: float) -> complex:
-        """Seen from the terminals at a slip."""
+        """The impedance [pu] seen from the terminals at a slip, per unit of the synchronous
+        speed and not 0.
+        """
         rotor = complex(self.R_1 / slip, self.X_1)
         if self.X_2 is not None and self.R_2 is not None:
             rotor = _parallel(rotor, complex(self.R_2 / slip, self.X_2))

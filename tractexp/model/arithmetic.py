@@ -16,8 +16,19 @@ VALUES = "at"  # what holds the numbers in such a text: at['T_m']
 
 
 def evaluate_texts(texts: Mapping[str, str], numbers: Mapping[str, float]) -> dict[str, float]:
-    """What is known, and after it each quantity of what stands before it; infinite or nan as IEEE
-    754 has it.
+    """The values of quantities that are written as arithmetic.
+
+    Parameters
+    ----------
+    texts : {name: expression}
+        Each of what is known and of the quantities before it.
+    numbers : {name: value}
+        What is known.
+
+    Returns
+    -------
+    {name: value}
+        Of both; infinite or nan as IEEE 754 has it.
     """
     values = {name: np.float64(value) for name, value in numbers.items()}
     with np.errstate(all="ignore"):

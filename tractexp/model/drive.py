@@ -22,13 +22,32 @@ IN_WORDS = {"i_alpha": "current alpha", "i_beta": "current beta", "i_zero": "zer
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """One event: uniformly sampled input, and measured power where there is any.
+    """One event of phasors: uniformly sampled input, and measured power where there is any.
 
-    U [pu] (N,); P, Q [pu] (N,), nan where missing; step [s]; U0, P0, Q0 [pu] and omega_s0 are the
-    steady state before the event; omega_s (N,) is the synchronous speed relative to nominal
-    [rad/s], U_angle (N,) the voltage's angle [rad] whose slope it is where that was recorded, else
-    its integral; omega_n is nominal; U2 (N,) and U20 are the negative-sequence voltage [pu], where
-    recorded.
+    Attributes
+    ----------
+    step : float [s]
+        Between samples.
+    U : (N,) [pu]
+        Voltage.
+    P, Q : (N,) [pu]
+        Measured power; nan where missing.
+    U0, P0, Q0 : float [pu]
+        The steady state before the event.
+    omega_s : (N,) or None [rad/s]
+        Synchronous speed relative to nominal.
+    omega_s0, omega_n : float [rad/s]
+        That before the event, and the nominal speed.
+    U2 : (N,) or None [pu]
+        Negative-sequence voltage, where it was recorded.
+    U20 : float [pu]
+        That before the event.
+    weight_P, weight_Q : float
+        Of squared errors.
+    window : (odd,) or None
+        Weights of the recorder's window, through which power is looked at.
+    U_angle : (N,) or None [rad]
+        The voltage's angle, whose slope `omega_s` is, where it was recorded.
     """
 
     step: float
@@ -79,14 +98,28 @@ class Excitation:
 @dataclass(frozen=True, eq=False)
 class WaveformDrive:
     """One event of sampled waveforms: space vectors in a frame that turns with the voltage before
-    the event.
+    it.
 
-    v (N,) complex is the voltage [pu of its peak], real and U0 before the event; v_zero (N,) its
-    zero sequence. `turn` (N,) complex of size one turns the frame's vectors into the stationary
-    frame of phase a. currents (3, N) are alpha, beta and zero sequence there [pu], nan where not
-    compared, `weights` how much a squared error of each counts. U (N,) and U2 are the sizes of the
-    voltage's sequences as a window of the past shows them [pu]. omega_s0 is the frame's speed
-    relative to nominal [rad/s].
+    Attributes
+    ----------
+    step : float [s]
+        Between samples.
+    v : (N,) complex [pu of its peak]
+        Voltage, real and U0 before the event.
+    v_zero : (N,) [pu]
+        Its zero sequence.
+    turn : (N,) complex
+        Of size one: what turns the frame's vectors into the stationary frame of phase a.
+    currents : (3, N) [pu]
+        Alpha, beta and zero sequence in the stationary frame; nan where not compared.
+    U, U2 : (N,) [pu]
+        Sizes of the voltage's sequences as a window of the past shows them.
+    U0, P0, Q0, U20 : float [pu]
+        Before the event.
+    omega_s0, omega_n : float [rad/s]
+        Speed of the frame relative to nominal, and the nominal speed.
+    weights : (3,)
+        Of a squared error of each current.
     """
 
     step: float
@@ -128,16 +161,43 @@ class WaveformDrive:
 
 
 def integrate(speed: np.ndarray, step: float) -> np.ndarray:
-    """The angle (N,) [rad] that a speed (N,) [rad/s] on straight lines between samples turns."""
+    """The angle that a speed turns.
+
+    Parameters
+    ----------
+    speed : (N,) [rad/s]
+        On straight lines between samples.
+    step : float [s]
+        Between samples.
+
+    Returns
+    -------
+    (N,) array [rad]
+        Zero at the first sample.
+
+    Examples
+    --------
+    >>> integrate(np.array([0.0, 2.0, 2.0]), 0.5).tolist()
+    [0.0, 0.5, 1.5]
+    """
     return np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) * (step / 2))])
 
 
 def band_limited(y: np.ndarray) -> np.ndarray:
-    """Slope at each sample (N,), per sample, of the cubic spline through them.
+    """The slope at each sample, per sample, of the cubic spline through them.
 
     What stands behind an anti-alias filter overshoots by itself: of negative sequence and of
     harmonics `slopes` would miss some percent of the voltage between samples where there are but 24
     in a cycle, and it is not linear in noise.
+
+    Parameters
+    ----------
+    y : (N,)
+        Samples at even times.
+
+    Returns
+    -------
+    (N,) array
     """
     from scipy.interpolate import CubicSpline
 
@@ -146,7 +206,25 @@ def band_limited(y: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """One or several events end to end. Shapes: N samples in all, E events."""
+    """One or several events end to end: N samples in all, E events.
+
+    Attributes
+    ----------
+    inputs : (6, N) or (14, N)
+        Of phasors or of waveforms, rows as in `INPUTS`; omega_s is 0 and U2 nan where not recorded.
+    measurements : (C, N) [pu]
+        P and Q, or three currents; gaps are filled with 0.
+    weights : (C, N)
+        Of squared errors; 0 in a gap.
+    first : (E + 1,) ints
+        First sample of each event, and the end.
+    event : (E, 5)
+        Columns as in `EVENT`.
+    before : (E, 2) [pu]
+        P0 and Q0.
+    windows : tuple
+        Weights of the recorder's window of each event, or None; empty where no event has one.
+    """
 
     # (6, N) or (14, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
     inputs: np.ndarray
@@ -159,7 +237,7 @@ class Drive:
 
     @classmethod
     def from_events(cls, events: Sequence[Excitation | WaveformDrive]) -> "Drive":
-        """Lay events end to end, all phasors or all waves."""
+        """The drive of events end to end, all of phasors or all of waveforms."""
         measured = _join(events, "measurements")
         lengths = [e.measurements.shape[1] for e in events]
         weights = np.repeat(np.array([e.weights for e in events]).T, lengths, axis=1)
@@ -178,12 +256,14 @@ class Drive:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the compared quantities are called."""
+        """The names (C,) of the compared quantities."""
         return next(names for names in OUTPUTS.values() if len(names) == len(self.measurements))
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The same as a page says it: P and Q, or which current."""
+        """The names (C,) of the compared quantities as a page says them: P and Q, or which
+        current.
+        """
         return tuple(IN_WORDS.get(name, name) for name in self.names)
 
     @property
@@ -193,17 +273,17 @@ class Drive:
 
     @property
     def channels(self) -> int:
-        """How many quantities are compared."""
+        """The number C of quantities that are compared."""
         return len(self.measurements)
 
     @property
     def events(self) -> int:
-        """How many events there are, E."""
+        """The number E of events."""
         return len(self.event)
 
     @property
     def samples(self) -> int:
-        """How many samples all events have together, N."""
+        """The number N of samples of all events together."""
         return self.inputs.shape[1]
 
     def part(self, event: int) -> slice:

@@ -36,8 +36,14 @@ CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")
 
 @dataclass(frozen=True, eq=False)
 class ModelResponse:
-    """What a load draws: P and Q, or waveforms' currents. Valid where `miss` is 0: a steady state
-    exists there.
+    """What a load draws, for n candidates.
+
+    Attributes
+    ----------
+    outputs : (C, n, N) [pu]
+        P and Q, or the currents of waveforms.
+    miss : (E, n)
+        How far a candidate is from a steady state before each event; its response is valid at 0.
     """
 
     outputs: np.ndarray  # (C, n, N) pu
@@ -61,7 +67,15 @@ class ModelResponse:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Weighted sums of squared errors; `refused` candidates have no steady state or diverged."""
+    """Weighted sums of squared errors of n candidates.
+
+    Attributes
+    ----------
+    sums : (E, C, n) [pu²]
+        Of P and Q, or of three currents, by event.
+    miss : (n,)
+        How far a candidate is from a steady state, summed over the events.
+    """
 
     sums: np.ndarray  # (E, C, n) pu²: P, Q, or three currents
     miss: np.ndarray  # (n,)
@@ -74,8 +88,14 @@ class Errors:
 
 @dataclass(frozen=True)
 class Acceptance:
-    """Whether a model takes an effect. `refusal` is the sentence why it makes no sense, None where
-    it does.
+    """Whether a model takes an effect.
+
+    Attributes
+    ----------
+    refusal : str or None
+        The sentence why the effect makes no sense for it; None where it does.
+    edits : names
+        The sites that the effect edits.
     """
 
     refusal: str | None
@@ -83,10 +103,10 @@ class Acceptance:
 
 
 class Model:
-    """A motor in parallel with a static load, Eq. (7). Make one with `compose`.
+    """A composite load, Eq. (7): a motor in parallel with a static load. Make one with `compose`.
 
-    Candidates are arrays `values` (n, d) in the order of `parameters`, or (E, n, d) where they
-    differ by event.
+    Candidates are arrays `values` (n, d) in the order of `parameters`, in their units, or (E, n, d)
+    where they differ by event.
     """
 
     def __init__(
@@ -121,8 +141,10 @@ class Model:
         return self.domain == WAVES
 
     def place_behind_recorder(self, recorder: Measurement | None) -> "Model":
-        """The same load as a known recorder shows it: without parameters, before the faults of the
-        measurement.
+        """The load as a known recorder shows it.
+
+        The recorder has no parameters, and comes before the faults of the measurement. None: the
+        model itself.
         """
         if recorder is None:
             return self
@@ -132,14 +154,14 @@ class Model:
 
     @functools.cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Those of motor, static load and effects, in this order."""
+        """The parameters of motor, static load and effects, in this order."""
         return tuple(
             p for part in (self.motor, self.static, *self.effects) for p in part.parameters
         )
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
-        """Their names."""
+        """The names of the parameters, in their order."""
         return tuple(p.name for p in self.parameters)
 
     @property
@@ -231,10 +253,23 @@ class Model:
         substeps: Sequence[int] | np.ndarray | int = 1,
         before: np.ndarray | None = None,
     ) -> ModelResponse:
-        """P and Q of every candidate over every event, (n, N); nan where it has diverged.
+        """Simulate candidates through events.
 
-        `before` (E, n, 2) are P0 and Q0 [pu] where candidates differ in them; by default the
-        drive's own.
+        Parameters
+        ----------
+        drive : Drive
+            E events of N samples in all.
+        values : (n, d) or (E, n, d)
+            Parameters of n candidates.
+        substeps : int or (E,) ints
+            Runge-Kutta steps per sample.
+        before : (E, n, 2) [pu] or None
+            P0 and Q0 where candidates differ in them; None: the drive's own.
+
+        Returns
+        -------
+        ModelResponse
+            nan where a candidate has diverged.
         """
         candidates = self._candidates(drive, values, before)
         n = candidates.shape[2]
@@ -256,11 +291,19 @@ class Model:
     def errors(
         self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1
     ) -> Errors:
-        """Weighted squared errors of every candidate over every event, in one pass and without
-        storing responses.
+        """The weighted squared errors of candidates, in one pass and without storing responses.
 
-        Those of a few candidates are stored at a time where the measurement stands between kernel
-        and sums.
+        Where the measurement stands between kernel and sums, the responses of a few candidates are
+        stored at a time.
+
+        Parameters
+        ----------
+        drive, values, substeps
+            As of `simulate`.
+
+        Returns
+        -------
+        Errors
         """
         if not (self.measurements or drive.windows):
             sums, miss = self._run(drive, self._candidates(drive, values), substeps)
@@ -293,14 +336,29 @@ class Model:
         share: float = 1.0,
         until: Sequence[float] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Runge-Kutta steps per sample that each event needs, and the error left [pu], found by
-        step doubling.
+        """The Runge-Kutta steps per sample that each event needs, by step doubling.
 
-        The error is the largest difference of any output between n and 2 n steps over the
-        candidates that have a steady state, or over that `share` of them which leaves least; of
-        each event `until` so many seconds after its first sample, by default all. Both results have
-        shape (E,). Integrated as printed a model takes one step per sample, as the paper does,
-        whatever error that leaves.
+        The error is the largest difference of any output between n and 2 n steps. Integrated as
+        printed a model takes one step per sample, as the paper does, whatever error that leaves.
+
+        Parameters
+        ----------
+        drive, values
+            As of `simulate`.
+        tolerance : float [pu]
+            The error that is allowed.
+        share : float
+            Share of the candidates with a steady state for which it must hold: those with the least
+            error.
+        until : E floats or None [s]
+            Seconds after each event's first sample up to which the error counts; None: all of it.
+
+        Returns
+        -------
+        (E,) ints
+            Steps per sample.
+        (E,) array [pu]
+            The error that they leave.
         """
         most = MOST_SUBSTEPS if self.integration == CLASSICAL else 1
         chosen, error = np.ones(drive.events, dtype=np.int64), np.full(drive.events, np.inf)
@@ -328,8 +386,19 @@ class Model:
                 coarse = self.simulate(drive, values, chosen)
 
     def refusal(self, values: np.ndarray, drive: Drive) -> str | None:
-        """Why these values (d,) have no steady state before the event, as a sentence; None where
-        they have one.
+        """Why parameters have no steady state before the first event.
+
+        Parameters
+        ----------
+        values : (d,)
+            Of one candidate.
+        drive : Drive
+            The events.
+
+        Returns
+        -------
+        str or None
+            A sentence; None where they have one.
         """
         _, miss = self._run(drive, self._candidates(drive, values), 1)
         if miss[0, 0] == 0:
@@ -354,10 +423,23 @@ class Model:
         )
 
     def at_rest(self, values: np.ndarray, drive: Drive, event: int = 0) -> dict[str, float]:
-        """The kernel's steady state of values (d,) before an event: parameters, states
-        (`NAME_before`), quantities.
+        """The steady state of one candidate before an event.
 
-        Valid where `refusal` has nothing to say; quantities that are phasors are left out.
+        It is valid where `refusal` has nothing to say; quantities that are phasors are left out.
+
+        Parameters
+        ----------
+        values : (d,)
+            Of one candidate.
+        drive : Drive
+            The events.
+        event : int
+            Which of them, from 0.
+
+        Returns
+        -------
+        {name: value}
+            Parameters, states (`NAME_before`) and named quantities.
         """
         stated = json.loads(
             text_of((self.motor, self.static, *self.effects), self._at_rest, self._in_cache("rest"))
@@ -470,10 +552,32 @@ def compose(
     domain: str = PHASORS,
     window: float | str | None = None,
 ) -> Model:
-    """A composite load of these parts. Raises `UserError` for an effect named twice, an unknown
-    integration or domain.
+    """Compose a load of a motor, a static load and effects.
 
-    `domain` is `phasors` or `waves`; `window` that over which the recorder averages phasors.
+    Parameters
+    ----------
+    motor : Motor
+        Or the plugin `none`.
+    static : Static
+        The static load.
+    effects : sequence of Effect
+        In any order.
+    integration : str
+        "classical", or "printed" as Eq. (4) is.
+    domain : str
+        "phasors" or "waves".
+    window : float [s], str or None
+        That over which the recorder averages phasors: seconds, the name of an estimator, or
+        `recorded`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    UserError
+        For an effect named twice, an unknown integration or domain.
     """
     check_choice("model.integration", integration, INTEGRATIONS)
     check_choice("domain", domain, DOMAINS)

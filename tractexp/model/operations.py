@@ -54,13 +54,15 @@ class Operations:
 
 @dataclass(frozen=True)
 class Cost:
-    """What one candidate costs: a Runge-Kutta step, and a sample without its steps."""
+    """The operations that one candidate costs: of a Runge-Kutta step, and of a sample without
+    its steps.
+    """
 
     step: Operations
     sample: Operations
 
     def per_sample(self, substeps: int) -> Operations:
-        """A sample with its steps."""
+        """The operations of a sample with so many steps."""
         return self.sample + self.step * substeps
 
 

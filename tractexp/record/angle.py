@@ -9,8 +9,23 @@ import numpy as np
 
 
 def unwrap_angle(angle: np.ndarray, turn: float = 2 * np.pi) -> np.ndarray:
-    """An angle (N,) without the whole turns it was wrapped by; over a gap (nan) as from one side to
-    the other. It stays a gap.
+    """An angle without the whole turns by which it was wrapped.
+
+    Parameters
+    ----------
+    angle : (N,)
+        In any unit; nan in a gap, which stays one.
+    turn : float
+        A whole turn in that unit.
+
+    Returns
+    -------
+    (N,) array
+
+    Examples
+    --------
+    >>> unwrap_angle(np.array([350.0, 10.0, 30.0]), 360.0).tolist()
+    [350.0, 370.0, 390.0]
     """
     there = np.isfinite(angle)
     unwrapped = np.full(len(angle), np.nan)
@@ -19,11 +34,23 @@ def unwrap_angle(angle: np.ndarray, turn: float = 2 * np.pi) -> np.ndarray:
 
 
 def measure_frequency(angle: np.ndarray, step: float, nominal: float) -> np.ndarray:
-    """Frequency (N,) [Hz] at which an angle (N,) [rad] turns beside its jumps, in a frame that
-    turns at `nominal`.
+    """The frequency at which an angle turns, beside its jumps.
 
     At each sample it is the slope of the curve through the angle which leans on the side that bends
     less (Akima 1970): before a jump the slope before it, after a jump that after it.
+
+    Parameters
+    ----------
+    angle : (N,) [rad]
+        In a frame that turns at `nominal`.
+    step : float [s]
+        Between samples.
+    nominal : float [Hz]
+        Of the network.
+
+    Returns
+    -------
+    (N,) array [Hz]
     """
     usual = np.diff(angle)
     m = np.concatenate([usual[:1], usual[:1], usual, usual[-1:], usual[-1:]])

@@ -30,8 +30,14 @@ STAYS = 5, 0.5  # cycles over which a step is still seen, and how much of it
 
 @dataclass(frozen=True)
 class Change:
-    """A step of a load, or of its voltage: samples before `first` and from `stop` on are those of
-    steady levels.
+    """A step of a load, or of its voltage.
+
+    Attributes
+    ----------
+    first, stop : int
+        Samples before `first` and from `stop` on are those of steady levels.
+    before, after : complex
+        P + jQ, in the unit of the record; of a step of the voltage that, real.
     """
 
     first: int
@@ -46,8 +52,19 @@ class Change:
 
 
 def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> list[Change]:
-    """The steps of P + jQ (N,), of more than 5 %, that the voltage U (N,) does not explain; `cycle`
-    in samples.
+    """The steps of a load that its voltage does not explain.
+
+    Parameters
+    ----------
+    U, P, Q : (N,)
+        Voltage and powers of a record, in any unit; P and Q may have gaps.
+    cycle : float
+        Samples in a cycle of the network.
+
+    Returns
+    -------
+    list of Change
+        Of more than 5 % of the apparent power.
     """
     S, n = without_gaps(P) + 1j * without_gaps(Q), max(1, round(cycle))
     (before, after), (low, high) = _levels(S, n), _levels(U.astype(complex), n)
@@ -63,7 +80,7 @@ def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> l
 
 
 def voltage_changes(U: np.ndarray, cycle: float) -> list[Change]:
-    """The steps of a voltage (N,) of more than 1 %, with the voltages in place of powers."""
+    """The steps of a voltage (N,) of more than 1 %, where `cycle` samples are a cycle."""
     n = max(1, round(cycle))
     low, high = _levels(U.astype(complex), n)
     return list(
@@ -74,8 +91,9 @@ def voltage_changes(U: np.ndarray, cycle: float) -> list[Change]:
 
 
 def _levels(x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Means (N,) of the n samples before each, and of the n that begin n samples later; empty for
-    too few samples.
+    """The means of the n samples before each, and of the n that begin n samples later.
+
+    Both are empty for too few samples.
     """
     if len(x) < 3 * n + 1:
         return np.empty(0, complex), np.empty(0, complex)
@@ -115,13 +133,36 @@ def _steps(
 
 
 def runs(mask: np.ndarray, least: int = 1) -> list[slice]:
-    """The unbroken stretches, of at least so many samples, in which `mask` (N,) is True."""
+    """The unbroken stretches in which a mask is true.
+
+    Parameters
+    ----------
+    mask : (N,) bools
+        By sample.
+    least : int
+        Shorter stretches are left out.
+
+    Returns
+    -------
+    list of slice
+
+    Examples
+    --------
+    >>> runs(np.array([True, True, False, True]), least=2)
+    [slice(0, 2, None)]
+    """
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int))).tolist()
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
 
 
 def without_gaps(x: np.ndarray) -> np.ndarray:
-    """x (N,) with its gaps (nan) filled in linearly; zero where it has no value."""
+    """Values (N,) with gaps (nan) filled in linearly; all zero where there is no value.
+
+    Examples
+    --------
+    >>> without_gaps(np.array([1.0, np.nan, 2.0])).tolist()
+    [1.0, 1.5, 2.0]
+    """
     valid = np.isfinite(x)
     if valid.all():
         return x
@@ -138,15 +179,15 @@ def _greatest(S: np.ndarray) -> float:
 
 
 def smear(record: Record) -> float:
-    """Samples that a step is smeared over: a cycle, or the window of the phasors if
-    that is longer.
+    """The number of samples that a step is smeared over: a cycle, or the window of the phasors
+    where that is longer.
     """
     length = record.window.length if record.window else 0.0
     return max(1 / record.base.frequency, length) * record.rate
 
 
 def clause(record: Record, begin: int, change: Change) -> str:
-    """What a step is; its samples count from `begin`."""
+    """A clause on a step of the load, whose samples count from sample `begin` of the record."""
     name = "is switched off" if change.ratio < SMALL_LOAD_SHARE else "changes"
     when = record.t[begin + (change.first + change.stop) // 2]
     return (

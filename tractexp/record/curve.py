@@ -4,13 +4,30 @@ import numpy as np
 
 
 def slopes(y: np.ndarray) -> np.ndarray:
-    """Slope at each sample (N,), per sample, of the smooth curve through them: Akima's, which does
-    not overshoot.
+    """The slope at each sample of a smooth curve through them, which does not overshoot.
 
-    Between samples the kernel reads the voltage off the cubics these slopes define. A straight line
-    would round the edges of a dip recorded every 10 ms by more than the noise of a good recorder.
+    Between samples the kernel reads the voltage off the cubics that these slopes define. A straight
+    line would round the edges of a dip recorded every 10 ms by more than the noise of a good
+    recorder.
 
+    Parameters
+    ----------
+    y : (N,)
+        Values at even times.
+
+    Returns
+    -------
+    (N,) array
+        Per sample.
+
+    Notes
+    -----
     Source: Akima 1970, with the weights that keep flat stretches flat (makima).
+
+    Examples
+    --------
+    >>> slopes(np.array([0.0, 1.0, 2.0, 3.0])).round(9).tolist()
+    [1.0, 1.0, 1.0, 1.0]
     """
     if len(y) < 3:
         return np.gradient(y) if len(y) > 1 else np.zeros(len(y))

@@ -34,13 +34,26 @@ def at_level(x: np.ndarray, share: float) -> np.ndarray:
 def direction(
     U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, calm: np.ndarray | None = None
 ) -> str:
-    """Why P is negative before a disturbance, one clause; "" where it is not.
+    """Why P is negative before a disturbance.
 
-    `calm` (N,) marks the state to compare with, by default the one that lasts longest. `polarity`
-    is the direction that the negative sequence shows: 1 as a load's, -1 reversed, 0 where it shows
-    none. A passive load draws negative-sequence current whatever its power does. Otherwise the
+    A passive load draws negative-sequence current whatever its power does. Where there is none the
     answer of P and Q to the voltage decides: a load's |P| falls with U and returns, and so does its
     inductive Q; a converter keeps P or the current, or reverses.
+
+    Parameters
+    ----------
+    U, P, Q : (N,)
+        Voltage and powers.
+    polarity : int
+        The direction that the negative sequence shows: 1 as a load's, -1 reversed, 0 where it shows
+        none.
+    calm : (N,) bools
+        The state to compare with; by default the one that lasts longest.
+
+    Returns
+    -------
+    str
+        One clause; "" where P is not negative.
     """
     valid = np.isfinite(U) & np.isfinite(P) & np.isfinite(Q)
     if not valid.any() or (calm is not None and not (calm & valid).any()):

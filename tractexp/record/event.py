@@ -102,7 +102,20 @@ class Event:
 
 
 def noise(t: np.ndarray, values: np.ndarray) -> float:
-    """Standard deviation of `values` (N,) about their least-squares line, without gaps (nan)."""
+    """The standard deviation of values about their least-squares line.
+
+    Parameters
+    ----------
+    t : (N,) [s]
+        Times.
+    values : (N,)
+        Gaps (nan) do not count.
+
+    Returns
+    -------
+    float
+        In the unit of the values.
+    """
     valid = np.isfinite(values)
     if np.count_nonzero(valid) < 3:
         return float("nan")
@@ -112,17 +125,30 @@ def noise(t: np.ndarray, values: np.ndarray) -> float:
 
 
 def measure_promise(depth: float | None, noise_share: float | None) -> float:
-    """How much an event may tell: its depth over its noise, the share of P."""
+    """How much an event may tell: its depth over the noise, a share of P."""
     return (depth or 0.0) / max(noise_share or 0.0, LEAST_TOLD_NOISE)
 
 
 def detect(record: Record) -> Event:
-    """The first dip of a record; raises `UserError` for none, one that does not end, or one that
-    comes too early.
+    """Find the first dip of a record.
 
-    An interruption, an open pole and a step are refused by their names, and so is a load that steps
-    right before. The record begins after an earlier step and ends where its load changes after the
-    dip for another reason than the voltage; its notes say what was done.
+    The record begins after an earlier step and ends where its load changes after the dip for
+    another reason than the voltage; its notes say what was done.
+
+    Parameters
+    ----------
+    record : Record
+        With at least one dip.
+
+    Returns
+    -------
+    Event
+
+    Raises
+    ------
+    UserError
+        Where there is no dip, it does not end, or it comes too early. An interruption, an open pole
+        and a step are refused by their names, and so is a load that steps right before the dip.
     """
     dips, swells = falls(record.t, record.U)
     if not dips:

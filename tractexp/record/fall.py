@@ -70,13 +70,26 @@ def _level_before_trigger(
 
 
 def find_dips(t: np.ndarray, U: np.ndarray, trigger: float | None = None) -> list[tuple[int, int]]:
-    """All dips of a voltage (N,), in order of time, as (start, end) sample numbers; end = N if
-    never recovered.
+    """All dips of a voltage, in order of time.
 
-    A dip falls by more than 3 % (or six standard deviations of the sample noise) below a reference
-    that starts at the level of the first samples, follows slow changes, and starts anew after each
-    dip, and where a voltage that slid begins to fall. Rises are not dips, and a swell leaves the
+    A dip falls by more than 3 % (or six standard deviations of the sample noise) below a reference.
+    That starts at the level of the first samples, follows slow changes, and starts anew after each
+    dip and where a voltage that slid begins to fall. Rises are not dips, and a swell leaves the
     reference where it was.
+
+    Parameters
+    ----------
+    t : (N,) [s]
+        Times.
+    U : (N,)
+        Voltage, in any unit.
+    trigger : float or None [s]
+        When the recorder was triggered.
+
+    Returns
+    -------
+    list of (int, int)
+        First sample, and the first one after the dip: N where it never recovers.
     """
     return falls(t, U, trigger)[0]
 
@@ -124,8 +137,21 @@ def falls(
 
 
 def find_sudden_change(x: np.ndarray, within: int, least: float) -> int | None:
-    """The sample of x (N,) right before it first changes by more than `least` within so many
-    samples; None where it only slides.
+    """The sample right before a trace first changes suddenly.
+
+    Parameters
+    ----------
+    x : (N,)
+        The trace.
+    within : int
+        Samples within which a change is sudden.
+    least : float
+        What it exceeds.
+
+    Returns
+    -------
+    int or None
+        None where the trace only slides.
     """
     changes = x[within:] - x[:-within]
     sudden = np.abs(changes) > least
@@ -139,7 +165,13 @@ def find_sudden_change(x: np.ndarray, within: int, least: float) -> int | None:
 
 
 def measure_median(x: np.ndarray) -> float:
-    """The median of finite values (N,), N at least 1; of few much sooner than NumPy's."""
+    """The median of finite values (N,), N at least 1; of few it is much faster than NumPy's.
+
+    Examples
+    --------
+    >>> measure_median(np.array([3.0, 1.0, 2.0, 10.0]))
+    2.5
+    """
     low = (len(x) - 1) // 2
     high = len(x) // 2
     ordered = np.partition(x, (low, high))
@@ -147,15 +179,22 @@ def measure_median(x: np.ndarray) -> float:
 
 
 def measure_growing_medians(x: np.ndarray) -> np.ndarray:
-    """The medians (K, N) of the first 1, 2, ... N of finite values (K, N)."""
+    """The medians (K, N) of the first 1, 2, ... N of finite values (K, N).
+
+    Examples
+    --------
+    >>> measure_growing_medians(np.array([[3.0, 1.0, 2.0]])).tolist()
+    [[3.0, 2.0, 2.0]]
+    """
     at = np.arange(x.shape[1])
     ordered = np.sort(np.where(at <= at[:, None], x[:, None], np.inf), axis=2)
     return (ordered[:, at, at // 2] + ordered[:, at, (at + 1) // 2]) / 2
 
 
 def margin_of(U: np.ndarray) -> float:
-    """The share of the reference by which a dip must fall; a voltage that is gone has no noise to
-    exceed.
+    """The share of the reference by which a voltage (N,) must fall to be in a dip.
+
+    A voltage that is gone has no noise to exceed.
     """
     alive = U[DEAD_VOLTAGE_SHARE * U.max() < U]
     if len(alive) < FEWEST_BEFORE:
@@ -164,8 +203,15 @@ def margin_of(U: np.ndarray) -> float:
 
 
 def sample_noise(x: np.ndarray) -> np.ndarray:
-    """Standard deviation of the noise from sample to sample of x (..., N): robust, and blind to
-    slow changes.
+    """The standard deviation (...) of the noise of x (..., N) from sample to sample.
+
+    It is robust, and blind to slow changes: the median of the differences counts.
+
+    Examples
+    --------
+    >>> noise = np.random.default_rng(1).standard_normal(20000)
+    >>> round(float(sample_noise(0.01 * noise + np.linspace(0, 1, 20000))), 4)
+    0.01
     """
     return np.median(np.abs(np.diff(x)), axis=-1) / 0.6745 / np.sqrt(2)
 

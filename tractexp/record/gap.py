@@ -20,13 +20,47 @@ NAMED_TIMES = 3  # of bridged samples that are told
 
 
 def limit_wave_gap(rate: float, frequency: float) -> int:
-    """How many samples in a row are bridged of a wave, one at least."""
+    """The number of samples in a row, one at least, that are bridged of a wave.
+
+    Parameters
+    ----------
+    rate, frequency : float [Hz]
+        Of the samples, and of the network.
+
+    Returns
+    -------
+    int
+        A tenth of a cycle less one.
+
+    Examples
+    --------
+    >>> limit_wave_gap(4000, 50)
+    7
+    """
     return max(1, int(LONGEST_WAVE_GAP * rate / frequency) - 1)
 
 
 def find_short_gaps(missing: np.ndarray, most: int = 1) -> np.ndarray:
-    """The numbers (K,) of missing samples (N,) of which at most so many are in a row, between two
-    that are there.
+    """The missing samples that stand in short gaps, between two that are there.
+
+    Parameters
+    ----------
+    missing : (N,) bools
+        Which samples are missing.
+    most : int
+        The longest gap that is short, in samples.
+
+    Returns
+    -------
+    (K,) ints
+        None where more than 5 % of all samples are missing.
+
+    Examples
+    --------
+    >>> missing = np.zeros(100, dtype=bool)
+    >>> missing[[10, 50, 51]] = True
+    >>> find_short_gaps(missing).tolist()
+    [10]
     """
     if not missing.any() or missing.mean() > MOST_BRIDGED_SHARE:
         return np.empty(0, dtype=int)
@@ -43,11 +77,26 @@ def _number_runs(missing: np.ndarray) -> np.ndarray:
 
 
 def find_lost_rows(t: np.ndarray, most: int = 1) -> np.ndarray:
-    """The numbers (K,) of the rows before which rows of uniform times (N,) are missing, each as
-    often as rows are.
+    """The rows before which rows of uniform times are missing.
 
-    None where more than so many in a row are missing somewhere, or where the times are not uniform
-    but for that.
+    Parameters
+    ----------
+    t : (N,) [s]
+        Times.
+    most : int
+        The largest number of rows in a row that may be missing.
+
+    Returns
+    -------
+    (K,) ints
+        Each as often as rows are missing before it. None where more are missing somewhere, or where
+        the times are not uniform but for that.
+
+    Examples
+    --------
+    >>> t = np.delete(np.arange(100) * 0.01, 40)
+    >>> find_lost_rows(t).tolist()
+    [40]
     """
     none = np.empty(0, dtype=int)
     if len(t) < 4 or not np.isfinite(t).all():
@@ -65,18 +114,36 @@ def find_lost_rows(t: np.ndarray, most: int = 1) -> np.ndarray:
 
 
 def insert_missing(x: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Values (N,) with one that is missing (nan) before each of `rows` (K,)."""
+    """Values (N,) with one that is missing (nan) before each of the rows (K,).
+
+    Examples
+    --------
+    >>> insert_missing(np.array([1.0, 2.0]), np.array([1])).tolist()
+    [1.0, nan, 2.0]
+    """
     return np.insert(np.asarray(x, dtype=float), rows, np.nan)
 
 
 def insert_times(t: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Times (N,) with evenly spaced ones before each of `rows` (K,)."""
+    """Times (N,) with evenly spaced ones before each of the rows (K,).
+
+    Examples
+    --------
+    >>> insert_times(np.array([0.0, 2.0]), np.array([1])).tolist()
+    [0.0, 1.0, 2.0]
+    """
     missing = insert_missing(t, rows)
     return bridge_values(missing, np.flatnonzero(np.isnan(missing)))
 
 
 def bridge_values(x: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values (N,) in which those `at` (K,) lie on straight lines between the others."""
+    """Values (N,) in which those at the samples `at` (K,) lie on straight lines between the others.
+
+    Examples
+    --------
+    >>> bridge_values(np.array([1.0, np.nan, np.nan, 4.0]), np.array([1, 2])).tolist()
+    [1.0, 2.0, 3.0, 4.0]
+    """
     bridged = np.array(x, dtype=float)
     there = np.delete(np.arange(len(x)), at)
     bridged[at] = np.interp(at, there, bridged[there])
@@ -84,11 +151,28 @@ def bridge_values(x: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def estimate_wave_values(x: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """What a wave (N,) has at the missing samples `at` (K,), by the cubic through two on either
-    side of a gap.
+    """The values of a wave at missing samples, by the cubic through two on either side of a gap.
 
     Of 20 samples a cycle it is right to 0.2 %, of 64 to 2e-5, where one is missing. Where one of
-    the outer two is missing as well, by the straight line through the inner two.
+    the outer two is missing as well, the straight line through the inner two is taken.
+
+    Parameters
+    ----------
+    x : (N,)
+        The wave, nan where it is missing.
+    at : (K,) ints
+        The missing samples, none of them at an end.
+
+    Returns
+    -------
+    (K,) array
+
+    Examples
+    --------
+    >>> wave = np.arange(6.0) ** 3
+    >>> wave[3] = np.nan
+    >>> estimate_wave_values(wave, np.array([3])).round(9).tolist()
+    [27.0]
     """
     there = np.flatnonzero(~np.isnan(x))
     after = there[np.searchsorted(there, at)]
@@ -108,7 +192,13 @@ def estimate_wave_values(x: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def describe_bridged(times: Sequence[float]) -> str:
-    """How many samples were bridged, and when, as the beginning of a sentence."""
+    """The beginning of a sentence on bridged samples: how many, and at which times [s].
+
+    Examples
+    --------
+    >>> describe_bridged([0.1])
+    '1 sample missing at t = 0.1 s'
+    """
     when = ", ".join(f"{t:.6g}" for t in times[:NAMED_TIMES])
     more = f" and {len(times) - NAMED_TIMES} more" if len(times) > NAMED_TIMES else ""
     return f"{count_noun(len(times), 'sample')} missing at t = {when} s{more}"

@@ -117,7 +117,22 @@ def on_own_base(events: Sequence[Event]) -> list[Event]:
 
 
 def convert_base(event: Event, ratio: float, own: OwnBase) -> Event:
-    """An event on a base of `ratio` times the power. Voltages, times and frequencies stay."""
+    """An event on a base of `ratio` times the power.
+
+    Parameters
+    ----------
+    event : Event
+        As it is.
+    ratio : float
+        The new base over the present one.
+    own : OwnBase
+        What the new base is called in the note.
+
+    Returns
+    -------
+    Event
+        Its voltages, times and frequencies are as before.
+    """
     if isinstance(event, WaveEvent):  # its currents are per unit of the record's base
         return in_waves(convert_base(event.phasors, ratio, own))
     record = event.record
@@ -143,5 +158,13 @@ def convert_base(event: Event, ratio: float, own: OwnBase) -> Event:
 
 
 def scale_parameter(value: Scalable, power_exponent: int, ratio: float) -> Scalable:
-    """A parameter's value on a base of a `ratio`-th of the power."""
+    """The value of a parameter on a base of a `ratio`-th of the power.
+
+    Powers, torques and inertias have the exponent 1, impedances -1, times and ratios 0.
+
+    Examples
+    --------
+    >>> scale_parameter(0.5, 1, 2.0), scale_parameter(0.5, -1, 2.0)
+    (1.0, 0.25)
+    """
     return value * ratio**power_exponent

@@ -61,15 +61,18 @@ def cycle_means(y: np.ndarray, rate: float, frequency: np.ndarray, at: np.ndarra
 
 
 def one_cycle(rate: float, nominal: float) -> Averager:
-    """The plain mean over one cycle of the frequency really present, down to the lowest that is
-    tracked.
+    """The plain mean over one cycle of the frequency really present.
+
+    Its reach is that of a cycle of the lowest frequency that is tracked. `rate` is that of the
+    samples and `nominal` the network's frequency, both in Hz.
     """
     return Averager(int(rate / (SLOWEST * nominal) / 2 + 0.5) + 1, cycle_means)
 
 
 def make_weighted_averager(weights: np.ndarray) -> Averager:
-    """Means with these weights (2 reach + 1,), symmetric; by the fast Fourier transform, as windows
-    may be long.
+    """The averager of symmetric weights (2 reach + 1,).
+
+    It uses the fast Fourier transform, as windows may be long.
     """
     reach, weights = len(weights) // 2, weights / weights.sum()
 
@@ -86,7 +89,25 @@ def make_weighted_averager(weights: np.ndarray) -> Averager:
 
 
 def frame(f: np.ndarray, rate: float) -> np.ndarray:
-    """Angle (N,) [rad] of a frame that turns at the frequencies f (N,) [Hz], zero at sample 0."""
+    """The angle of a frame that turns at given frequencies.
+
+    Parameters
+    ----------
+    f : (N,) [Hz]
+        Frequencies, on straight lines between samples.
+    rate : float [Hz]
+        Of the samples.
+
+    Returns
+    -------
+    (N,) array [rad]
+        Zero at sample 0.
+
+    Examples
+    --------
+    >>> (frame(np.full(3, 50.0), 100.0) / np.pi).tolist()
+    [0.0, 1.0, 2.0]
+    """
     return np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) * np.pi / rate)])
 
 
@@ -98,17 +119,40 @@ def fundamental(
     means: Means = cycle_means,
     harmonics: Sequence[int] = (),
 ) -> np.ndarray:
-    """RMS phasors (..., M) of x (..., N) at the samples `at` (M,), about which whole windows must
-    lie inside.
+    """The RMS phasors of a waveform.
 
-    `rate` in samples per second, `frequency` in Hz, a number or (N,). The phasors are stamped at
-    the window's center, in the `frame` that turns at `frequency`. With `harmonics`, those of each
-    (H, ..., M), in frames as many times as fast.
+    In each window the least-squares sinusoid is taken, x = sqrt(2) Re(X e^{j phi}), so that a
+    phasor is exact at any frequency, where the plain DFT leaks its mirror image: with S and G the
+    weighted means of x e^{-j phi} and e^{-2 j phi}, the normal equation sqrt(2) S = X + G X* is
+    solved for X.
 
-    In the window the least-squares sinusoid is taken, x = sqrt(2) Re(X e^{j phi}), so a phasor is
-    exact at any `frequency`, where the plain DFT leaks its mirror image: with S and G the weighted
-    means of x e^{-j phi} and e^{-2 j phi}, the normal equation sqrt(2) S = X + G X* is solved for
-    X.
+    Parameters
+    ----------
+    x : (..., N)
+        Waveforms.
+    rate : float [Hz]
+        Of the samples.
+    frequency : float or (N,) [Hz]
+        At which the frame turns in which phasors are told.
+    at : (M,) ints
+        Samples at the centers of the windows, about which whole ones must lie inside.
+    means : function
+        The weighted means of an estimator.
+    harmonics : ints
+        Whose phasors are asked for, in frames as many times as fast; none: the fundamental.
+
+    Returns
+    -------
+    (..., M) or (H, ..., M) complex array
+        RMS, in the unit of x.
+
+    Examples
+    --------
+    >>> t = np.arange(400) / 4000
+    >>> x = 10 * np.sqrt(2) * np.cos(2 * np.pi * 48 * t + 0.5)
+    >>> X = fundamental(x, 4000, 48.0, np.array([200]))
+    >>> np.abs(X).round(3).tolist(), np.angle(X).round(3).tolist()
+    ([10.0], [0.5])
     """
     f = np.broadcast_to(np.asarray(frequency, dtype=float), x.shape[-1])
     angle = frame(f, rate)
@@ -121,33 +165,76 @@ def fundamental(
 
 
 def sequences(phases: np.ndarray) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Positive and negative sequence (N,) of three phase phasors (3, N), ordered a, b, c (Fortescue
-    1918).
+    """The positive and the negative sequence of three phases.
+
+    Parameters
+    ----------
+    phases : (3, N) complex
+        Phasors in the order a, b, c.
+
+    Returns
+    -------
+    (N,) complex array
+        Positive sequence, as phase a has it.
+    (N,) complex array
+        Negative sequence.
+
+    Notes
+    -----
+    Source: Fortescue 1918.
+
+    Examples
+    --------
+    >>> a = np.exp(-2j * np.pi / 3)
+    >>> positive, negative = sequences(np.array([[1.0], [a], [a**2]]))
+    >>> abs(positive).round(9).tolist(), abs(negative).round(9).tolist()
+    ([1.0], [0.0])
     """
     a, b, c = phases
     return (a + TURN * b + TURN**2 * c) / 3, (a + TURN**2 * b + TURN * c) / 3
 
 
 def symmetrical(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positive and negative sequence (N,) of phasors (3, N); of a single phase (1, N), itself and
-    zero.
+    """The positive and negative sequence (N,) of phasors (3, N); of a single phase (1, N) itself
+    and zero.
     """
     return sequences(X) if len(X) == 3 else (X[0], np.zeros_like(X[0]))
 
 
 def measure_turning(angle: np.ndarray, rate: float) -> np.ndarray:
-    """Frequency [Hz] at which a phasor's angle (N,) [rad] turns in its frame."""
+    """The frequency (N,) [Hz] at which a phasor's angle (N,) [rad] turns in its frame.
+
+    Examples
+    --------
+    >>> angle = 2 * np.pi * 0.5 * np.arange(5) / 100
+    >>> measure_turning(angle, 100.0).round(6).tolist()
+    [0.5, 0.5, 0.5, 0.5, 0.5]
+    """
     return np.gradient(np.unwrap(angle)) * rate / (2 * np.pi)
 
 
 def track(voltages: np.ndarray, rate: float, nominal: float, least: float = 0.0) -> np.ndarray:
-    """Frequency (N,) [Hz] of phase voltages (K, N), three or one, smoothed over 4 cycles, within 10
-    % of `nominal`.
+    """The frequency of phase voltages, sample by sample.
 
-    The mean speed of the positive-sequence voltage (of the one there is) over the span about each
-    sample. Three passes, each at the frequency that the previous one measured, remove the error of
-    the frequency from the phasors. A voltage below `least` has no angle: spans end before it, and
-    within the nominal frequency is taken.
+    It is the mean speed of the positive-sequence voltage (of the one there is) over 4 cycles about
+    each sample. Three passes, each at the frequency that the previous one measured, remove the
+    error of the frequency from the phasors. A voltage below `least` has no angle: spans end before
+    it, and within the nominal frequency is taken.
+
+    Parameters
+    ----------
+    voltages : (K, N)
+        Three phases, or one.
+    rate : float [Hz]
+        Of the samples.
+    nominal : float [Hz]
+        The network's frequency; the result is within 10 % of it.
+    least : float
+        In the unit of the voltages.
+
+    Returns
+    -------
+    (N,) array [Hz]
     """
     n, (every, reach, half) = voltages.shape[-1], _choose_tracking_grid(rate, nominal)
     at = np.arange(reach, n - reach, every)
@@ -165,8 +252,8 @@ def track(voltages: np.ndarray, rate: float, nominal: float, least: float = 0.0)
 
 
 def _speed(angle: np.ndarray, dead: np.ndarray, half: int) -> np.ndarray:
-    """Mean increase (M,) of an angle over `half` steps either way, or up to where it is dead; nan
-    where it is.
+    """The mean increase (M,) of an angle a step, over `half` steps either way or up to where it is
+    dead; nan where it is.
     """
     k, last = np.arange(len(angle)), len(angle) - 1
     early = np.maximum(k - half, np.maximum.accumulate(np.where(dead, k + 1, 0)))
@@ -188,8 +275,22 @@ def _choose_tracking_grid(rate: float, nominal: float) -> tuple[int, int, int]:
 
 @dataclass(frozen=True, eq=False)
 class Phasors:
-    """RMS phasors of one load at uniform times: of its three phases (K = 3) or of the only one (K =
-    1).
+    """RMS phasors of one load at uniform times.
+
+    Attributes
+    ----------
+    t : (M,) [s]
+        Times.
+    V : (K, M) complex [kV]
+        Phase to ground; of a single-phase load (K = 1) the voltage it is fed with.
+    I : (K, M) complex [kA]
+        Into the load.
+    f : (M,) [Hz]
+        At which the (positive-sequence) voltage turns.
+    more : {name: (M,)}
+        Powers of harmonics P_3, ..., P_H [MW] and distortions THD_u, THD_i.
+    bridged : tuple of float [s]
+        When samples were missing in the waveforms.
     """
 
     t: np.ndarray  # (M,) s
@@ -240,11 +341,20 @@ class Phasors:
 
 
 def join_phasors(parts: Sequence[Phasors]) -> Phasors:
-    """Phasors that follow each other without a gap as one, evenly spaced by the widest of their
-    steps.
+    """Join phasors that follow each other without a gap.
 
     The frame of each part is turned so that V1 goes on where the part before it ends; what no
     window saw at a change of rate is interpolated.
+
+    Parameters
+    ----------
+    parts : sequence of Phasors
+        In order of time.
+
+    Returns
+    -------
+    Phasors
+        Evenly spaced, by the widest of their steps.
     """
     if len(parts) == 1:
         return parts[0]
@@ -279,16 +389,38 @@ def measure(
     block: int = BLOCK,
     tracked: dict[int, np.ndarray] | None = None,
 ) -> Phasors:
-    """Phasors of `waves` (2 K, N) sampled at `rate` [Hz] from `start` [s], measured `block` samples
-    at a time, about.
+    """The phasors of sampled waveforms.
 
-    One phasor about every `step` seconds: the nearest whole number of samples. `skew` (2 K,) [s] is
-    how much later than the time stamp each channel is sampled. `window(rate, nominal)` is what the
-    estimator averages over. With `harmonics`, `more` has their powers P_3, ..., that of all but the
-    fundamental, P_H [MW], and the total distortions THD_u and THD_i. `tracked` has the frequencies
-    that were tracked in the blocks of the same voltages before, by their first sample, and gets
-    those that are tracked here: loads of one bus share it. N must span two cycles, and the window,
-    at least; raises `UserError` otherwise.
+    Parameters
+    ----------
+    waves : (2 K, N)
+        Voltages [kV], then as many currents [kA]; N spans two cycles, and the window, at least.
+    rate, nominal : float [Hz]
+        Of the samples, and of the network.
+    start : float [s]
+        Time of the first sample.
+    step : float [s]
+        Between phasors: the nearest whole number of samples.
+    skew : (2 K,) [s]
+        How much later than its time stamp each channel is sampled.
+    window : (rate, nominal) -> Averager
+        What the estimator averages over.
+    harmonics : ints
+        Whose powers are asked for, with that of all but the fundamental and the total distortions.
+    block : int
+        Samples that are measured at a time, about.
+    tracked : {first sample: frequencies}
+        Frequencies tracked before in the blocks of the same voltages, which loads of one bus share;
+        those that are tracked here are added.
+
+    Returns
+    -------
+    Phasors
+
+    Raises
+    ------
+    UserError
+        For waveforms that are too short.
     """
     n, K, over, every = (
         waves.shape[-1],
@@ -338,8 +470,8 @@ def measure(
 def _distortion(
     X: np.ndarray, squares: np.ndarray, power: np.ndarray, harmonics: Sequence[int]
 ) -> dict[str, np.ndarray]:
-    """Powers and distortion of phasors X (1 + H, 2 K, M), of waves with these mean `squares` and
-    products (`power`).
+    """The powers and distortions of phasors X (1 + H, 2 K, M), for waves with these mean squares
+    and products (`power`).
 
     Source: IEEE 1459-2010, 3.1.2: P_H = P - P_1 and THD = sqrt((V/V_1)^2 - 1), which count whatever
     is not the fundamental; of three phases together as in its effective values, 3.2.2.

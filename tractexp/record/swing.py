@@ -25,7 +25,17 @@ LEAST_PASSED = 0.3  # of an oscillation that a recorder's window leaves: of less
 
 @dataclass(frozen=True)
 class Swing:
-    """An oscillation of P or Q at a frequency [Hz]; the amplitude is a share of apparent power."""
+    """An oscillation of a load before an event.
+
+    Attributes
+    ----------
+    quantity : str
+        P or Q.
+    frequency : float [Hz]
+        Of the oscillation.
+    amplitude : float
+        As a share of the apparent power.
+    """
 
     quantity: str
     frequency: float
@@ -40,8 +50,19 @@ class Swing:
 
 
 def find_swing(record: Record, part: slice) -> Swing | None:
-    """The largest swing of the load within samples before an event that its voltage does not
-    explain; None without.
+    """The largest swing of a load before an event that its voltage does not explain.
+
+    Parameters
+    ----------
+    record : Record
+        Of the load.
+    part : slice
+        The samples before the event.
+
+    Returns
+    -------
+    Swing or None
+        None where there is none.
     """
     U, P, Q = (without_gaps(x[part]) for x in (record.U, record.P, record.Q))
     rate, fastest = record.rate, FASTEST_SHARE * record.base.frequency

@@ -29,6 +29,15 @@ ERROR = 2e-4  # pu: how exactly the average voltage must be the recorded one, if
 class Window:
     """A linear average: each phasor is the sum of weights times what was there at times about its
     stamp.
+
+    Attributes
+    ----------
+    name : str
+        Of the estimator.
+    at : (W,) [s]
+        Times about the stamp, increasing.
+    weights : (W,)
+        Their sum is 1.
     """
 
     name: str  # of the estimator
@@ -37,11 +46,18 @@ class Window:
 
     @property
     def length(self) -> float:
-        """From its first to its last weight [s]."""
+        """The length [s] of the window."""
         return float(self.at[-1] - self.at[0]) * len(self.at) / (len(self.at) - 1)
 
     def compute_weights(self, step: float) -> np.ndarray:
-        """Weights (odd,) of samples `step` [s] apart, for what is linear between them."""
+        """The weights (odd,) of samples `step` [s] apart, for what is linear between them.
+
+        Examples
+        --------
+        >>> window = Window("mean", np.array([-0.01, 0.01]), np.array([0.5, 0.5]))
+        >>> window.compute_weights(0.01).tolist()
+        [0.5, 0.0, 0.5]
+        """
         reach = int(np.ceil(np.abs(self.at).max() / step - 1e-9))
         weights = np.zeros(2 * reach + 2)
         whole, part = np.divmod(self.at / step, 1)
@@ -72,8 +88,22 @@ class Window:
 
 
 def mean_weights(samples: float) -> np.ndarray:
-    """What each sample around the middle one counts in the mean over a window of so many samples,
-    (odd,).
+    """The weights of samples in the mean over a window.
+
+    Parameters
+    ----------
+    samples : float
+        Length of the window in samples, not necessarily whole.
+
+    Returns
+    -------
+    (odd,) array
+        Around the middle sample, of sum 1, for what is linear between samples.
+
+    Examples
+    --------
+    >>> mean_weights(2.0).tolist()
+    [0.0, 0.25, 0.5, 0.25, 0.0]
     """
     whole, part = divmod(samples / 2, 1)
     half = np.zeros(int(whole) + 2)
@@ -85,11 +115,22 @@ def mean_weights(samples: float) -> np.ndarray:
 
 @np.errstate(invalid="ignore")  # what diverges stays what is not finite
 def average(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Mean of y (..., N) with weights (odd,) about each sample.
+    """The mean of a signal about each sample.
 
-    Beyond its ends y goes on as over its last window, with the trend from one window to the next: a
-    ring of whole cycles, such as the offset of a stator flux, would not average out at the ends of
-    a y that stood still there.
+    Beyond its ends the signal goes on as over its last window, with the trend from one window to
+    the next: a ring of whole cycles, such as the offset of a stator flux, would not average out at
+    the ends of a signal that stood still there.
+
+    Parameters
+    ----------
+    y : (..., N)
+        The signal.
+    weights : (odd,)
+        Of the samples about each, of sum 1.
+
+    Returns
+    -------
+    (..., N) array
     """
     most = len(weights) // 2
     cycle = max(round(1 / float(weights.max())), 1)
@@ -113,17 +154,44 @@ def average(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 @np.errstate(over="ignore")  # likewise
 def averaged_power(power: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The power (..., N) that a load draws at the voltage u (N,), as phasors of these weights show
-    it.
+    """The power of a load as phasors of a window show it.
+
+    The current, power over voltage, is averaged, and multiplied by the averaged voltage.
+
+    Parameters
+    ----------
+    power : (..., N) [pu]
+        What the load draws.
+    u : (N,) [pu]
+        The voltage that it sees.
+    weights : (odd,)
+        Of the window.
+
+    Returns
+    -------
+    (..., N) array [pu]
     """
     return average(power / u, weights) * average(u, weights)
 
 
 def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Event":
-    """The event with the voltage that the load saw, where the record's was average with weights
-    over `window` [s].
+    """The event with the voltage that the load saw.
 
-    That which bends least, weighted, among those whose average is the recorded one: least squares.
+    Of the voltages whose average is the recorded one, within its noise, it is the one that bends
+    least: weighted least squares. Near the edges of the dip it is free to bend.
+
+    Parameters
+    ----------
+    event : Event
+        As recorded.
+    weights : (odd,)
+        Of the recorder's window.
+    window : float [s]
+        Its length.
+
+    Returns
+    -------
+    Event
     """
     from scipy.linalg import cho_solve_banded
 
