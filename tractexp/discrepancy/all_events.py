@@ -25,8 +25,16 @@ from tractexp.record import Event
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """An explanation fitted to fitted and held-out events together, in coordinates of the fitted
-    ones.
+    """A set of effects fitted to fitted and held-out events together.
+
+    Attributes
+    ----------
+    fit : Refit
+        In coordinates of the fitted events.
+    louder : float
+        The deviance that it gains on all events, less what it gains on the fitted ones.
+    p_left : float
+        How often chance leaves as much of all events.
     """
 
     fit: Refit
@@ -103,7 +111,7 @@ class AllEvents:
         return each_apart(lambda fit: self._measure(fit, by_name[fit.names], seed), fits, effort)
 
     def compare(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
-        """Explanations fitted to all events from where they were, and what leaves something there
+        """Sets fitted to all events from where they were; what leaves something there is fitted
         from every setting, too.
         """
         joint = {t.fit.names: t for t in self.fit_jointly(alone, seed)}
@@ -116,8 +124,9 @@ class AllEvents:
         return list({**joint, **{t.fit.names: t for t in better}}.values())
 
     def without_each(self, fit: Refit) -> dict[str, Refit]:
-        """A set of several effects as it fits the fitted events without each of them, by the one
-        left out; from where the set fits, and from where it was found.
+        """{member: fit} of a set without each of its effects, to the fitted events.
+
+        Each begins from where the set fits, and from where it was found.
         """
         if len(fit.names) < 2:
             return {}
@@ -130,15 +139,15 @@ class AllEvents:
         return {left: fits[names] for left, names in rest.items()}
 
     def fit_to_all(self, fits: Mapping[str, Refit]) -> dict[str, Refit]:
-        """These, fitted to all events."""
+        """{member: fit} of given fits, fitted to all events."""
         joint = {key: best_of(self._refit(fit, anew=False))[0] for key, fit in fits.items()}
         return {key: replace(fit, unit=self._narrow(fit)) for key, fit in joint.items()}
 
     def p_left(self, local_minima: Sequence[np.ndarray], seed: int) -> float:
-        """How often chance leaves as much as the base model does of all events; 1 where it has no
+        """How often chance leaves as much of all events as the base model does; 1 where it has no
         steady state there.
 
-        `local_minima` (D,) are its own on the fitted events.
+        The fits begin at `local_minima` (D,), those on the fitted events.
         """
         if not np.isfinite(self.plain.deviance):
             return 1.0

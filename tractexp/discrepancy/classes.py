@@ -28,9 +28,17 @@ LEAST_PARTING = 0.01  # of the response: less is no difference to anyone
 
 @dataclass(frozen=True)
 class EffectClass:
-    """Sets that predict alike up to the dip `part_at`, where they differ by a share `by` of the
-    response; None where they do not part, and `by` is then the most that they differ by, nan where
-    the motor stalls in all.
+    """Sets of effects that predict alike.
+
+    Attributes
+    ----------
+    sets : tuple of tuples of names
+        The tied sets.
+    part_at : ImaginedDip or None
+        The dip from which on they differ; None where none of those tried parts them.
+    by : float
+        The share of the response by which they differ there; without such a dip the most that they
+        differ by, nan where the motor stalls in all.
     """
 
     sets: tuple[Names, ...]
@@ -95,8 +103,22 @@ def imagine_grid(context: Context, fits: Sequence[Refit]) -> list[ImaginedDip]:
 
 
 def measure_parting(power: Sequence[np.ndarray], drive: Drive, event: int) -> float:
-    """The largest rms difference of two sets in an event, over the rms of their mean response; nan
-    where the motor stalls or diverges in both of a pair, and infinite where in one.
+    """How far sets differ in an event.
+
+    Parameters
+    ----------
+    power : sequence of arrays [pu]
+        What each set calculates.
+    drive : Drive
+        The events.
+    event : int
+        Which of them, from 0.
+
+    Returns
+    -------
+    float
+        The largest rms difference of two sets over the rms of their mean response; nan where the
+        motor stalls or diverges in both of a pair, infinite where in one.
     """
     part = drive.part(event)
     changes = [one[:, part] - one[:, part][:, :1] for one in power]

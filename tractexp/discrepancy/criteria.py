@@ -132,9 +132,25 @@ class Criteria:
         return NAMING_SHARE * self.false_alarms
 
     def rejects(self, behind: Any) -> Any:
-        """Whether a rival this far behind the best set in Akaike's criterion is rejected; a number,
-        or an array (n,).
+        """Whether a set is rejected against the best one, by its relative likelihood exp(-behind /
+        2).
 
-        exp(-behind / 2) is its relative likelihood (Akaike 1978).
+        Parameters
+        ----------
+        behind : float or (n,)
+            How far it is behind in Akaike's criterion.
+
+        Returns
+        -------
+        bool or (n,) bools
+
+        Notes
+        -----
+        Source: Akaike 1978.
+
+        Examples
+        --------
+        >>> Criteria().rejects(3.0), Criteria().rejects(9.0)
+        (False, True)
         """
         return behind > -2 * math.log(self.rejected)

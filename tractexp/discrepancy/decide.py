@@ -38,8 +38,16 @@ CONFIRMED_SHARE = 0.5  # of what an event shows of a set: so much of it confirms
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """The word, and the sets kept: the one that the extended model has first. `complete`: nothing
-    but noise is left.
+    """What an investigation decides.
+
+    Attributes
+    ----------
+    word : str
+        `none`, `candidate`, `named`, `tied` or `unexplained`.
+    kept : tuple of SetEvidence
+        The sets that are kept; the extended model has the first.
+    complete : bool
+        Whether nothing but noise is left.
     """
 
     word: str
@@ -63,7 +71,19 @@ class Verdict:
 
 
 def decide(evidence: Evidence, criteria: Criteria) -> Verdict:
-    """The verdict on a table of evidence."""
+    """The verdict on a table of evidence: it fits nothing and writes nothing.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        One row a set of effects, with what is known of each.
+    criteria : Criteria
+        The thresholds.
+
+    Returns
+    -------
+    Verdict
+    """
     find_kept = find_predicting if evidence.is_predicted else find_explaining
     kept = find_kept(evidence, criteria)
     least_p = min(evidence.base.p_left, evidence.base.p_of_all)

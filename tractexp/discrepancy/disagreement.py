@@ -24,8 +24,24 @@ MISSED = 20.0  # factor by which scales that are not exact may miss p
 
 @dataclass(frozen=True, eq=False)
 class Disagreement:
-    """The tests at one fit: what each further effect would gain, what is left, and how often chance
-    does as much.
+    """The tests at one fit.
+
+    Attributes
+    ----------
+    fit : Refit
+        The fit.
+    noise : Noise
+        Under which it is tested.
+    tangent : Linearization
+        All differences there.
+    projection : ScoreTest
+        These, whitened and with the nuisances projected out.
+    chance : Chance
+        The null distribution of every statistic.
+    scores : list of Score
+        What each further effect would gain, the best first.
+    robust : (k, d) or None
+        Rows of the covariance where what is left is no noise; None: that of independent residuals.
     """
 
     fit: Refit
@@ -45,8 +61,8 @@ class Disagreement:
 
     @property
     def freedom(self) -> float:
-        """What standard errors stand on: samples, or blocks of them where what is left
-        is no noise.
+        """The degrees of freedom of standard errors: samples, or blocks of them where what is
+        left is no noise.
         """
         fitted = self.root.shape[1]
         if self.robust is None:
@@ -76,33 +92,33 @@ class Disagreement:
 
     @property
     def p_by_test(self) -> dict[str, float]:
-        """How often chance leaves as much, by each test."""
+        """{test: p}: how often chance leaves as much as this fit."""
         return self.goodness_of_fit.p_by_test
 
     @property
     def p_left(self) -> float:
-        """How often it does by the most significant test, corrected for their number."""
+        """The p of the most significant test, corrected for their number."""
         return self.goodness_of_fit.p
 
     @property
     def adequate(self) -> bool:
-        """Whether chance alone may leave as much."""
+        """Whether chance alone may leave as much as this fit."""
         return self.p_left >= self.criteria.adequate_p
 
     @property
     def is_undecided(self) -> bool:
-        """Whether the draws leave that open: their scales are not exact."""
+        """Whether the draws leave it open if the fit is adequate: their scales are not exact."""
         level = self.criteria.adequate_p
         return not self.chance.scales and level / MISSED < self.p_left < level * MISSED
 
     @property
     def loudest(self) -> str:
-        """What stands out most of that which this fit leaves."""
+        """The name of the most significant test."""
         return self.goodness_of_fit.most_significant_test
 
     @property
     def parameters_at_bound(self) -> list[str]:
-        """Parameters that rest on a bound: better values lie beyond it."""
+        """The names of parameters that rest on a bound: better values lie beyond it."""
         names = {k: name for name, k in self.context.coordinates.column.items()}
         return [names[k] for k in self.tangent.held]
 
@@ -137,18 +153,46 @@ class Disagreement:
 
 
 def disagreement(base: BaseFit, seed: int) -> Disagreement:
-    """The disagreement of the base model with the records."""
+    """The tests of the base model's fit.
+
+    Parameters
+    ----------
+    base : BaseFit
+        The base model's own fit.
+    seed : int
+        Of the draws.
+
+    Returns
+    -------
+    Disagreement
+    """
     return examine_fit(base.quiet, base.fit, base.noise, seed)
 
 
 def examine_fit(
     quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool = False
 ) -> Disagreement:
-    """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it
-    as known.
+    """Make all tests at one fit, under the noise of what no candidate explains there.
 
     Taken as known the noise makes every test sharper: what even those do not doubt needs no draws
     that estimate it anew, which cost a hundred times as much.
+
+    Parameters
+    ----------
+    quiet : QuietNoise
+        What estimates the noise.
+    fit : Refit
+        Where the tests are made.
+    noise : Noise
+        Under which it was fitted.
+    seed : int
+        Of the draws.
+    plain : bool
+        Whether the noise is taken as known.
+
+    Returns
+    -------
+    Disagreement
     """
     context = quiet.context
     t = tangent(context, fit, noise)

@@ -197,8 +197,8 @@ def refit_sets(context: Context, noise: Noise, begin: Sequence[Start]) -> list[R
 
 
 def beneath(first: Disagreement, fit: Refit) -> Disagreement:
-    """The tests of the base model in the valley of a fit with an effect, where its best fit lies in
-    another.
+    """The tests of the base model at the local minimum of a fit with an effect, where its best fit
+    is another.
     """
     context = first.context
     bare = refit(
@@ -266,8 +266,10 @@ def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) 
 
 
 def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
-    """The sets of `size` effects that lower the linearised deviance most: from the base fit, and by
-    adding one; of more than are named by adding one alone.
+    """The sets of `size` effects that lower the linearized deviance most.
+
+    They begin at the base fit and at sets that have one effect less; of more effects than are
+    named, at the latter alone.
     """
     first, last = steps[0], steps[-1]
     sets: dict[Names, float] = {}

@@ -25,12 +25,21 @@ LEAST_DISTINCT_PUSH = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """What a model calculates of all events end to end, (C, N) [pu], and what is left against the
-    measurement.
+    """What a model calculates of all events end to end, and what it leaves.
 
-    Of waveforms P and Q are those that the record's estimator sees in calculated and in recorded
-    currents, and `epsilon_i` is what the currents miss; over several events it is the rms of
-    theirs. `error` is the model's.
+    Attributes
+    ----------
+    calculated : (C, N) [pu]
+        P and Q, or currents.
+    epsilon_p, epsilon_q : float
+        Relative errors of Eq. (20), as fractions; of waveforms those of P and Q that the record's
+        estimator sees in calculated and in recorded currents.
+    deviance, chi2_per_sample : float
+        The sum of squares of whitened residuals, and that per sample.
+    error : ModelError
+        The model's error.
+    epsilon_i : float or None
+        That of the currents, over several events the rms of theirs.
     """
 
     calculated: np.ndarray
@@ -44,13 +53,30 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class GapTest:
-    """The model's error before and after, and whether these events bear the extension out.
+    """The model's error before and after, and whether some events bear the extension out.
 
-    `gain` is the deviance gained, `expected` what a true explanation would gain, the squared
-    distance of both curves in standard deviations; a true one scatters about it by twice its root.
-    `left` is what pushes into the balances would still gain beyond chance: a measure sharper than
-    the model's error where the gap is no larger than the noise. `by_event` (E,) is what of that is
-    expected of each event. `units` (2, D) are the coordinates of both models in `context`.
+    Attributes
+    ----------
+    before, after : Curves
+        Of the base and of the extended model.
+    gain : float
+        The deviance gained.
+    left : float
+        What injected perturbations would still gain beyond chance: sharper than the model's error
+        where the gap is no larger than the noise.
+    expected : float
+        What a true explanation would gain: the squared distance of both curves in standard
+        deviations. A true one scatters about it by twice its root.
+    shown : float
+        The gain from which the events show the extension.
+    noise : Noise
+        Of the events.
+    context : Context or None
+        The events and models.
+    units : two (D,) arrays
+        Coordinates of both models in `context`.
+    by_event : E floats
+        What of `expected` is of each event.
     """
 
     before: Curves
@@ -92,7 +118,13 @@ class GapTest:
 
 
 def share_gone(factor: float) -> float:
-    """The share of squares that is gone where their root is divided by a factor."""
+    """The share of squares that is gone where their root is divided by a factor.
+
+    Examples
+    --------
+    >>> share_gone(2.0)
+    0.75
+    """
     return 1 - 1 / factor**2
 
 
@@ -138,11 +170,28 @@ def gap(
     without: Sequence[str] = (),
     changes: np.ndarray | None = None,
 ) -> GapTest:
-    """Compare a fit of the base model, or of one with the effects `without`, and that with the
-    named effects on the events of `context`.
+    """Compare two fits on the events of a context.
 
-    Coordinates `fitted` were fitted to these events in the extended model. What is left is what
-    `changes` (c, C N) would still gain, by default pushes into the balances.
+    Parameters
+    ----------
+    context : Context
+        The events and models.
+    base, extended : (D,)
+        Coordinates of both fits.
+    names : names
+        Effects of the extended one.
+    noise : Noise
+        Of the events.
+    fitted : columns
+        Coordinates that were fitted to these events in the extended model.
+    without : names
+        Effects of the base one.
+    changes : (c, C N) or None
+        Whitened changes that could still gain; None: injected perturbations of the balances.
+
+    Returns
+    -------
+    GapTest
     """
     before, after = curves(context, base, noise, without), curves(context, extended, noise, names)
     gained = before.deviance - after.deviance
@@ -176,8 +225,8 @@ def gap(
 def compute_pushed_changes(
     context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise
 ) -> np.ndarray:
-    """What pushes into all balances in all windows change at coordinates (D,),
-    whitened (c, C N).
+    """The changes (c, C N), whitened, that perturbations of all balances in all windows make at
+    coordinates (D,).
     """
     points, _ = perturbations(context, unit)
     return context.whiten(noise, context.changes(unit, points, names, [PUSHES] * len(points)))
@@ -191,10 +240,28 @@ def beyond_chance(
     fitted: Sequence[int] | np.ndarray,
     changes: np.ndarray,
 ) -> float:
-    """How much more than chance `changes` (c, C N) would still lower the deviance at coordinates
-    (D,).
+    """By how much more than chance some changes would still lower the deviance.
 
-    Unbiased: the energy in their space less its dimension, what is `fitted` projected out.
+    It is unbiased: the energy in their space less its dimension, what is fitted projected out.
+
+    Parameters
+    ----------
+    context : Context
+        The events and models.
+    unit : (D,)
+        Coordinates of the fit.
+    names : names
+        Its effects.
+    noise : Noise
+        Of the events.
+    fitted : columns
+        Coordinates that were fitted to these events.
+    changes : (c, C N)
+        Whitened.
+
+    Returns
+    -------
+    float
     """
     raw = context.residuals(np.concatenate([unit[None], two_sided(unit, fitted)[0]]), names)
     rows = np.nan_to_num(context.whiten(noise, raw))

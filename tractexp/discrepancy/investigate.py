@@ -234,7 +234,7 @@ class Findings:
 
     @property
     def final_grade(self) -> GradedModel:
-        """The same of the model that the investigation ends with."""
+        """The model that the investigation ends with, as an identification grades it."""
         return self.grade_of(self.names)
 
     def grade_of(self, names: Sequence[str]) -> GradedModel:
@@ -261,8 +261,8 @@ class Findings:
         return {name: value for name, value in self.undetermined_values.items() if name not in own}
 
     def misfits(self, graded: GradedModel) -> tuple[Misfit, Misfit | None]:
-        """How far off a graded model is on the events that were to be fitted, and on those that
-        were to be held out.
+        """How far off a graded model is on the events that were to be fitted, and on those held
+        out.
         """
         split = len(self.grader.train)
         fitted = graded.fits[:split]
@@ -270,7 +270,9 @@ class Findings:
         return Misfit.from_fits(fitted), Misfit.from_fits(held_out) if held_out else None
 
     def select_misfit(self, graded: GradedModel) -> Misfit:
-        """The same on the held-out events, where there are any."""
+        """How far off a graded model is on the held-out events; on the fitted ones where there
+        are none.
+        """
         fitted, held_out = self.misfits(graded)
         return held_out or fitted
 
@@ -409,17 +411,43 @@ def investigate(
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,
 ) -> Findings:
-    """Find where model and records disagree, name what is missing, add it, and measure how the gap
-    shrinks.
+    """Find where model and records disagree, name what is missing, add it, and measure the gap.
 
-    `bounds` {name: (lower, upper)} and `fixed` {name: value} are of the base model's parameters,
-    `only` names the effects that are tested (none: all), `substeps` the Runge-Kutta steps per
-    sample (None: as many as needed).
+    Parameters
+    ----------
+    model : Model
+        The base model.
+    train, validate : sequences of Event
+        The events that are fitted, and those that are held out to judge what is found.
+    bounds : {name: (lower, upper)}
+        Of the base model's parameters, in their units.
+    fixed : {name: value}
+        Parameters that are held.
+    only : names
+        The effects that are tested; none: all.
+    substeps : int or None
+        Runge-Kutta steps per sample; None: as many as needed.
+    criteria : Criteria or None
+        The thresholds of the decisions.
+    priors : bool
+        Whether the motor is held to what machines usually are, where more than noise is left.
+    shown : names
+        Effects that the base model has because its records show them.
+    search : Problem -> (d,)
+        The free values at which an identification's search ends; None: there is no search.
+    seed : int
+        The same seed gives the same bits.
+    tell : line -> None
+        Called at each stage.
 
-    `priors` hold the motor where more than noise is left, as in an identification. Of grades are
-    `shown`, effects that the base model has because its records show them, and `search`, which
-    gives the free values (d,) that an identification's search ends at. Raises `UserError` for wrong
-    events or names.
+    Returns
+    -------
+    Findings
+
+    Raises
+    ------
+    UserError
+        For wrong events or names.
     """
     criteria = criteria or Criteria()
     train, validate = (domain_of(model).events(events) for events in (train, validate))

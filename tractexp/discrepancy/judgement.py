@@ -19,7 +19,9 @@ TESTABLE = 0.8
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the data say of one effect, and its score where it has one."""
+    """What the data say of one effect of the catalogue: a status, the reason, and the score where
+    it has one.
+    """
 
     name: str
     status: str

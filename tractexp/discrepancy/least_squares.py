@@ -25,8 +25,9 @@ from tractexp.noise import Noise
 
 
 def residual_noise(context: Context, fit: Refit) -> Noise:
-    """White noise of the size of what a fit leaves, the same in each channel: under it the deviance
-    is the sum of squares that names are judged by.
+    """White noise as loud as what a fit leaves, alike in each channel.
+
+    Under it the deviance is the sum of squares by which names are judged.
     """
     residual = context.residuals(fit.unit[None], fit.names)[0]
     level = float(np.sqrt(np.mean(residual[context.valid] ** 2)))

@@ -20,12 +20,26 @@ from tractexp.record import Event
 
 @dataclass(frozen=True, eq=False)
 class Overlay:
-    """One event as recorded, and what the models draw in it (C, n) [pu]: P and Q, or the currents
-    of a `WaveEvent`.
+    """One event as recorded, and as the models calculate it.
 
-    `after` is the extended model's where there is one, `nearest` that of the candidates which come
-    nearest where nothing explains. `driving` (n,) is the voltage that the load saw, `deviation` (C,
-    n) that of the noise.
+    Attributes
+    ----------
+    event : Event
+        As recorded.
+    held_out : bool
+        Whether it was held out.
+    driving : (n,) [pu]
+        The voltage that the load saw.
+    before : (C, n) [pu]
+        The base model's P and Q, or the currents of a `WaveEvent`.
+    after : (C, n) [pu] or None
+        Those of the extended model, where there is one.
+    nearest : (C, n) [pu] or None
+        Those of the candidates that come nearest, where nothing explains.
+    deviation : (C, n) [pu]
+        Standard deviation of the noise.
+    places : tuple of DisagreementInterval
+        Where base model and record disagree.
     """
 
     event: Event

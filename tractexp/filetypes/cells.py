@@ -53,8 +53,14 @@ GROUPED = {
 
 
 class BadCell(Exception):
-    """Cell `row` of a column is no number or no time; `why` ends the sentence that the place
-    begins.
+    """A cell of a column that is no number or no time.
+
+    Attributes
+    ----------
+    row : int
+        The cell's row, from 0.
+    why : str
+        The end of the sentence that the place begins.
     """
 
     def __init__(self, row: int, why: str) -> None:
@@ -64,12 +70,24 @@ class BadCell(Exception):
 
 
 def is_gap(cell: Any) -> bool:
-    """Whether a cell stands for a missing value."""
+    """Whether a cell stands for a missing value: it is empty or holds one of `GAPS`.
+
+    Examples
+    --------
+    >>> is_gap(None), is_gap("#REF!"), is_gap("0")
+    (True, True, False)
+    """
     return cell is None or (isinstance(cell, str) and cell.strip().lower() in GAPS)
 
 
 def is_number(cell: Any, decimal: str = ".") -> bool:
-    """Whether a cell is a number, written with that decimal mark."""
+    """Whether a cell is a number, written with that decimal mark.
+
+    Examples
+    --------
+    >>> is_number("1,5"), is_number("1,5", ",")
+    (False, True)
+    """
     try:
         _number(cell, decimal)
     except ValueError:
@@ -78,13 +96,29 @@ def is_number(cell: Any, decimal: str = ".") -> bool:
 
 
 def is_plain_number(cell: Any) -> bool:
-    """Whether a cell is a number written with either decimal mark."""
+    """Whether a cell is a number, written with a point or a comma."""
     return is_number(cell) or is_number(cell, ",")
 
 
 def group_mark(cell: Any, decimal: str) -> str:
-    """The mark between groups of three digits of a number, where it can be no decimal mark; ""
-    where there is none.
+    """The mark between groups of three digits of a number.
+
+    Parameters
+    ----------
+    cell : any
+        A cell of a table.
+    decimal : str
+        The decimal mark, "." or ",".
+
+    Returns
+    -------
+    str
+        "" where there is none, or where it could be a decimal mark.
+
+    Examples
+    --------
+    >>> group_mark("1,234,567", "."), group_mark("1,234", ".")
+    (',', '')
     """
     match = GROUPED[decimal].fullmatch(cell.strip()) if isinstance(cell, str) else None
     if match is None:
@@ -151,10 +185,33 @@ def _rises(values: Sequence[float]) -> bool:
 def numbers(
     cells: Sequence[Any], decimal: str = ".", gaps: bool = False, group: str = ""
 ) -> np.ndarray:
-    """The numbers (N,) of cells, nan for a gap where `gaps` are allowed; raises `BadCell` for what
-    is neither.
+    """The numbers of a column's cells.
 
-    `group` is the mark between groups of three digits, "" for none.
+    Parameters
+    ----------
+    cells : N cells
+        Texts or numbers.
+    decimal : str
+        The decimal mark, "." or ",".
+    gaps : bool
+        Whether a cell may stand for a missing value.
+    group : str
+        The mark between groups of three digits, "" for none.
+
+    Returns
+    -------
+    (N,) array
+        nan for a gap.
+
+    Raises
+    ------
+    BadCell
+        For the first cell that is no number, or is a gap where none may be.
+
+    Examples
+    --------
+    >>> numbers(["1.234,5", ""], ",", gaps=True, group=".").tolist()
+    [1234.5, nan]
     """
     values = np.empty(len(cells))
     for row, cell in enumerate(cells):
@@ -179,7 +236,7 @@ def numbers(
 
 
 def quote_cell(cell: Any) -> str:
-    """A cell in a message: of a list, of bytes or of a long text its beginning."""
+    """A cell as a message quotes it: of a long text its first 40 characters."""
     return f"'{cell!s:.40}'"
 
 

@@ -66,7 +66,24 @@ def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
 
 
 def load(path: Path, encoding: str | None = None) -> Recording:
-    """Read a raw report; raises `UserError` naming line, column and value of what is wrong."""
+    """Read a raw event report.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    encoding : str or None
+        Of its text; None: guessed from its letters.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    UserError
+        With line, column and value of what is wrong.
+    """
     opened = _open_report(path, encoding)
     report, remarks, t = opened.report, opened.remarks, opened.t
     if opened.per_cycle < FEWEST_WAVE_RATE:
@@ -110,12 +127,28 @@ def load(path: Path, encoding: str | None = None) -> Recording:
 
 
 def table(path: Path, encoding: str | None = None) -> Rows:
-    """The phasors of a filtered report, RMS and angles in a frame that turns at the nominal
-    frequency.
+    """Read a filtered event report as phasors.
 
     Two samples a quarter of a cycle apart are real and imaginary part: x_k + j x_(k-1), at four
     samples a cycle. The relay samples by the frequency that it tracks, so that this holds off the
-    nominal one. Raises `UserError` as `load`, and for a raw report.
+    nominal one.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    encoding : str or None
+        Of its text; None: guessed from its letters.
+
+    Returns
+    -------
+    Rows
+        RMS values, and angles in a frame that turns at the nominal frequency.
+
+    Raises
+    ------
+    UserError
+        As `load`, and for a raw report.
     """
     opened = _open_report(path, encoding)
     report, remarks, quarter = opened.report, opened.remarks, round(opened.per_cycle / 4)
@@ -246,7 +279,13 @@ def _read_tracked_frequency(
 
 
 def checksum(text: str) -> str:
-    """The checksum of a row up to its last comma: the sum of its bytes, four hexadecimal digits."""
+    """The checksum of a row up to its last comma: the sum of its bytes, as four hexadecimal digits.
+
+    Examples
+    --------
+    >>> checksum("AB")
+    '0083'
+    """
     return f"{sum(text.encode('latin-1', 'replace')) & 0xFFFF:04X}"
 
 

@@ -185,8 +185,18 @@ ELECTRICAL = frozenset(BY_UNIT.values())
 
 @dataclass(frozen=True)
 class Role:
-    """What a column is: `key` as in `data.columns`, the factor to the unit used inside, and what
-    the unit says.
+    """What a column of a table is.
+
+    Attributes
+    ----------
+    key : str
+        As in `data.columns`: U, P, Ua, I1_angle and the like.
+    unit : str
+        As the heading names it, "" where it does not.
+    line : bool or None
+        Whether a voltage is line to line; None where its name does not say it.
+    backward : bool
+        Whether its two phases are named the other way round, BA in place of AB.
     """
 
     # t, frac, soc, U, U2, P, Q, f, dfdt, day; Ua ... Uca, U1, Ia ..., Pa ...; an angle ends in
@@ -205,11 +215,25 @@ class Role:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """A header's name and its unit, "" where it has none: "Voltage [kV]", "U/kV", "Zeit in ms",
-    "P_MW".
+    """A column's name and its unit.
 
     A unit stands at the end: before its last letters nothing is looked for, which would take hours
     in a name of a million brackets.
+
+    Parameters
+    ----------
+    name : str
+        A heading.
+
+    Returns
+    -------
+    (str, str)
+        The unit is "" where there is none.
+
+    Examples
+    --------
+    >>> split_unit("Voltage [kV]"), split_unit("P_MW"), split_unit("speed")
+    (('Voltage', 'kV'), ('P', 'MW'), ('speed', ''))
     """
     name = name.strip().strip('"').strip("'").strip()
     before = name[:-LONGEST_NAME_END]
@@ -234,8 +258,22 @@ def is_unit(text: str) -> bool:
 
 
 def meaning(unit: str) -> tuple[str, float] | None:
-    """(quantity, factor to the unit used inside) of a unit; the quantity is "" of per unit. None
-    for no unit.
+    """What a unit means.
+
+    Parameters
+    ----------
+    unit : str
+        As written.
+
+    Returns
+    -------
+    (str, float) or None
+        The quantity ("" of per unit) and the factor to the unit used inside; None for no unit.
+
+    Examples
+    --------
+    >>> meaning("kW"), meaning("furlong")
+    (('power', 0.001), None)
     """
     if unit.strip() == "mW":
         return "power", 1e-9
@@ -244,8 +282,14 @@ def meaning(unit: str) -> tuple[str, float] | None:
 
 
 def factor(unit: str) -> float:
-    """From a unit to the one used inside, 1 for none; a setting's may have a number before it:
-    "89.8 kV".
+    """The factor from a unit to the one used inside (kV, kA, MW, Mvar, s); 1 for no unit.
+
+    A setting's unit may have a number before it.
+
+    Examples
+    --------
+    >>> factor("V"), factor("89.8 kV")
+    (0.001, 89.8)
     """
     number, unit = amount(unit)
     return number * (meaning(unit) or ("", 1.0))[1]
@@ -280,8 +324,26 @@ def _count_marks(named: Sequence[tuple[str, str]], order: str) -> int:
 
 
 def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
-    """What a column of that name and unit is, in a table with that order of phases; None for
-    anything else.
+    """What a column is, by its name and unit.
+
+    Parameters
+    ----------
+    name : str
+        Without the unit.
+    unit : str
+        "" where there is none.
+    order : str
+        The order of phases in the table.
+
+    Returns
+    -------
+    Role or None
+        None where the name says nothing that is known.
+
+    Examples
+    --------
+    >>> role("active power", "MW").key
+    'P'
     """
     words = _words(name)
     kind = unit_quantity(unit)

@@ -34,10 +34,24 @@ _SECTION = re.compile(
 
 
 def load(path: Path, encoding: str | None = None) -> Recording:
-    """Read a .cfg and the .dat beside it, or a .cff; raises `UserError` where they are missing, cut
-    short or disagree.
+    """Read a COMTRADE record: a .cfg and the .dat beside it, or a .cff.
 
-    `encoding` is that of the configuration; None: guessed from its letters.
+    Parameters
+    ----------
+    path : Path
+        Of the .cfg, .dat or .cff file.
+    encoding : str or None
+        Of the configuration; None: guessed from its letters.
+
+    Returns
+    -------
+    Recording
+        What was odd in the file is in its notes.
+
+    Raises
+    ------
+    UserError
+        Where files are missing, cut short or disagree.
     """
     path = Path(path)
     if path.is_dir():

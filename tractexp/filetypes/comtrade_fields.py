@@ -15,7 +15,13 @@ _DATE = re.compile(
 
 
 def number(text: str) -> float | None:
-    """A finite number as files write it, or None."""
+    """A finite number as files write it; None for any other text.
+
+    Examples
+    --------
+    >>> number(" 1.5D3 "), number("inf")
+    (1500.0, None)
+    """
     text = text.strip()
     if not _NUMBER.fullmatch(text):
         return None
@@ -29,9 +35,26 @@ def quote_field(text: str) -> str:
 
 
 def date(text: str, american: bool) -> tuple[datetime | None, str]:
-    """A date in whichever order its numbers allow, and a remark on it; None where they allow none.
+    """The date of a field, in whichever order its numbers allow.
 
-    `american`: the month is written first (1991).
+    Parameters
+    ----------
+    text : str
+        As in 31/12/2024,23:59:59.000000.
+    american : bool
+        Whether the month is written first, as in files of 1991.
+
+    Returns
+    -------
+    datetime or None
+        None where no order gives a day of the calendar.
+    str
+        A remark on how it was read; "" where nothing is odd.
+
+    Examples
+    --------
+    >>> date("31/12/2024,23:59:59.5", american=False)[0].isoformat()
+    '2024-12-31T23:59:59.500000'
     """
     match = _DATE.fullmatch(text.strip())
     if match is None:
@@ -57,7 +80,7 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
 
 
 def _full_year(year: int) -> int:
-    """A year of which two digits may be written: 70 to 99 are of the last century."""
+    """The year of which two digits may be written: 70 to 99 are of the last century."""
     if year >= 100:
         return year
     return year + (1900 if year >= 70 else 2000)

@@ -72,7 +72,9 @@ class Samples:
 
 
 def row(kind: str, analogs: int, digitals: int) -> np.dtype:
-    """One binary sample."""
+    """The structure of one binary sample: number, time stamp, analog values and words of 16
+    states.
+    """
     words = -(-digitals // 16)
     return np.dtype(
         [("n", "<u4"), ("t", "<u4"), ("a", VALUE[kind], (analogs,)), ("d", "<u2", (words,))]
@@ -334,7 +336,23 @@ def _narrow(column: np.ndarray) -> np.ndarray:
 
 
 def pack(states: np.ndarray) -> np.ndarray:
-    """States (N, D) as words (N, ceil(D/16)), the first channel in the lowest bit."""
+    """Pack states into words of 16 bits.
+
+    Parameters
+    ----------
+    states : (N, D) bools
+        Of D status channels.
+
+    Returns
+    -------
+    (N, ceil(D/16)) ints
+        The first channel is in the lowest bit.
+
+    Examples
+    --------
+    >>> pack(np.array([[True, False, True]])).tolist()
+    [[5]]
+    """
     count = -(-states.shape[1] // 16)
     padded = np.zeros((len(states), 16 * count), bool)
     padded[:, : states.shape[1]] = states

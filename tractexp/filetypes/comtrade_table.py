@@ -51,10 +51,25 @@ def _read_meanings(header: Header) -> tuple[set[str], set[str]]:
 
 
 def table(path: Path, encoding: str | None = None) -> Rows:
-    """The channels of a record as columns, on the primary side, in their units; the longest stretch
-    of one rate.
+    """Read a COMTRADE record of values, not of waveforms, as a table.
 
-    Raises `UserError` as `comtrade.load`.
+    Parameters
+    ----------
+    path : Path
+        Of the .cfg, .dat or .cff file.
+    encoding : str or None
+        Of the configuration; None: guessed from its letters.
+
+    Returns
+    -------
+    Rows
+        The channels as columns, on the primary side, in their units; the longest stretch of one
+        rate.
+
+    Raises
+    ------
+    UserError
+        As `comtrade.load`.
     """
     recording = comtrade.load(path, encoding)
     segment = max(recording.segments, key=lambda one: one.stop - one.first)

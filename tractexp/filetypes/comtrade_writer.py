@@ -27,12 +27,25 @@ FULL["ASCII"], FULL["UNSIGNED"] = (-99999, 99998), (0, 65534)
 def write(
     recording: Recording, path: Path, kind: str = "BINARY", revision: int = 2013
 ) -> list[Path]:
-    """Write a .cfg and .dat, or one .cff where `path` ends so; returns the files, each written
-    whole or not at all.
+    """Write a recording as COMTRADE, each file whole or not at all.
 
-    `kind` is BINARY (16 bits), BINARY32, FLOAT32 or ASCII (1999: BINARY or ASCII). Raw values that
-    do not fit go to the next kind that holds them exactly; FLOAT32, where chosen, rounds to 24
-    bits. Commas in names become semicolons.
+    Parameters
+    ----------
+    recording : Recording
+        Any; commas in names become semicolons.
+    path : Path
+        A .cff for one file; any other for a .cfg and a .dat.
+    kind : str
+        BINARY (16 bits), BINARY32, FLOAT32 or ASCII; of 1999 BINARY or ASCII. Raw values that do
+        not fit go to the next kind that holds them exactly; FLOAT32, where chosen, rounds to 24
+        bits.
+    revision : int
+        Year of the standard.
+
+    Returns
+    -------
+    list of Path
+        The files.
     """
     path = Path(path)
     check_choice("the ending of a COMTRADE file", path.suffix.lower(), (".cfg", ".cff"))

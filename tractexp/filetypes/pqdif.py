@@ -82,9 +82,25 @@ def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
 
 
 def load(path: Path, encoding: str | None = None) -> Recording:
-    """The waveforms: each observation of the channels that most have is a segment.
+    """Read the waveforms of a PQDIF file.
 
-    Raises `UserError` naming file and record of what is wrong, and for a file without waveforms.
+    Each observation of the channels that most have is a segment.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    encoding : str or None
+        Of its texts; None: guessed from their letters.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    UserError
+        With file and record of what is wrong, and for a file without waveforms.
     """
     remarks = Remarks(str(path))
     content = read_observations(path, encoding, [WAVEFORM], remarks)
@@ -236,10 +252,25 @@ def _moment(start: tuple[int, float], more: float, remarks: Remarks) -> datetime
 
 
 def table(path: Path, encoding: str | None = None) -> Rows:
-    """The logs of RMS values, powers and phasors, those of the times that most have.
+    """Read the logs of a PQDIF file: RMS values, powers and phasors.
 
-    Columns are named by what they are (UA, P, U1 angle), with the circuit where there are several.
-    Raises `UserError` for a file without logs.
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    encoding : str or None
+        Of its texts; None: guessed from their letters.
+
+    Returns
+    -------
+    Rows
+        At the times that most logs have. Columns are named by what they are (UA, P, U1 angle), with
+        the circuit where there are several.
+
+    Raises
+    ------
+    UserError
+        For a file without logs.
     """
     remarks = Remarks(str(path))
     content = read_observations(path, encoding, [LOG, PHASOR], remarks)

@@ -107,8 +107,25 @@ def check_there(path: Path) -> None:
 def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) -> bytes:
     """The content of an ordinary file, or its first bytes to a limit.
 
-    Raises `UserError` for what is none, has more bytes than `largest` or cannot be read,
-    `FileNotFoundError` where it is missing.
+    Parameters
+    ----------
+    path : Path or str
+        Of a file, or of one in a .zip.
+    limit : int or None
+        Bytes that are read; None: all.
+    largest : int
+        Bytes that a file has at most.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    UserError
+        For what is no ordinary file, is larger than `largest` or cannot be read.
+    FileNotFoundError
+        Where it is missing.
     """
     try:
         with open_ordinary_file(path) as file:
@@ -349,12 +366,28 @@ def _count_nodes(text: str, path: Path | str) -> None:
 def write(
     path: Path | str, content: str | bytes, *, lasting: bool = True, private: bool = False
 ) -> Path:
-    """Write a file in one move and return its path: a reader never sees half of it, a full disk
-    leaves none.
+    """Write a file in one move: a reader never sees half of it, and a full disk leaves none.
 
-    What is `lasting` has reached the disk when this returns, and outlives a loss of power; a cache
-    or a log need not wait for that. What is `private` nobody else can read. Raises `UserError`
-    where the folder or the file cannot be written.
+    Parameters
+    ----------
+    path : Path or str
+        Where it is written; its folder is created if need be.
+    content : str or bytes
+        Text is written as UTF-8.
+    lasting : bool
+        Whether it has reached the disk when this returns, and outlives a loss of power; a cache or
+        a log need not wait for that.
+    private : bool
+        Whether nobody else can read it.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    UserError
+        Where the folder or the file cannot be written.
     """
     path = Path(path)
     with _as_user_error(path), _make_part_file(path) as temporary:
@@ -533,8 +566,8 @@ def _try_lock(file: IO[bytes]) -> bool:
 
 
 def inside(path: Path, folder: Path) -> bool:
-    """Whether a file or folder, with everything below it, lies below `folder`, wherever links lead;
-    no pipes.
+    """Whether a file or folder, with everything below it, lies below another folder, wherever links
+    lead; pipes do not.
     """
     whole = folder.resolve()
     try:
@@ -619,8 +652,9 @@ def write_json(path: Path | str, content: Any, *, private: bool = False) -> Path
 
 
 def plain(content: Any) -> Any:
-    """Content as JSON knows it: dataclasses, NumPy's arrays, tuples and paths turned into plain
-    ones, nan into None.
+    """Content as JSON knows it.
+
+    Dataclasses, NumPy's arrays, tuples and paths are turned into plain ones, nan into None.
     """
     if isinstance(content, dict):
         return {str(key): plain(value) for key, value in content.items()}

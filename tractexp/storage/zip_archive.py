@@ -34,7 +34,9 @@ DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, Runtime
 
 
 def locate(path: Path | str) -> tuple[Path, str] | None:
-    """(archive, name within it) of a path that leads into a .zip; None of any other."""
+    """The archive, and the name within it, of a path that leads into a .zip; None of any other
+    path.
+    """
     if ENDING not in str(path).lower():
         return None
     whole = Path(path)

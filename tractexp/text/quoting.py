@@ -47,17 +47,31 @@ def _code(point: int) -> str:
 
 
 def modelica(text: str) -> str:
-    """A string of Modelica (specification 3.6, section 2.4.3), with its quotes."""
+    r"""A string of Modelica with its quotes.
+
+    Source: Modelica specification 3.6, section 2.4.3.
+
+    Examples
+    --------
+    >>> print(modelica('bus "A"'))
+    "bus \"A\""
+    """
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def html(text: str) -> str:
-    """Text in an element, or in an attribute with its quotes around."""
+    """A text as it stands in an element of HTML, or in an attribute with its quotes around.
+
+    Examples
+    --------
+    >>> html("<b>")
+    '&lt;b&gt;'
+    """
     return _html.escape(text)
 
 
 def unescape_html(text: str) -> str:
-    """What `html` was given."""
+    """The text that `html` was given."""
     return _html.unescape(text)
 
 
@@ -69,7 +83,13 @@ def script(data: Any) -> str:
 
 
 def markdown(text: str) -> str:
-    """Text in a line of Markdown, of a table, too."""
+    r"""A text as it stands in a line of Markdown, of a table, too.
+
+    Examples
+    --------
+    >>> print(markdown("a_b"))
+    a\_b
+    """
     return "".join(f"\\{c}" if c in MARKDOWN else c for c in " ".join(text.splitlines()))
 
 
@@ -81,7 +101,13 @@ def markdown_again(text: str) -> str:
 
 
 def fence_markdown(text: str) -> str:
-    """A block of code of Markdown, which no backticks in the text end."""
+    """A block of code of Markdown, which no backticks in the text end.
+
+    Examples
+    --------
+    >>> fence_markdown("``````").splitlines()[0]
+    '```````'
+    """
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
     return f"{fence}\n{text}\n{fence}"
 

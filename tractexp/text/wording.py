@@ -22,26 +22,46 @@ UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud80
 
 
 def escape_text(text: object) -> str:
-    """A text of others, such as a channel's name, for a terminal: its control characters as
-    `\\x1b`, but for lines.
+    """A text of others, such as a channel's name, as a terminal may print it.
+
+    Control characters stand as escapes; line breaks stay.
+
+    Examples
+    --------
+    >>> escape_text("bus" + chr(27) + "[31m").isprintable()
+    True
     """
     return UNSEEN.sub(lambda match: match[0].encode("unicode_escape").decode(), str(text))
 
 
 def one_line(text: object) -> str:
-    """As `shown`, where a line break would be a line of somebody else's."""
+    """As `escape_text`, in one line: a line break would be a line of somebody else's."""
     return escape_text(text).replace("\n", "\\n")
 
 
 def in_words(p: float) -> str:
-    """A probability for a sentence or a cell: '0.45', '0.00012', 'less than one in a million'."""
+    """A probability for a sentence or a cell.
+
+    Examples
+    --------
+    >>> in_words(0.4543), in_words(0.00012), in_words(1e-9)
+    ('0.45', '0.00012', 'less than one in a million')
+    """
     if p < NEGLIGIBLE:
         return "less than one in a million"
     return f"{p:.2g}" if p >= 1e-4 else _powers(p, 2)
 
 
 def with_error(value: float, error: float) -> str:
-    """A value to the digits that its standard error leaves: '0.022016 ± 0.000078'."""
+    """A value to the digits that its standard error leaves.
+
+    Examples
+    --------
+    >>> with_error(0.0220163, 7.78e-5)
+    '0.022016 ± 0.000078'
+    >>> with_error(0.25, float("nan"))
+    '0.25'
+    """
     if not (math.isfinite(error) and error > 0):
         return f"{value:.4g}"
     digits = 1 - math.floor(math.log10(error))
@@ -51,31 +71,61 @@ def with_error(value: float, error: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share of a whole that is itself estimated: what seems more than all of it is all, and less
-    than none, none.
+    """A share of a whole that is itself estimated, in percent: never below none or above all of it.
+
+    Examples
+    --------
+    >>> percent(0.234), percent(1.08)
+    ('23%', '100%')
     """
     return f"{min(max(share, 0.0), 1.0):.0%}"
 
 
 def epsilon(error: float | None) -> str:
-    """A relative error of Eq. (20); a record without that power has none."""
+    """A relative error of Eq. (20) in percent; "undefined" for a record without that power.
+
+    Examples
+    --------
+    >>> epsilon(0.0123), epsilon(None)
+    ('1.230%', 'undefined')
+    """
     return "undefined" if error is None or not math.isfinite(error) else f"{error:.3%}"
 
 
 def join_words(names: Sequence[str], last: str = "and") -> str:
-    """Names as a sentence lists them: 'a', 'a and b', 'a, b and c'."""
+    """Names as a sentence lists them.
+
+    Examples
+    --------
+    >>> join_words(["P"]), join_words(["P", "Q"]), join_words(["U", "P", "Q"], "or")
+    ('P', 'P and Q', 'U, P or Q')
+    """
     return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
 
 def list_first(names: Sequence[str], most: int) -> str:
-    """The first of some names, and how many more there are: "a, b and 4 more"."""
+    """The first of some names, and how many more there are.
+
+    Examples
+    --------
+    >>> list_first(["a", "b", "c", "d"], 2)
+    'a, b and 2 more'
+    """
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 
 
 def alternatives(sets: Sequence[Sequence[str]]) -> str:
-    """Sets of names as alternatives; many that share a name by that name and what may stand beside
-    it: 'a and b or c', 'a beside one more effect (b, c or d)'.
+    """Sets of names as alternatives.
+
+    Several that share a name are told by that name and what may stand beside it.
+
+    Examples
+    --------
+    >>> alternatives([["lag"], ["trip", "stall"]])
+    'lag or trip and stall'
+    >>> alternatives([["lag", "b"], ["lag", "c"], ["lag", "d"]])
+    'lag beside one more effect (b, c or d)'
     """
     if not sets:
         return ""
@@ -95,15 +145,27 @@ def alternatives(sets: Sequence[Sequence[str]]) -> str:
 
 
 def list_figures(values: Sequence[float], shown: Callable[[float], str]) -> str:
-    """Figures as a sentence lists them; of many the smallest and the largest."""
+    """Figures as a sentence lists them; of more than three the smallest and the largest.
+
+    Examples
+    --------
+    >>> list_figures([1.0, 2.0, 3.0, 4.0], str)
+    '1.0 to 4.0'
+    """
     if len(values) > FEWEST_GROUPED:
         return f"{shown(min(values))} to {shown(max(values))}"
     return join_words([shown(value) for value in values])
 
 
 def as_sentence(text: str) -> str:
-    """A clause as a sentence of its own: with a capital, unless it begins with a parameter's name,
-    and a full stop.
+    """A clause as a sentence of its own.
+
+    It begins with a capital, unless with a parameter's name, and ends with a full stop.
+
+    Examples
+    --------
+    >>> as_sentence("the motor stalls"), as_sentence("T_m is at its bound")
+    ('The motor stalls.', 'T_m is at its bound.')
     """
     return f"{text if '_' in text.split(' ')[0] else text[:1].upper() + text[1:]}."
 
@@ -114,17 +176,35 @@ def _powers(value: float, digits: int) -> str:
 
 
 def figure(value: float | None, digits: int = 4, unit: str = "") -> str:
-    """A number with so many significant digits and its unit; "" where there is none."""
+    """A number with so many significant digits and its unit; "" where there is none.
+
+    Examples
+    --------
+    >>> figure(0.123456, 3, "pu"), figure(None)
+    ('0.123 pu', '')
+    """
     return "" if value is None or value != value else f"{value:.{digits}g}{unit and ' '}{unit}"
 
 
 def change(before: float | None, after: float | None) -> str:
-    """A number before and after; a question mark where it is missing."""
+    """A number before and after; a question mark where one is missing.
+
+    Examples
+    --------
+    >>> change(1.0, None)
+    '1 to ?'
+    """
     return f"{figure(before) or '?'} to {figure(after) or '?'}"
 
 
 def count_noun(number: int, noun: str) -> str:
-    """1 dip, 2 dips."""
+    """A number with its noun.
+
+    Examples
+    --------
+    >>> count_noun(1, "dip"), count_noun(3, "dip")
+    ('1 dip', '3 dips')
+    """
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
@@ -149,6 +229,11 @@ def shown_in_words(shown: Mapping[str, str]) -> str:
 def shorten(sentence: str, longest: int = LONGEST_SENTENCE) -> str:
     """As many clauses of a sentence as there is room for, or words; an ellipsis says that there are
     more.
+
+    Examples
+    --------
+    >>> shorten("the motor stalls, and the load does not return", 25)
+    'the motor stalls ...'
     """
     if len(sentence) <= longest:
         return sentence

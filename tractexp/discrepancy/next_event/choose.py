@@ -156,10 +156,29 @@ def next_event(
     seed: int = 0,
     error: float = 0.0,
 ) -> NextEvent:
-    """Choose what to record to tell two rivals or more apart.
+    """Choose what to record next, to tell two rivals or more apart.
 
-    `bare` is the base model's fit, `noise` that under which all were fitted, `error` what the best
-    of the rivals misses of a response beyond the noise: it will miss as much of the next.
+    Parameters
+    ----------
+    context : Context
+        The records and models.
+    noise : Noise
+        Under which all rivals were fitted.
+    bare : Refit
+        The base model's fit.
+    rivals : sequence of Refit
+        The sets that are tied.
+    labels : sequence of str
+        Their names in sentences.
+    seed : int
+        Of the draws.
+    error : float
+        What the best of the rivals misses of a response beyond the noise: it will miss as much of
+        the next.
+
+    Returns
+    -------
+    NextEvent
     """
     context.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
     sides = [linearize_side(context, noise, fit) for fit in (bare, *rivals)]

@@ -27,11 +27,24 @@ HIGHEST_PHASOR_RATE = 5000.0  # Hz, of phasors
 
 @dataclass(frozen=True)
 class ImaginedDip:
-    """An event from the voltage before it back to that voltage: the phase turns by `jump` [degrees]
-    while it is low.
+    """An event from the voltage before it back to that voltage.
 
-    `rate` is how many times as fast as the records it is sampled, `unbalance` its negative sequence
-    over its depth.
+    Attributes
+    ----------
+    depth : float
+        Share by which the voltage falls.
+    duration : float [s]
+        From edge to edge.
+    jump : float [degrees]
+        By which the phase turns while it is low.
+    rate : int
+        How many times as fast as the records it is sampled.
+    unbalance : float
+        Negative sequence over the depth.
+    switched : bool
+        Whether it is the switching of a tap or a capacitor bank, and no dip.
+    domain : Domain
+        Phasors or waveforms.
     """
 
     depth: float

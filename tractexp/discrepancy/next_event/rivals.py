@@ -34,10 +34,28 @@ def event_for(
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,
 ) -> NextEvent:
-    """Fit sets of effects to all events and choose the event that tells them apart.
+    """Fit sets of effects to all events, and choose the event that tells them apart.
 
-    Raises `UserError` for fewer than two sets, and for effects that cannot be told on these events
-    or are no load's.
+    Parameters
+    ----------
+    model : Model
+        The base model.
+    events : sequence of Event
+        All of them are fitted.
+    rivals : sequence of names
+        Two sets of effects or more.
+    bounds, fixed, substeps, criteria, seed, tell
+        As of `tractexp.discrepancy.investigate.investigate`.
+
+    Returns
+    -------
+    NextEvent
+
+    Raises
+    ------
+    UserError
+        For fewer than two sets, and for effects that cannot be told on these events or are no
+        load's.
     """
     criteria = criteria or Criteria()
     sets = list(dict.fromkeys(tuple(sorted(names)) for names in rivals))

@@ -54,10 +54,16 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class EventView:
-    """An explanation on one new event: whitened prediction f (n,) and its differences K (k + 2, n),
-    P0, Q0 at last.
+    """An explanation on one new event.
 
-    nan where the model does not survive it.
+    Attributes
+    ----------
+    f : (n,)
+        Whitened prediction; nan where the model does not survive the event.
+    K : (k + 2, n)
+        Its derivatives, those by P0 and Q0 last.
+    missed : float
+        What the model misses beside the noise.
     """
 
     f: np.ndarray
