@@ -178,10 +178,32 @@ def test_a_button_goes_from_megawatts_to_per_unit_and_back(tmp_path):
     megawatts, per_unit, again = json.loads(re.search(r'id="told">(.*?)</p>', dom)[1])
     assert megawatts == again
     assert megawatts[:3] == ["in pu", "U [kV]", "P [MW]"]
-    assert per_unit[:3] == ["in MW and Mvar", "U [pu]", "P [pu]"]
+    assert per_unit[:3] == ["in physical units", "U [pu]", "P [pu]"]
     assert per_unit[3:5] == pytest.approx([10 / 49, 2], abs=1e-4)
     assert megawatts[3:5] == pytest.approx([27.5 * 10 / 49, 80], abs=1e-2)
     assert megawatts[5:] == per_unit[5:] == [True, "legendonly"]
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_currents_go_from_amperes_to_per_unit_and_back_with_all_their_samples(tmp_path):
+    i = np.sin(np.arange(5000) / 50)
+    chart = Chart("t [s]", ["i [pu]"]).samples("i", 0.0, 1e-3, i, BLUE)
+    chart.units(["i [A]"], [250.0]).limits(None, 1.0, 2.0)
+    powers = Chart("t [s]", ["P [pu]"]).line("P", np.arange(3), np.arange(3), BLUE)
+    script = """
+    const told = [], [button] = document.querySelectorAll("button.units"), [chart] = charts;
+    const tell = () => told.push([chart.layout.yaxis.title.text, chart.data[0].y.length,
+      Math.max(...chart.data[0].y), charts[1].data[0].y[2]]);
+    tell(); button.click(); tell(); button.click(); tell();
+    Plotly.relayout(chart, {"xaxis.range": [0, 4.999]}).then(() => { button.click(); tell();
+      document.getElementById("told").textContent = JSON.stringify(told); });"""
+    page = Report("units").chart(chart, "i").chart(powers.units(["P [MW]"], [40.0]), "P")
+    dom, complaints = drawn(Worked(page, script), tmp_path)
+    assert complaints == []
+    amperes, per_unit, again, whole = json.loads(re.search(r'id="told">(.*?)</p>', dom)[1])
+    assert amperes == again == ["i [A]", 1003, pytest.approx(250, abs=0.1), pytest.approx(80)]
+    assert per_unit == ["i [pu]", 1003, pytest.approx(1, abs=1e-3), pytest.approx(2)]
+    assert whole == ["i [pu]", 2000, pytest.approx(1, abs=1e-3), pytest.approx(2)]
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no browser")

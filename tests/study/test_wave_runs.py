@@ -93,7 +93,8 @@ def test_the_page_shows_currents_spectra_and_the_power_of_the_same_estimator(fit
     ):
         assert told in text, told
     axes = re.findall(r'"title":\{"text":"([^"]*)"\}', text)
-    assert {"u [kV]", "i_a [A]", "i_b [A]", "i_c [A]", "frequency [Hz]", "after [%]"} <= set(axes)
+    assert {"u [pu]", "i_a [pu]", "i_c [pu]", "frequency [Hz]", "after [%]"} <= set(axes)
+    assert '"labels":["u [kV]","i_a [A]","i_b [A]","i_c [A]","Δi [A]"]' in text
     assert any(axis.startswith("i_alpha [") for axis in axes)
     assert not any(axis.startswith("i_zero [") for axis in axes)  # not compared
 

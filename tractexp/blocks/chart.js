@@ -95,6 +95,7 @@ const readOut = (chart, t) => {
 };
 const zoomed = chart => {
   const picked = chart.data.map((trace, k) => k).filter(k => chart.data[k].samples);
+  if (!picked.length) return;
   const [from, to] = chart.layout.xaxis.range.map(Number);
   const made = picked.map(k => seen(chart.data[k].samples, from, to));
   Plotly.restyle(chart, {x: made.map(m => m.x), y: made.map(m => m.y)}, picked);
@@ -102,10 +103,15 @@ const zoomed = chart => {
 // Panels whose units are known: curves are kept as they were given, and shown times their panel's factor.
 let perUnit = false;
 const inUnits = ({own, units, titles}, data) => {
-  const scale = trace => perUnit ? 1 : units.factors[Number((trace.yaxis || "y").slice(1) || 1) - 1];
+  const factor = trace => perUnit ? 1 : units.factors[Number((trace.yaxis || "y").slice(1) || 1) - 1];
   const labels = perUnit ? titles : units.labels;
+  const scaled = (kept, by) => ArrayBuffer.isView(kept) ? kept.map(value => value * by) : kept;
+  data.filter(trace => trace.samples).forEach(trace => {
+    const {offset, scale} = trace.samples.own = trace.samples.own || {...trace.samples};
+    Object.assign(trace.samples, {offset: offset * factor(trace), scale: scale * factor(trace)});
+  });
   return {
-    curves: data.map((trace, k) => ArrayBuffer.isView(own[k]) ? own[k].map(value => value * scale(trace)) : own[k]),
+    curves: data.map((trace, k) => scaled(own[k], factor(trace))),
     axes: Object.fromEntries(labels.map((text, k) => [`yaxis${k ? k + 1 : ""}.title.text`, text])),
   };
 };
@@ -114,10 +120,13 @@ const switchUnits = () => {
   document.querySelectorAll("button.units").forEach(label);
   charts.filter(chart => chart.measures && chart.data).forEach(chart => {
     const {curves, axes} = inUnits(chart.measures, chart.data);
-    Plotly.update(chart, {y: curves}, axes);
+    const kept = chart.data.map((trace, k) => k).filter(k => !chart.data[k].samples);
+    if (kept.length) Plotly.restyle(chart, {y: kept.map(k => curves[k])}, kept);
+    Plotly.relayout(chart, axes);
+    zoomed(chart);
   });
 };
-const label = button => { button.textContent = perUnit ? "in MW and Mvar" : "in pu"; };
+const label = button => { button.textContent = perUnit ? "in physical units" : "in pu"; };
 const measure = (chart, data, layout, units) => {
   const axes = units.labels.map((_, k) => layout[`yaxis${k ? k + 1 : ""}`]);
   const own = data.map(trace => trace.y);

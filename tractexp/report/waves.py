@@ -13,7 +13,7 @@ from tractexp.domain.playback import AFTER
 from tractexp.identification.result import Fit
 from tractexp.inference.problem import Problem
 from tractexp.record import WaveEvent
-from tractexp.report.events import BAND_DEVIATIONS, EXCESS
+from tractexp.report.events import BAND_DEVIATIONS, EXCESS, find_base
 
 PHASES = ("a", "b", "c")
 SHOWN_CYCLES = 2.0  # shown at first before and after the dip
@@ -69,16 +69,15 @@ def wave_chart(
     """Voltages, then each phase's current as recorded and as calculated, and what the curves leave
     of it.
 
-    The dip is in view at first. Voltages are in kV, currents in A or kA. `deviation` (3, N) of the
-    noise [pu] draws a band around the currents `around` (3, N) and about zero; `places` have
-    `start` and `end` [s]: where more than chance is left of some current.
+    The dip is in view at first. `deviation` (3, N) of the noise [pu] draws a band around the
+    currents `around` (3, N) and about zero; `places` have `start` and `end` [s]: where more than
+    chance is left of some current.
     """
-    (kV, kA), part = event.peaks, slice(event.lead, None)
+    part = slice(event.lead, None)
     names = PHASES[: event.phases] if event.phases > 1 else ("",)
     measured = event.of_phases(np.nan_to_num(event.currents))[:, part]
-    unit, one = ("kA", kA) if kA * np.abs(measured).max() >= KILO else ("A", 1000 * kA)
     start, step = float(event.record.t[event.lead]), event.record.step
-    panels = ["u [kV]", *(f"i{f'_{n}' if n else ''} [{unit}]" for n in names), f"Δi [{unit}]"]
+    panels = ["u [pu]", *(f"i{f'_{n}' if n else ''} [pu]" for n in names), "Δi [pu]"]
     chart = Chart(
         "t [s]", panels, heights=[1.0, *[1.3] * len(names), 1.0], pixels=170 + 130 * len(panels)
     )
@@ -86,20 +85,18 @@ def wave_chart(
     for name, u, color in zip(
         names, event.of_phases(_voltage(event))[:, part], colors, strict=False
     ):
-        chart.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
+        chart.samples(f"phase {name}" if name else "voltage", start, step, u, color)
     if deviation is not None and around is not None:
-        _noise_bands(chart, event, one * deviation, one * around)
+        _noise_bands(chart, event, deviation, around)
     for first, last in _merge_intervals(places):
         chart.shade(first, last, EXCESS, 1 + event.phases, "more than chance leaves", opacity=0.2)
     for k in range(event.phases):
-        chart.samples("measured", start, step, one * measured[k], style.MEASURED, 1 + k, width=3)
+        chart.samples("measured", start, step, measured[k], style.MEASURED, 1 + k, width=3)
     for name, currents, color, dash in curves:
         calculated = event.of_phases(currents)[:, part]
         for k, phase in enumerate(names):
-            chart.samples(
-                name, start, step, one * calculated[k], color, 1 + k, width=1.3, dash=dash
-            )
-            rest = one * (measured[k] - calculated[k])
+            chart.samples(name, start, step, calculated[k], color, 1 + k, width=1.3, dash=dash)
+            rest = measured[k] - calculated[k]
             own = colors[k] if len(curves) == 1 and phase else color
             chart.samples(
                 f"phase {phase}" if own != color else name,
@@ -110,7 +107,22 @@ def wave_chart(
                 len(names) + 1,
                 dash=dash,
             )
+    if find_base(event.record) is not None:
+        _show_units(chart, panels, event.peaks, float(np.abs(measured).max()))
     return chart.edge(event.t_start).edge(event.t_end).limits(None, *_view(event))
+
+
+def _show_units(
+    chart: Chart, panels: Sequence[str], peaks: tuple[float, float], largest: float
+) -> None:
+    """Voltages are shown in kV, currents in A or kA; `peaks` are what one per unit is [kV, kA],
+    `largest` is that of the currents [pu].
+    """
+    kV, kA = peaks
+    current = ("kA", kA) if kA * largest >= KILO else ("A", 1000 * kA)
+    units = [("kV", kV), *[current] * (len(panels) - 1)]
+    labels = [panel.replace("pu", unit) for panel, (unit, _) in zip(panels, units, strict=True)]
+    chart.units(labels, [factor for _, factor in units])
 
 
 def _noise_bands(chart: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray) -> None:
