@@ -9,7 +9,7 @@ import tractexp
 from tractexp.blocks import Report
 from tractexp.blocks.block import Markup
 from tractexp.blocks.chart import Chart
-from tractexp.blocks.docx import LEFT_OUT
+from tractexp.blocks.docx import LEFT_OUT, TEXT_WIDTH
 from tractexp.blocks.drawing import draw_chart
 from tractexp.errors import UserError
 
@@ -48,6 +48,29 @@ def test_a_page_is_a_document_with_its_tables_charts_and_equations(tmp_path):
     assert len(document.inline_shapes) == 2  # the chart and the first equation
     width = document.sections[0].page_width - 2 * document.sections[0].left_margin
     assert all(shape.width <= width for shape in document.inline_shapes)
+
+
+def test_a_document_has_columns_by_their_words_and_equations_as_large_as_its_text(tmp_path):
+    docx = pytest.importorskip("docx", reason="the extra [word] is not installed")
+    from docx.oxml.ns import qn
+
+    page = Report("a").equation("a = b").equation(r"\frac{a + b + c + d}{b}")
+    page.table(["", "meaning"], [["C", " ".join(["words"] * 60)], ["x" * 64, "a sum"]])
+    page.table(["", ""], [["command", "tractexp a"], ["tractexp", "0.2"]])
+    document = docx.Document(str(page.save(tmp_path / "sheet.docx")))
+    small, large = document.inline_shapes
+    assert small.height < large.height < 3 * small.height
+    assert small.width < large.width
+    told, made = document.tables
+    narrow, wide = (column.width for column in told.columns)
+    assert 2 * narrow < wide
+    assert 0.99 < (narrow + wide) / docx.shared.Cm(TEXT_WIDTH) < 1.01
+    first_rows = [
+        one._tbl.tblPr.find(qn("w:tblLook")).get(qn("w:firstRow")) for one in (told, made)
+    ]
+    assert first_rows == ["1", "0"], "a table without a head has none"
+    assert all(row._tr.trPr.find(qn("w:cantSplit")) is not None for row in told.rows)
+    assert document.styles["Heading 1"].font.name == document.styles["Normal"].font.name
 
 
 def test_without_the_library_the_sentence_says_what_to_install(tmp_path, monkeypatch):

@@ -4,19 +4,28 @@ sentences, tables, and charts and equations as pictures.
 
 import io
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
 from tractexp.blocks.drawing import draw_chart, draw_equation
+from tractexp.blocks.style import FAINT
 from tractexp.errors import UserError
 from tractexp.storage import files
 
 PAPER, MARGIN = (21.0, 29.7), 2.0  # cm, A4
 TEXT_WIDTH = PAPER[0] - 2 * MARGIN
-EQUATION_HEIGHT = 0.9  # cm
+EQUATION_SCALE = 0.8  # of an equation as it is drawn, so that its letters are as large as the text
 TABLE_STYLE = "Light List Accent 1"
+FONT = "Arial"
+FONT_SIZES = {"Normal": 10, "Caption": 8, "Title": 20, "Heading 1": 13, "Heading 2": 11}  # points
+TABLE_FONT_SIZE = 9  # points
+LETTER, CELL_MARGIN = 0.18, 0.45  # cm of a table: one letter, both margins of a cell
+MOST_ROWS_TOGETHER = 12  # of a table that stands on one page
+LONGEST_WORD = 20  # letters that a column has room for; longer words, such as sums, are broken
+FIRST_ROW = 0x20  # of the flags by which a table's style is applied: there is a head
 LEFT_OUT = "What the page moves or folds away, such as sliders, is left out of this document."
 
 
@@ -33,6 +42,7 @@ def save_document(report: Report, path: Path) -> Path:
         ) from None
     document = docx.Document()
     _set_paper(document.sections[0])
+    _set_fonts(document)
     document.core_properties.title = report.title
     document.add_heading(report.title, 0)
     if report.lead:
@@ -81,14 +91,29 @@ def _set_paper(section: Any) -> None:
         setattr(section, f"{side}_margin", Cm(MARGIN))
 
 
-def _add_picture(document: Any, path: Path, height: float | None = None) -> None:
-    """A picture of that height [cm], as wide as the text where that is less."""
+def _set_fonts(document: Any) -> None:
+    """One font for text and headings, whose own are those of a theme; captions are no headings."""
+    from docx.shared import Pt, RGBColor
+
+    for name, size in FONT_SIZES.items():
+        style = document.styles[name]
+        style.font.name, style.font.size = FONT, Pt(size)
+        fonts = style.element.rPr.rFonts
+        for key in [key for key in fonts.attrib if key.endswith("Theme")]:
+            del fonts.attrib[key]
+    caption = document.styles["Caption"].font
+    caption.bold, caption.color.rgb = False, RGBColor.from_string(FAINT.removeprefix("#"))
+
+
+def _add_picture(document: Any, path: Path, scale: float | None = None) -> None:
+    """A picture of so much of its own size, at most as wide as the text; as wide as the text where
+    nothing is said.
+    """
     from docx.shared import Cm
 
-    shape = document.add_picture(str(path), height=None if height is None else Cm(height))
-    most = int(Cm(TEXT_WIDTH))
-    if height is None or shape.width > most:
-        shape.width, shape.height = most, round(shape.height * most / shape.width)
+    shape, most = document.add_picture(str(path)), int(Cm(TEXT_WIDTH))
+    width = most if scale is None else min(most, round(scale * shape.width))
+    shape.width, shape.height = width, round(shape.height * width / shape.width)
 
 
 def _add_equation(document: Any, latex: str, path: Path) -> None:
@@ -98,18 +123,73 @@ def _add_equation(document: Any, latex: str, path: Path) -> None:
         document.add_paragraph(latex)
         return
     files.write(path, drawn)
-    _add_picture(document, path, EQUATION_HEIGHT)
+    _add_picture(document, path, EQUATION_SCALE)
 
 
 def _add_table(document: Any, table: Table) -> None:
-    """A table with its title above and its caption below."""
+    """A table with its title above and its caption below; the end of a page parts no row and no
+    short table, and a long one has its head on each.
+    """
+    from docx.oxml import OxmlElement
+    from docx.shared import Cm
+
     if table.title:
         document.add_paragraph(table.title, style="Caption")
     head = [list(table.columns)] if any(table.columns) else []
     rows = [*head, *table.cells]
     grid = document.add_table(len(rows), len(table.columns), style=TABLE_STYLE)
+    grid.autofit = False
+    widths = [Cm(width) for width in share_width(rows)]
+    for column, width in zip(grid.columns, widths, strict=True):
+        column.width = width
+    left, together = {0, *table.words}, len(rows) <= MOST_ROWS_TOGETHER
     for line, row in zip(grid.rows, rows, strict=True):
-        for cell, text in zip(line.cells, row, strict=True):
-            cell.text = text
+        line._tr.get_or_add_trPr().append(OxmlElement("w:cantSplit"))
+        for k, (cell, text, width) in enumerate(zip(line.cells, row, widths, strict=True)):
+            cell.width = width
+            paragraph = _fill_cell(cell, text, to_the_right=k not in left)
+            paragraph.paragraph_format.keep_with_next = together and row is not rows[-1]
+    if head:
+        grid.rows[0]._tr.get_or_add_trPr().append(OxmlElement("w:tblHeader"))
+    else:
+        _take_off_head(grid)
     if table.caption:
         document.add_paragraph(table.caption, style="Caption")
+
+
+def _fill_cell(cell: Any, text: str, to_the_right: bool) -> Any:
+    """Write a text into a cell, close to its edges; its paragraph."""
+    from docx.enum.text import WD_ALIGN_PARAGRAPH
+    from docx.shared import Pt
+
+    (paragraph,) = cell.paragraphs
+    paragraph.add_run(text).font.size = Pt(TABLE_FONT_SIZE)
+    paragraph.paragraph_format.space_after = Pt(0)
+    if to_the_right:
+        paragraph.alignment = WD_ALIGN_PARAGRAPH.RIGHT
+    return paragraph
+
+
+def _take_off_head(grid: Any) -> None:
+    """Let the first row of a table without a head look like the others."""
+    from docx.oxml.ns import qn
+
+    look = grid._tbl.tblPr.find(qn("w:tblLook"))
+    look.set(qn("w:firstRow"), "0")
+    look.set(qn("w:val"), f"{int(look.get(qn('w:val')), 16) & ~FIRST_ROW:04X}")
+
+
+def share_width(rows: Sequence[Sequence[str]]) -> list[float]:
+    """Widths [cm] of a table's columns: each has room for its longest word where there is, and what
+    is left goes to those that need more lines.
+    """
+    columns = list(zip(*rows, strict=True))
+    words = [[len(word) for cell in column for word in cell.split()] for column in columns]
+    least = [CELL_MARGIN + LETTER * min(max(one, default=1), LONGEST_WORD) for one in words]
+    whole = [CELL_MARGIN + LETTER * max(map(len, column)) for column in columns]
+    if sum(whole) <= TEXT_WIDTH:
+        return [width * TEXT_WIDTH / sum(whole) for width in whole]
+    shrunk = min(1.0, TEXT_WIDTH / sum(least))
+    wanted = [max(a - b, 0.0) for a, b in zip(whole, least, strict=True)]
+    rest = (TEXT_WIDTH - shrunk * sum(least)) / (sum(wanted) or 1.0)
+    return [shrunk * a + rest * b for a, b in zip(least, wanted, strict=True)]
