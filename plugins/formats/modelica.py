@@ -41,11 +41,11 @@ class Modelica(Format):
             lines.append(
                 f"  parameter Real {p.name} = {load.values[p.name]!r} {quoting.modelica(about)};"
             )
-        for name, about in BEFORE.items():
+        own = {p.name for p in load.model.parameters}
+        for name in [*BEFORE, *sorted({*before} - {*BEFORE, *own})]:
             if any(_reads(right, name) for _, right in rows) or name in ("U0", "omega_s0"):
-                lines.append(
-                    f"  parameter Real {name} = {before[name]!r} {quoting.modelica(about)};"
-                )
+                about = quoting.modelica(BEFORE.get(name, "before the event"))
+                lines.append(f"  parameter Real {name} = {before[name]!r} {about};")
         lines += [f"  input Real U(start = U0) {quoting.modelica('voltage [pu]')};"]
         lines += [
             "  input Real omega_s(start = omega_s0)"
@@ -90,6 +90,7 @@ BEFORE = {
     "P0": "active power before the event [pu]",
     "Q0": "reactive power before the event [pu]",
     "U20": "negative-sequence voltage before the event [pu]",
+    "omega_before": "motor's speed before the event, less synchronous [rad/s]",
 }
 
 
@@ -133,6 +134,8 @@ def _modelica(expression):
 
         def _print_Float(self, expr):
             return repr(float(expr))
+
+        _print_Pi = _print_Float
 
     names = {"Max(": "max(", "Min(": "min(", "Abs(": "abs("}
     text = Printer({"full_prec": False}).doprint(

@@ -192,6 +192,7 @@ def modelica(text):
         ("double_cage", "constant_impedance", ()),
         ("none", "zip", ()),
         ("electromechanical", "exponential", ("stator_resistance",)),
+        ("electromechanical", "exponential", ("speed_dependent_torque",)),
     ],
 )
 def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
@@ -229,6 +230,23 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
     )
     assert pytest.approx(P, abs=1e-6) == response.P[0]
     assert pytest.approx(Q, abs=1e-6) == response.Q[0]
+
+
+def test_every_name_in_a_modelica_file_is_declared_in_it():
+    known = {"der", "time", "sqrt", "exp", "log", "max", "min", "abs", "if", "then", "else"}
+    known |= {"sin", "cos", "tan", "tanh", "atan", "atan2", "sign", "noEvent", "and", "or", "not"}
+    written = 0
+    for name in sorted(discover()["effect"]):
+        try:
+            text = write("modelica", identified("stator_flux", "exponential", (name,)))
+        except UserError:  # it is refused, or does not fit this model
+            continue
+        head, equations = re.sub(r'"[^"]*"', "", text).split("\nequation\n")
+        declared = {*re.findall(r"Real (\w+)", head), "end", "TractionLoad"}
+        used = {*re.findall(r"[A-Za-z_]\w*", re.sub(r"\d[\d.]*e[-+]?\d+", "", equations))}
+        assert used - declared <= known, name
+        written += 1
+    assert written > 20
 
 
 @pytest.mark.parametrize(
