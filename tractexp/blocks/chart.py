@@ -41,6 +41,7 @@ HOVER = "%{y:.5g}"
 DECADE = 20  # an axis that spans less has its ticks between powers of ten
 # points of a sampled line that are drawn at once: twice as many as a page is wide
 MOST_DRAWN_POINTS = 2000
+MOST_LOG_TICKS = 6  # of a vertical axis, where digits between powers of ten would overlap
 TICK = 28  # letters of a trace's name beside its axis
 GREATEST_CODE = 32767  # the greatest of 16 bits; the least stands for a gap
 
@@ -132,7 +133,7 @@ class Chart:
                 "linecolor": "#444",
             }
             if log:
-                axis |= {"type": "log", "exponentformat": "power"}
+                axis |= {"type": "log", "exponentformat": "power", "nticks": MOST_LOG_TICKS}
             axes[_axis("yaxis", k)] = axis
             top = low - PANEL_GAP
         return axes
