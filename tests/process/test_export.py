@@ -8,6 +8,7 @@ import json
 import re
 
 import andes_check
+import modelica_check
 import numpy as np
 import pytest
 from command_line import run_command
@@ -230,6 +231,15 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
     )
     assert pytest.approx(P, abs=1e-6) == response.P[0]
     assert pytest.approx(Q, abs=1e-6) == response.Q[0]
+
+
+def test_what_a_modelica_compiler_made_of_our_files_is_what_the_page_says():
+    rows = json.loads(modelica_check.ROWS.read_text(encoding="utf-8"))
+    assert len(rows) == len(modelica_check.LOADS)
+    for row in rows:
+        assert row["P"] < 1e-5 * row["moves_P"]
+        assert row["Q"] < 1e-5 * row["moves_Q"]
+    assert modelica_check.text() in modelica_check.PAGE.read_text(encoding="utf-8")
 
 
 def test_every_name_in_a_modelica_file_is_declared_in_it():
