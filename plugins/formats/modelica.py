@@ -118,7 +118,7 @@ def _equations(eq):
 
 def _modelica(expression):
     """An expression in Modelica's operators and functions."""
-    from sympy import Float, Rational
+    from sympy import Float, Rational, pi
     from sympy.printing.str import StrPrinter
 
     class Printer(StrPrinter):
@@ -135,11 +135,11 @@ def _modelica(expression):
         def _print_Float(self, expr):
             return repr(float(expr))
 
-        _print_Pi = _print_Float
-
     names = {"Max(": "max(", "Min(": "min(", "Abs(": "abs("}
     text = Printer({"full_prec": False}).doprint(
-        expression.evalf() if isinstance(expression, Float) else expression
+        expression.evalf()
+        if isinstance(expression, Float)
+        else expression.xreplace({pi: Float(pi)})
     )
     for python, modelica in names.items():
         text = text.replace(python, modelica)
