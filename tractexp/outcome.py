@@ -12,13 +12,16 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, fields
 from pathlib import Path
-from typing import Any, ClassVar, Self, get_origin
+from typing import TYPE_CHECKING, Any, ClassVar, Self, get_origin
 
 from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
 from tractexp.process.blas import in_one_thread
 from tractexp.storage import files
 from tractexp.text.progress import say
+
+if TYPE_CHECKING:
+    import pandas
 
 MARK = "tractexp"  # the key by which a saved result is known
 COMPUTING = ("report", "predict", "write_results", "write_drawings")  # methods of results
@@ -36,7 +39,7 @@ class Tabulated:
         """What a terminal and a notebook show; by default the table."""
         return Report().add(self.table())
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """The table as a pandas frame."""
         return self.table().to_frame()
 
@@ -153,6 +156,13 @@ class Written(Outcome):
     def screen(self) -> Report:
         """What a command prints of it: the answer on one screen; by default the summary."""
         return self.summary()
+
+    @property
+    def next_step(self) -> str:
+        """What a command ends with: what leads on, and the command that does it; "" where that
+        stands on the screen itself.
+        """
+        return ""
 
     def report(self) -> Report:
         """The page as a list of blocks: a notebook shows it, `save(path)` writes it.

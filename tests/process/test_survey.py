@@ -22,10 +22,12 @@ from made_recordings import constant, motor_dip, recording
 
 import tractexp
 from tractexp.api import surveying
+from tractexp.api.survey import Surveyed
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.recording import archive
+from tractexp.report.survey import UNREAD
 
 DEPTHS = {"shallow 1": 0.06, "deep 1": 0.5, "shallow 2": 0.08, "deep 2": 0.6, "shallow 3": 0.07}
 
@@ -61,6 +63,39 @@ def field(tmp_path_factory):
 @pytest.fixture(scope="module")
 def surveyed(field):
     return tractexp.survey(field, cores=1)
+
+
+def make_row(file, **changes):
+    """A row of a survey: a dip of a table, worth fitting."""
+    row = {"file": file, "event": f"{file}#1.1", "station": "", "load": file.partition(".")[0]}
+    row |= {"kind": "dip", "worth": True, "depth": 0.4, "noise": 0.01}
+    return row | {"command": f"tractexp data.train=[{file}]"} | changes
+
+
+@pytest.mark.parametrize(
+    ("rows", "command", "step"),
+    [
+        ([make_row("a.csv")], "", "fit a.csv#1.1: tractexp data.train=[a.csv]"),
+        (
+            [make_row("a.csv"), make_row("b.csv")],
+            "",
+            "fit each load to all its dips: tractexp task=station data.path=recs",
+        ),
+        ([make_row("a.csv")], "tractexp data=x", "fit them together: tractexp data=x"),
+        (
+            [make_row("a b.csv", worth=False)],
+            "",
+            "see why nothing is worth fitting: tractexp look 'recs/a b.csv'",
+        ),
+        (
+            [make_row("a.csv", worth=False, kind=UNREAD)],
+            "",
+            "see what can be read: tractexp list data",
+        ),
+    ],
+)
+def test_a_survey_ends_with_the_command_that_leads_on(rows, command, step):
+    assert Surveyed({"folder": "recs", "rows": rows, "command": command}).next_step == step
 
 
 def test_no_name_of_a_file_is_a_formula_of_the_table_or_a_program_of_the_page(tmp_path):

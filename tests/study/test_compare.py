@@ -832,7 +832,7 @@ def swept(tmp_path_factory):
     for path in older.iterdir():
         os.utime(path, (1, 1))
     write_sweep(folder / "outputs" / "sweeps" / "newer", runs)
-    return folder, compare_command("hydra.run.dir=out", cwd=folder)
+    return folder, compare_command("hydra.run.dir=out", "--all", cwd=folder)
 
 
 def test_the_command_compares_the_newest_sweep(swept):

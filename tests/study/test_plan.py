@@ -13,6 +13,7 @@ import pytest
 import uncertainty as study
 from command_line import run_command
 from pages import charts, read, unpacked
+from screens import LINES, count_rows
 
 import tractexp as public
 from tractexp.configuration.plugin import get
@@ -207,7 +208,9 @@ def test_the_plan_task_answers_with_a_number_and_a_figure(tmp_path):
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / "run" / "plan.json").read_text())
     assert 0.05 < content["depth_needed"] < 0.5
-    assert f"how deep? {content['answer']}" in done.stdout
+    assert done.stdout.startswith(f"how deep? {content['answer']}\n")
+    assert "next: until then, what these dips tell: tractexp task=profile" in done.stdout
+    assert len(count_rows(done.stdout)) <= LINES
     assert not list((tmp_path / "run").glob("*.svg"))
     scans = {"depth", "duration [s]", "samples per second", "noise, of P before the dip"}
     assert set(content["half_intervals"]) == scans

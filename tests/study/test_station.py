@@ -13,6 +13,7 @@ from command_line import run_command
 from made_station import MACHINES, SCATTER, make_station
 
 import tractexp
+from tractexp.api import station as station_call
 from tractexp.api import station_load
 from tractexp.errors import UserError
 from tractexp.identification.station import Dip, LoadSpec, fit_dips, predict_in_turn
@@ -108,7 +109,7 @@ def test_a_motor_of_another_size_has_the_same_constants():
     assert fit.torques == pytest.approx([0.4, 0.6], abs=0.01)
 
 
-def test_tables_of_one_folder_are_of_one_load(tmp_path):
+def test_tables_of_one_folder_are_of_one_load(tmp_path, monkeypatch):
     for load in ("north", "south"):
         (tmp_path / load).mkdir()
         for k in (0, 5):
@@ -121,6 +122,8 @@ def test_tables_of_one_folder_are_of_one_load(tmp_path):
         assert load["composition"]["varies"] == []
         assert [event["when"] for event in load["events"]] == [None, None]
     assert "dip, by its number" in found.report().html
+    monkeypatch.setattr(station_call, "find_folder", lambda: None)  # as from Python
+    assert found.next_step.startswith(f"find what {names[0]} lacks at its deepest dips: tractexp")
 
 
 def test_what_was_read_and_fitted_is_not_done_again(fitted, made, monkeypatch):
@@ -182,6 +185,7 @@ def test_the_command_goes_on_where_it_was(made, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert "24 dips fitted" in done.stdout
+    assert "next: export " in done.stdout
     (result,) = (tmp_path / "outputs" / "stations").glob("*/station.json")
     assert len(json.loads(result.read_text())["loads"]) == 2
 

@@ -20,6 +20,7 @@ from tractexp.outcome import Plain, Tabulated
 from tractexp.text import quoting
 
 if TYPE_CHECKING:
+    from tractexp.api.given import ModelGiven
     from tractexp.model.model import Model
     from tractexp.record import Event
 
@@ -207,7 +208,7 @@ class LoadModel(Portable, Plain, Tabulated):
 
 @public
 def compose(
-    model: Any = None,
+    model: "ModelGiven | None" = None,
     *,
     motor: str | Mapping[str, Any] | Sequence[Any] | None = None,
     static: str | Mapping[str, Any] | None = None,

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.read import GROUP, node_of
@@ -20,6 +20,9 @@ from tractexp.recording.cut import cut_recording
 from tractexp.recording.reader import WaveformReader
 from tractexp.storage.files import limit_time
 from tractexp.text.progress import console
+
+if TYPE_CHECKING:
+    from tractexp.api.given import Records, Setting
 
 WHAT = ("recording", "events")
 # s of waveforms kept about a dip's record, for the windows of its first and last phasors
@@ -47,11 +50,11 @@ class Converted(Tabulated):
 
 @public
 def convert(
-    *sources: Any,
+    *sources: "Records",
     to: str | None = None,
     what: str | None = None,
     folder: str | Path = ".",
-    **settings: Any,
+    **settings: "Setting",
 ) -> Converted:
     """Write files that can be read, or events that were read, as Parquet, CSV or COMTRADE.
 

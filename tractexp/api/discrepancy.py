@@ -38,6 +38,9 @@ from tractexp.text.wording import join_words, shorten, shown_in_words, with_erro
 NEXT = "next: "
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from tractexp.api.given import ModelGiven, Records, Source
     from tractexp.discrepancy.investigate import Findings as Steps
     from tractexp.discrepancy.readings import Reading
     from tractexp.tracking import TrackedRun
@@ -296,11 +299,20 @@ class Investigation(Written):
         errors = {name: at["standard_error"] for name, at in self.content["parameters"].items()}
         return Identification(replace(self.result, standard_errors=errors))
 
-    def predict(self, event: Any = None, **voltage: Any) -> Response:
+    def predict(
+        self,
+        event: "Source | None" = None,
+        *,
+        t: "ArrayLike | None" = None,
+        U: "ArrayLike | None" = None,
+        f: "ArrayLike | None" = None,
+        P0: float | None = None,
+        Q0: float | None = None,
+    ) -> Response:
         """What the model of `fit` draws in an event, or from a voltage: see
         `Identification.predict`.
         """
-        return self.fit.predict(event, **voltage)
+        return self.fit.predict(event, t=t, U=U, f=f, P0=P0, Q0=Q0)
 
     @functools.cached_property
     def steps(self) -> "Steps":
@@ -381,10 +393,10 @@ def _size(name: str, at: Mapping[str, Any], unit: str) -> str:
 
 @public
 def investigate(
-    records: Any,
-    model: Any = None,
+    records: "Records",
+    model: "ModelGiven | None" = None,
     *,
-    validate: Any = (),
+    validate: "Records" = (),
     effects: Sequence[str] = (),  # only these effects are tested; empty: the whole catalogue
     false_alarms: float = 0.05,  # probability of naming anything where nothing is missing
     # {name: value} of other thresholds of its decisions
@@ -394,7 +406,7 @@ def investigate(
     substeps: int | None = None,
     domain: str | None = None,
     seed: int = 0,
-    progress: Any = None,
+    progress: Progress = None,
 ) -> Investigation:
     """Find what a load model lacks: where it disagrees with the records, which effect explains
     that, and how sure.

@@ -8,6 +8,7 @@ from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.blocks.terminal import show
 from tractexp.configuration.plugin import build, plugin
 from tractexp.configuration.run_command import build_again_command
 from tractexp.errors import TASK, UserError, check_choice, check_range
@@ -16,7 +17,7 @@ from tractexp.identification.result import load
 from tractexp.outcome import Outcome
 from tractexp.record.identity import describe_identities
 from tractexp.storage import files
-from tractexp.text.progress import say
+from tractexp.text.progress import console, say, text_width
 
 if TYPE_CHECKING:
     from tractexp.exchange.format import Identified
@@ -228,9 +229,11 @@ class Export(Task, call=export, given=("fit",)):
         fit = Identification(load(Path(self.parameters)))
         exported = self.perform(job, fit=fit)
         path = exported.write(job.folder / f"load{exported.suffix}")
-        say(f"model: {exported.title}, from {self.parameters}")
+        told = Report().text(f"model: {exported.title}, from {self.parameters}")
         if fit.grade and not fit.adequate:
-            say(f"  mind: {fit.headline}")
-        for note in exported.notes:
-            say(f"note: {note}")
+            told.items([f"mind: {fit.headline}"])
+        told.text(*(f"note: {note}" for note in exported.notes))
+        if not fit.adequate:
+            told.text(*(f"next: {sentence}" for sentence in fit.advice[:1]))
+        show(told, console(), text_width())
         say(f"  {path}")

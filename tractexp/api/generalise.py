@@ -14,12 +14,14 @@ from tractexp.api.setup import Setup
 from tractexp.api.task import SEARCH, Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import build, plugin
+from tractexp.configuration.run_command import OF_LOAD, build_again_command
 from tractexp.errors import DATA, UserError, check_range, setting
 from tractexp.outcome import Drawing, Written
 from tractexp.storage import files
 from tractexp.text.progress import Progress, tell
 
 if TYPE_CHECKING:
+    from tractexp.api.given import Chosen, ModelGiven, Records, Several
     from tractexp.identification.result import Fit, Result
 
 CAPTION = (
@@ -28,6 +30,8 @@ CAPTION = (
     " beside it where each optimizer's search ended"
 )
 ARRAYS = ("t", "U", "P", "Q", "P_calculated", "Q_calculated")
+SEEDS_COMPARED = 10  # of the sweep that is advised
+OF_SEARCH = (*OF_LOAD, *SEARCH)  # the settings that it repeats
 ESTIMATE = "estimate"  # stands for an optimizer in what is told of the most likely parameters
 RESIDUALS = ("residual_P", "residual_Q")
 ERRORS = (*RESIDUALS, "epsilon_p", "epsilon_q")
@@ -88,6 +92,14 @@ class Generalised(Written):
         """The table, and what its numbers are."""
         return Report().add(self.table()).text(CAPTION)
 
+    @property
+    def next_step(self) -> str:
+        """The command that compares the searches under more seeds."""
+        names = dict.fromkeys(row["optimizer"] for row in self.residuals)
+        asked = f"optimizer={','.join(name for name in names if name != ESTIMATE)}"
+        sweep = build_again_command("-m", asked, f"seed=range(0,{SEEDS_COMPARED})", of=OF_SEARCH)
+        return f"compare the searches themselves: {sweep}"
+
     def write_results(self, folder: Path) -> list[Path]:
         """Write `generalise.json`: the residuals of every search, and what it identified."""
         content = {"residuals": self.residuals, "identified": self.identified}
@@ -102,22 +114,22 @@ class Generalised(Written):
 
 @public
 def generalise(
-    records: Any,
-    model: Any = None,
+    records: "Records",
+    model: "ModelGiven | None" = None,
     *,
-    validate: Any,
-    optimizers: Any = None,
+    validate: "Records",
+    optimizers: "Several | None" = None,
     seeds: int = 1,  # searches of each optimizer: that seed and the ones after it
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     per_event: Sequence[str] | None = None,
     substeps: int | None = None,
-    objective: Any = None,
+    objective: "Chosen | None" = None,
     budget: int | None = None,
     time_limit: float | None = None,
     target: float | None = None,
     seed: int = 0,
-    progress: Any = None,
+    progress: Progress = None,
 ) -> Generalised:
     """Fit a model by each optimizer under several seeds, and judge it on dips that were not fitted.
 

@@ -30,6 +30,10 @@ from tractexp.text.progress import Progress, counter, tell
 from tractexp.text.wording import epsilon, join_words
 
 if TYPE_CHECKING:
+    import pandas
+    from numpy.typing import ArrayLike
+
+    from tractexp.api.given import Chosen, ModelGiven, Records, Source
     from tractexp.exchange.operating_point import OperatingPoint
     from tractexp.identification.agreement import EventAgreement
     from tractexp.identification.estimate import EstimationResult
@@ -130,7 +134,7 @@ class Estimates(dict[str, Estimate]):
         """Raise KeyError with the nearest name."""
         raise KeyError(f"no parameter is called {name}{among(name, self, 'Parameters')}")
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """A pandas frame of numbers with a row for each estimate: parameter, value, unit, the ends
         `lower` and `upper` of the 95 % interval and the standard error (nan where there is none),
         search (where the optimizer ended), verdict.
@@ -357,11 +361,11 @@ class Identification(Written):
 
     def predict(
         self,
-        event: Any = None,
+        event: "Source | None" = None,
         *,
-        t: Any = None,
-        U: Any = None,
-        f: Any = None,
+        t: "ArrayLike | None" = None,
+        U: "ArrayLike | None" = None,
+        f: "ArrayLike | None" = None,
         P0: float | None = None,
         Q0: float | None = None,
     ) -> Response:
@@ -413,7 +417,7 @@ class Identification(Written):
 
         return parameters(self)
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """The estimates as a pandas frame of numbers: `Estimates.to_frame`."""
         return self.parameters.to_frame()
 
@@ -562,10 +566,10 @@ class Identification(Written):
 
 @public
 def identify(
-    records: Any,
-    model: Any = None,
+    records: "Records",
+    model: "ModelGiven | None" = None,
     *,
-    validate: Any = (),
+    validate: "Records" = (),
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     per_event: Sequence[str] | None = None,
@@ -573,15 +577,15 @@ def identify(
     domain: str | None = None,
     priors: bool | None = None,
     physical: bool | None = None,
-    objective: Any = None,
-    optimizer: Any = None,
+    objective: "Chosen | None" = None,
+    optimizer: "Chosen | None" = None,
     budget: int | None = None,
     time_limit: float | None = None,
     target: float | None = None,
     seed: int = 0,
     check_intervals: bool = True,
     frequency_swing: float = FREQUENCY_SWING,
-    progress: Any = None,
+    progress: Progress = None,
 ) -> Identification:
     """Fit the free parameters of a load model to recorded dips, and judge the fit on these and on
     others held out.

@@ -17,15 +17,17 @@ from tractexp.blocks import Report, Table
 from tractexp.cache import provenance
 from tractexp.configuration.choices import choices, defaults
 from tractexp.configuration.plugin import plugin
+from tractexp.configuration.run_command import suggest_run
 from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Written
 from tractexp.record import Event, OwnBase
 from tractexp.record.identity import Identity
 from tractexp.storage import files
 from tractexp.text import quoting
-from tractexp.text.progress import tell
+from tractexp.text.progress import Progress, tell
 
 if TYPE_CHECKING:
+    from tractexp.api.given import Records, Source
     from tractexp.identification.linear_network import BlackBox
     from tractexp.identification.result import Fit
 
@@ -71,7 +73,7 @@ class NetworkFit(Written):
         """How much of the response it leaves, in one sentence."""
         return self.content["sentence"]
 
-    def predict(self, event: Any) -> Response:
+    def predict(self, event: "Source") -> Response:
         """P and Q [pu] (N,) that it draws in an event, on the base of its file.
 
         `event` is one that `tractexp.read` gave, or what it reads, holding one dip: its voltage and
@@ -93,6 +95,11 @@ class NetworkFit(Written):
 
         return linear_network.summary(self)
 
+    @property
+    def next_step(self) -> str:
+        """The command that fits the load whose physics is known."""
+        return f"fit a load beside this yardstick: {suggest_run('task=identify')}"
+
     def report(self) -> Report:
         """The page: the curves of the network, and what each number of poles leaves."""
         from tractexp.report import linear_network
@@ -102,12 +109,12 @@ class NetworkFit(Written):
 
 @public
 def linear_network(
-    records: Any,
+    records: "Records",
     *,
-    validate: Any = (),
+    validate: "Records" = (),
     domain: str | None = None,
     poles: int | None = None,  # null: as many as the fitted dips ask for
-    progress: Any = None,
+    progress: Progress = None,
 ) -> NetworkFit:
     """Fit the best linear network of few poles from the voltage to the current of recorded dips:
     how good can it get?
@@ -233,7 +240,8 @@ class LinearNetwork(Task, call=linear_network):
 
     def perform(self, job: Job, **instead: Any) -> NetworkFit:
         """Fit the network in the domain of the run's model."""
-        return super().perform(job, domain=job.config["model"]["domain"], **instead)
+        given = {"domain": job.config["model"]["domain"], "progress": job.tell_beside}
+        return super().perform(job, **given | instead)
 
     def collect_log(self, job: Job, result: NetworkFit) -> dict[str, Any]:
         """The errors and the number of poles for MLflow."""

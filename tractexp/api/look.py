@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields, replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -29,6 +29,11 @@ from tractexp.recording.recording import unit_of
 from tractexp.storage import files
 from tractexp.text.progress import Progress, tell_stages
 from tractexp.text.wording import count_noun
+
+if TYPE_CHECKING:
+    import pandas
+
+    from tractexp.api.given import Records, Setting
 
 RACE = "model=auto"  # what a load of the field is made of nobody knows: structures are raced
 NAME_THEM = "name the channels of one load: voltages=[...] currents=[...]"
@@ -59,7 +64,7 @@ class Listed(Tabulated):
             columns, [[_cell(row[name]) for name in columns] for row in self.rows], self.title
         )
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """The rows as a pandas frame; what is not known is nan."""
         import pandas
 
@@ -141,7 +146,7 @@ class Look(Written):
         """(file, load) of each load."""
         return [(f["file"], load) for f in self.content["files"] for load in f["feeders"]]
 
-    def phasors(self, feeder: int = 0, file: int = 0) -> Any:
+    def phasors(self, feeder: int = 0, file: int = 0) -> "pandas.DataFrame":
         """A frame of one load: t [s], f [Hz], U, U2 [kV, line to line], I1, I2 [kA], P [MW], Q
         [Mvar].
 
@@ -154,7 +159,7 @@ class Look(Written):
             series(_pick_item(_pick_item(self.views, file, "file").sights, feeder, "load"))
         )
 
-    def waveforms(self, file: int = 0) -> Any:
+    def waveforms(self, file: int = 0) -> "pandas.DataFrame":
         """A frame of all channels of a file in primary values: t [s], then each channel [kV, kA,
         ...].
 
@@ -243,7 +248,7 @@ class Look(Written):
 
 
 @public
-def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
+def look(*sources: "Records", progress: Progress = None, **settings: "Setting") -> Look:
     """Look at files without saying which channels they have: what they hold, which loads they show,
     what happened.
 

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from tractexp.api.setup import Setup
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
+from tractexp.configuration.run_command import suggest_run
 from tractexp.errors import MODEL, TASK, UserError, check_range, setting
 from tractexp.identification import plan as planning
 from tractexp.identification.adequacy import Grade
@@ -29,6 +30,10 @@ from tractexp.record import Event
 from tractexp.report import plan as shown
 from tractexp.report.plan import DEPTH, DURATION, JUMP, RATE, UNBALANCE, Planned, rest
 from tractexp.storage import files
+from tractexp.text.progress import Progress
+
+if TYPE_CHECKING:
+    from tractexp.api.given import ModelGiven, Records
 
 DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
 GRIDS = {  # of what only some domains' dips have: degrees, negative sequence over the depth
@@ -76,6 +81,15 @@ class Forecasts(Written):
         """How deep a dip is needed, and the intervals."""
         return shown.summary(self.content)
 
+    def screen(self) -> Report:
+        """The answer on one screen of a terminal."""
+        return shown.screen(self.content)
+
+    @property
+    def next_step(self) -> str:
+        """The command that shows what the dips at hand tell, whatever is recorded next."""
+        return f"until then, what these dips tell: {suggest_run('task=profile')}"
+
     def report(self) -> Report:
         """The page: each interval against depth, duration, rate and noise."""
         return shown.report(self.forecast, self.content)
@@ -83,8 +97,8 @@ class Forecasts(Written):
 
 @public
 def plan(
-    records: Any,
-    model: Any = None,
+    records: "Records",
+    model: "ModelGiven | None" = None,
     *,
     parameter: str = "H",  # how deep a dip is needed for this one (H stands for M)
     within: float = 0.05,  # half of the 95 % interval, as a share of the value
@@ -96,14 +110,16 @@ def plan(
     # negative sequence over the depth, 1 of a fault between two phases; in waveforms
     unbalance: float | None = None,
     domain: str | None = None,
-    values: Any = FIT,  # fit, default, or the path of a result.json
+    # fit, default, or the path of a result.json
+    values: "str | Path | Identification | Mapping[str, float]" = FIT,
     least: float = 0.05,  # another event of the archive must narrow the intervals by this share
     events: int | None = None,  # at most so many
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
-    rivals: Any = (),  # [a,b+c], or a discrepancy.json: what to record to tell these apart
-    progress: Any = None,
+    # [a,b+c], or a discrepancy.json: what to record to tell these apart
+    rivals: "str | Sequence[str | Sequence[str]]" = (),
+    progress: Progress = None,
 ) -> Forecasts | Recommended:
     """Forecast the intervals that a recording would give, without fitting it; or what tells
     `rivals` apart.

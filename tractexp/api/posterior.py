@@ -18,9 +18,11 @@ from tractexp.configuration.plugin import plugin
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Written
 from tractexp.storage import files
-from tractexp.text.progress import counter
+from tractexp.text.progress import Progress, counter
 
 if TYPE_CHECKING:
+    import arviz  # pyright: ignore[reportMissingImports]
+
     from tractexp.identification.posterior import PosteriorSample
 
 
@@ -53,7 +55,7 @@ class Sampled(Written):
         """Draws (n,) of each free parameter, by name."""
         return dict(zip(self.sample.names, self.sample.draws.T, strict=True))
 
-    def to_inference_data(self) -> Any:
+    def to_inference_data(self) -> "arviz.InferenceData":
         """The draws as an `arviz.InferenceData`: group `posterior`, a variable for each free
         parameter, (chain, draw) with a chain for each walker.
 
@@ -81,6 +83,10 @@ class Sampled(Written):
 
     def summary(self) -> Report:
         """The intervals, and how well the chains have mixed."""
+        return self.fit.summary().add(self.table()).text(*self._describe_effort())
+
+    def _describe_effort(self) -> list[str]:
+        """What the draws took, and whether that was enough."""
         c, s = self.content, self.settings
         effort = (
             f"{s['steps']} steps of {s['walkers']} walkers in {c['seconds']:.1f} s, acceptance"
@@ -88,11 +94,19 @@ class Sampled(Written):
             f" autocorrelation time {c['autocorrelation']:.0f} steps"
         )
         short = "note: the chain is shorter than 50 autocorrelation times; raise steps"
-        return (
-            self.fit.summary()
-            .add(self.table())
-            .text(effort, *([short] if not c["converged"] else []))
-        )
+        return [effort] if c["converged"] else [effort, short]
+
+    def screen(self) -> Report:
+        """The load, and each interval by curvature and by posterior."""
+        from tractexp.report.screen import describe_judged_load
+
+        told = describe_judged_load(self.fit)
+        return told.add(self.table()).text(*self._describe_effort())
+
+    @property
+    def next_step(self) -> str:
+        """What follows from the identification."""
+        return next(iter(self.fit.next_steps), "")
 
     def report(self) -> Report:
         """The page: marginals and pairs."""
@@ -119,7 +133,7 @@ def posterior(
     walkers: int = 48,
     steps: int = 2000,
     seed: int | None = None,
-    progress: Any = None,
+    progress: Progress = None,
 ) -> Sampled:
     """Sample the posterior of an identification's free parameters under a flat prior within their
     bounds.

@@ -12,11 +12,13 @@ from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
+from tractexp.configuration.run_command import suggest_run
 from tractexp.errors import check_range
 from tractexp.identification.result import Result
+from tractexp.identification.verdict import IDENTIFIED, brief
 from tractexp.outcome import Written
 from tractexp.storage import files
-from tractexp.text.progress import counter
+from tractexp.text.progress import Progress, counter
 
 if TYPE_CHECKING:
     from tractexp.identification.profile import Profiles
@@ -82,6 +84,26 @@ class Profiled(Written):
         )
         return report.text(effort)
 
+    def screen(self) -> Report:
+        """The load, and each interval by curvature and by profile with what it says, in a word."""
+        from tractexp.report.screen import describe_judged_load, name_verdict
+
+        told = describe_judged_load(self.identification)
+        rows = [[*row, name_verdict(self.profiles[row[0]]["verdict"])] for row in self.table().rows]
+        table = Table([*self.table().columns, "known"], rows, words=(4,))
+        return told.add(table).text(*(f"note: {note}" for note in self.content["notes"]))
+
+    @property
+    def next_step(self) -> str:
+        """What follows from the identification; of a model that leaves noise alone, the command
+        that plans which dip would tell a parameter that is not identified.
+        """
+        poor = [n for n, one in self.profiles.items() if brief(one["verdict"]) != IDENTIFIED]
+        if self.fit.adequate and poor:
+            planned = suggest_run("task=plan", f"task.parameter={poor[0]}")
+            return f"which dip would tell {poor[0]}: {planned}"
+        return next(iter(self.identification.next_steps), "")
+
     def report(self) -> Report:
         """The page: a curve for each parameter."""
         from tractexp.report import profile
@@ -99,7 +121,7 @@ def profile(
     fit: Identification,
     *,
     points: int = 24,  # at most so many on either side of the optimum
-    progress: Any = None,
+    progress: Progress = None,
 ) -> Profiled:
     """Find the best fit for each value of each free parameter of an identification in turn.
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 
@@ -29,6 +29,12 @@ from tractexp.recording.event_views import settings_of
 from tractexp.storage import files
 from tractexp.text.wording import count_noun
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from tractexp.api.given import Records, Setting
+    from tractexp.api.look import Look
+
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2", "U_angle")
 GROUP = "data"
 
@@ -36,21 +42,27 @@ GROUP = "data"
 class Dips(Plain, Tabulated, list[Event]):
     """Events in a list that prints as a table."""
 
-    def __getitem__(self, k: Any) -> Any:
+    @overload
+    def __getitem__(self, k: SupportsIndex, /) -> Event: ...
+
+    @overload
+    def __getitem__(self, k: slice, /) -> "Dips": ...
+
+    def __getitem__(self, k: SupportsIndex | slice, /) -> "Event | Dips":
         """An event, or the dips of a slice."""
         return Dips(super().__getitem__(k)) if isinstance(k, slice) else super().__getitem__(k)
 
-    def to_dict(self) -> Any:
+    def to_dict(self) -> list[dict[str, Any]]:  # type: ignore[override] # a list is saved as one
         """The records, as plain data that JSON knows."""
         return [record_to_dict(event.record) for event in self]
 
     @classmethod
-    def from_dict(cls, content: Any) -> "Dips":
+    def from_dict(cls, content: Iterable[Mapping[str, Any]]) -> "Dips":  # type: ignore[override]
         """What `to_dict` gave; the dips are found again."""
         return cls(detect(record_from_dict(one)) for one in content)
 
-    def look(self) -> Any:
-        """A look (a `Look`) at the files that the events are from, and at the records that are from
+    def look(self) -> "Look":
+        """A look at the files that the events are from, and at the records that are from
         none.
         """
         from tractexp.api.look import look
@@ -99,16 +111,16 @@ class Dips(Plain, Tabulated, list[Event]):
 
 @public
 def read(
-    *sources: Any,
-    t: Any = None,
-    U: Any = None,
-    P: Any = None,
-    Q: Any = None,
-    f: Any = None,
-    U2: Any = None,
-    U_angle: Any = None,
+    *sources: "Records",
+    t: "ArrayLike | None" = None,
+    U: "ArrayLike | None" = None,
+    P: "ArrayLike | None" = None,
+    Q: "ArrayLike | None" = None,
+    f: "ArrayLike | None" = None,
+    U2: "ArrayLike | None" = None,
+    U_angle: "ArrayLike | None" = None,
     name: str | None = None,
-    **settings: Any,
+    **settings: "Setting",
 ) -> Dips:
     """Read records of voltage dips, check them and find the dip in each.
 

@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from tractexp.storage import files
 from tractexp.text.wording import epsilon
 
 if TYPE_CHECKING:
+    import pandas
+
     from tractexp.identification.result import Fit
     from tractexp.model.model import Model
 
@@ -77,7 +79,7 @@ class Response:
             drawn = files.read_text(self.draw(Path(folder) / "response.svg"))
         return drawn[drawn.index("<svg") :]
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """A pandas frame of the columns."""
         import pandas
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -19,6 +19,11 @@ from tractexp.domain import domain_of
 from tractexp.errors import TASK, UserError, among, check_range, setting
 from tractexp.identification.result import load
 from tractexp.outcome import Drawing, Written
+
+if TYPE_CHECKING:
+    from tractexp.api.discrepancy import Investigation
+    from tractexp.api.given import ModelGiven, Records
+    from tractexp.api.identify import Identification
 
 # a dip by hand, where nothing else is known
 BEFORE = {"U0": 1.0, "P0": 1.0, "Q0": 0.5, "frequency": 50.0}
@@ -66,7 +71,7 @@ class Simulation(Written):
     values: Mapping[str, float]
     responses: tuple[Response, ...]
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> np.ndarray:
         """`t`, `U`, `P` and `Q` of the only event."""
         if name in ("t", "U", "P", "Q") and len(self.responses) == 1:
             return getattr(self.responses[0], name)
@@ -136,10 +141,10 @@ def _stem(number: int) -> str:
 
 @public
 def simulate(
-    model: Any = None,
+    model: "ModelGiven | Identification | Investigation | None" = None,
     values: Mapping[str, float] | None = None,  # {name: value}
     *,
-    records: Any = (),
+    records: "Records" = (),
     depth: float | None = None,  # of the voltage before; null: play the recorded data
     duration: float = 0.15,  # s, from the start of the fall to the start of the recovery
     fall: float = 0.02,  # s

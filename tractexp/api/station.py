@@ -6,28 +6,38 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
-from tractexp.api.identify import Identification
+from tractexp.api.identify import UNUSABLE, Identification
 from tractexp.api.look import Listed
-from tractexp.api.station_load import FEWEST_DIPS, LoadJob, fit_load, read_files
-from tractexp.api.survey import survey
-from tractexp.api.surveying import keys
+from tractexp.api.station_load import LoadJob, fit_load, read_files
+from tractexp.api.survey import build_fit_command, survey
+from tractexp.api.surveying import FEWEST_DIPS, keys, name_load
 from tractexp.api.task import Job, Task, call
 from tractexp.blocks import Report, Table
 from tractexp.cache.store import Store, environment, key
+from tractexp.configuration.overrides import format_assignment, survey_of
 from tractexp.configuration.plugin import get, plugin
+from tractexp.configuration.run_command import find_folder
 from tractexp.errors import DATA, UserError, among, check_choice, check_range
+from tractexp.exchange.format import choose_format
 from tractexp.identification.result import Result
 from tractexp.outcome import Written
 from tractexp.process.workers import Workers, backends
 from tractexp.report import station as shown
 from tractexp.storage import files
+from tractexp.text import quoting
 from tractexp.text.progress import Progress, count_parts, tell
 from tractexp.text.wording import count_noun
 
+if TYPE_CHECKING:
+    import pandas
+
+    from tractexp.api.given import ModelGiven
+
+MOST_EXAMINED_DIPS = 3  # that an investigation of a load begins with
 DIPS, LOADS = "dips", "loads"  # in the folder of `keep`: an entry for each file, for each load
 
 
@@ -87,7 +97,7 @@ class Station(Written):
         """A load as it usually is, as one identified model: it predicts, simulates and exports."""
         return Identification(Result.from_content(self.load_named(name)["result"], name))
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """The dips of all loads as a pandas frame."""
         rows = [
             {"station": load["station"], "load": load["load"], **event}
@@ -108,6 +118,25 @@ class Station(Written):
         """The answer on one screen of a terminal."""
         return shown.screen(self.content)
 
+    @property
+    def next_step(self) -> str:
+        """The command that exports the first load that may be used; else one that finds what its
+        model lacks.
+        """
+        place = find_folder()
+        for number, load in enumerate(self._fitted_loads, 1):
+            format = choose_format(self.identification(load["load"]).result)
+            if place and format and load["usability"] != UNUSABLE:
+                file = format_assignment("task.parameters", str(place / name_file(number)))
+                export = quoting.shell("tractexp", "task=export", file, f"task.format={format}")
+                return f"export {load['load']}: {export}"
+        for load in self._fitted_loads:
+            told = sorted(load["events"], key=lambda event: -event["depth"])[:MOST_EXAMINED_DIPS]
+            events = [event["event"] for event in told]
+            command = build_fit_command(self.folder, events, "task=discrepancy")
+            return f"find what {load['load']} lacks at its deepest dips: {command}"
+        return f"see what each file holds: {survey_of(self.folder)}"
+
     def report(self) -> Report:
         """The page: each load over the years."""
         return shown.report(self.content)
@@ -118,7 +147,7 @@ class Station(Written):
         """
         frame = self.to_frame()
         loads = [
-            files.write_json(folder / f"load_{number}.json", load["result"])
+            files.write_json(folder / name_file(number), load["result"])
             for number, load in enumerate(self._fitted_loads, 1)
         ]
         return [
@@ -128,10 +157,15 @@ class Station(Written):
         ]
 
 
+def name_file(number: int) -> str:
+    """The file of a load that was fitted, by its number from 1."""
+    return f"load_{number}.json"
+
+
 @public
 def fit_station(
     folder: str | Path,
-    model: Any = None,
+    model: "ModelGiven | None" = None,
     *,
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
@@ -240,7 +274,7 @@ def _group(
     stamps = defaultdict[tuple[str, str], list[str]](list)
     for row in rows:
         one = read[row["event"]]
-        name = _name_load(row, folder)
+        name = name_load(row, folder)
         dips = groups[name]
         if "record" in one:
             dips.append((row["event"], row["when"], one["record"]))
@@ -260,14 +294,6 @@ def _group(
         if len(dips) < FEWEST_DIPS
     ]
     return jobs, single
-
-
-def _name_load(row: Mapping[str, Any], folder: Path) -> tuple[str, str]:
-    """Station and load of a row. A table names neither: those of one folder are of one load."""
-    file = Path(row["file"])
-    if row["load"] != file.stem:
-        return row["station"] or "", row["load"] or ""
-    return row["station"] or "", (Path(folder.resolve().name) / file.parent).as_posix()
 
 
 def _fit_loads(

@@ -41,7 +41,6 @@ from tractexp.record import Event, OwnBase, Record, detect
 from tractexp.recording import archive
 from tractexp.storage import files
 
-FEWEST_DIPS = 2  # of a load that is fitted
 KEPT_BEFORE, KEPT_AFTER = 0.6, 1.5  # s of a record before its dip and after it
 KEPT_RATE = 400.0  # Hz: phasors are means over a cycle, and years of dips are kept in memory
 MOST_RACED = 4  # dips on which structures are raced

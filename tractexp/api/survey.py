@@ -2,6 +2,7 @@
 fitting.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.look import Listed
-from tractexp.api.surveying import keys, look_at_files
+from tractexp.api.surveying import FEWEST_DIPS, keys, look_at_files, name_load
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.cache.store import Store
-from tractexp.configuration.overrides import build_typed_command
+from tractexp.configuration.overrides import build_typed_command, format_assignment
 from tractexp.configuration.plugin import discover, get, plugin
 from tractexp.errors import DATA, UserError, check_range
 from tractexp.outcome import Written
@@ -27,6 +28,9 @@ from tractexp.text import quoting
 from tractexp.text.progress import Progress, count_parts, tell_stages
 
 if TYPE_CHECKING:
+    import pandas
+
+    from tractexp.api.given import ModelGiven
     from tractexp.identification.plan import ChosenEvent
 
 ROWS = "rows"  # in the folder of `keep`: an entry for each file that was looked at
@@ -97,7 +101,7 @@ class Surveyed(Written):
         """What is to be typed to fit them together; "" where not asked for."""
         return self.content["command"]
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """The rows as a pandas frame."""
         return self.rows.to_frame()
 
@@ -112,6 +116,25 @@ class Surveyed(Written):
     def report(self) -> Report:
         """The page: a row for each event."""
         return shown.report(self.content)
+
+    @property
+    def next_step(self) -> str:
+        """The command that fits what is worth it, or that shows why nothing is."""
+        if self.command:
+            return f"fit them together: {self.command}"
+        worth = [row for row in self.content["rows"] if row["worth"]]
+        loads = Counter(name_load(row, Path(self.folder)) for row in worth)
+        if loads and max(loads.values()) >= FEWEST_DIPS:
+            station = ("task=station", format_assignment("data.path", self.folder))
+            return f"fit each load to all its dips: {quoting.shell('tractexp', *station)}"
+        if worth:
+            best = max(worth, key=_promise)
+            return f"fit {best['event']}: {best['command']}"
+        seen = next((row for row in self.content["rows"] if row["kind"] != UNREAD), None)
+        if seen is None:
+            return f"see what can be read: {quoting.shell('tractexp', 'list', 'data')}"
+        look = quoting.shell("tractexp", "look", str(Path(self.folder, seen["file"])))
+        return f"see why nothing is worth fitting: {look}"
 
     def write_results(self, folder: Path) -> list[Path]:
         """Write the rows as `survey.json`, `survey.csv` and `survey.parquet`."""
@@ -155,9 +178,9 @@ def survey(
     folder: str | Path,
     *,
     informative: int | None = None,  # so many events that tell most about the model together
-    model: Any = None,
+    model: "ModelGiven | None" = None,
     # of the model there: fit, of the deepest event; default; or the path of a result.json
-    values: Any = "fit",
+    values: "str | Path | Mapping[str, float]" = "fit",
     cores: int | None = None,  # processes; null: all cores
     keep: str | Path | None = None,
     progress: Progress = None,
@@ -225,11 +248,14 @@ def survey(
     content["informative"] = files.plain(
         [{"event": c.name, "gain": c.gain, "half": c.half} for c in best]
     )
-    reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
-    content["command"] = build_typed_command(
-        {"name": reader, "path": str(folder), "train": [c.name for c in best]}
-    )
+    content["command"] = build_fit_command(str(folder), [c.name for c in best])
     return Surveyed(content)
+
+
+def build_fit_command(folder: str, events: Sequence[str], *more: str) -> str:
+    """The command that fits events of a folder together, with further settings."""
+    reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
+    return build_typed_command({"name": reader, "path": folder, "train": [*events]}, *more)
 
 
 def _promise(row: Mapping[str, Any]) -> float:

@@ -3,7 +3,7 @@
 import contextlib
 import functools
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,7 @@ MOST_OWN_FILES = 2  # files that this process looks at sooner than others have s
 UNRECOGNISED = "no voltages and currents of one load were recognised"
 PICTURE_POINTS = 48  # of a small picture
 AROUND = (0.1, 0.3)  # s before and after an event in its picture
+FEWEST_DIPS = 2  # of a load that a station fits
 LONGEST_PICTURED_EVENT = 5.0  # s of an event there
 
 
@@ -225,6 +226,14 @@ def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
         names[path]: key(__version__, names[path], _states(beside[path.parent / path.stem]))
         for path in paths
     }
+
+
+def name_load(row: Mapping[str, Any], folder: Path) -> tuple[str, str]:
+    """Station and load of a row. A table names neither: those of one folder are of one load."""
+    file = Path(row["file"])
+    if row["load"] != file.stem:
+        return row["station"] or "", row["load"] or ""
+    return row["station"] or "", (Path(folder.resolve().name) / file.parent).as_posix()
 
 
 def _states(paths: Sequence[Path]) -> list[Any]:

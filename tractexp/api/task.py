@@ -194,6 +194,7 @@ def setting_of(parameter: inspect.Parameter) -> tuple[Any, Any]:
     empty ones.
     """
     kind, default = parameter.annotation, parameter.default
+    kind = Any if isinstance(kind, str) else kind  # in quotes: what type checkers alone are told
     kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
     for one in kinds:
         origin, inner = get_origin(one), get_args(one)
@@ -212,8 +213,11 @@ def _plain(kind: Any) -> Any:
 
 
 def print_result(job: "Job", result: Written) -> None:
-    """Print one screen, or everything: see `Job.tells_everything`."""
-    show(result.summary() if job.tells_everything else result.screen(), console(), text_width())
+    """Print one screen, or everything (see `Job.tells_everything`), and what leads on."""
+    report = result.summary() if job.tells_everything else result.screen()
+    if step := result.next_step:
+        report.text(f"next: {step}")
+    show(report, console(), text_width())
 
 
 def print_written(paths: Iterable[Path], page: str) -> None:

@@ -13,6 +13,8 @@ from tractexp.errors import UserError, check_choice
 from tractexp.storage import files
 
 if TYPE_CHECKING:
+    import pandas
+
     from tractexp.blocks.chart import Chart
 
 KINDS = ("plain", "good", "bad")
@@ -108,7 +110,7 @@ class Table:
         """The table as a notebook shows it."""
         return Report().add(self).fragment
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """A pandas frame of the rows."""
         import pandas
 

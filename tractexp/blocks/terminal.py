@@ -9,6 +9,7 @@ from tractexp.blocks.block import CodeBlock, Heading, Items, Paragraphs, Report,
 from tractexp.text.wording import one_line
 
 PLAIN_LINE_WIDTH = 200  # characters of a line of text that is no terminal's
+MISSING_CELL = "-"  # in a row that is a line
 COLUMN_GAP = 2  # characters between two columns
 NARROWEST_WORDS = 12  # characters to which a column of words may be folded
 COMMAND = re.compile(r"(?<=: )(tractexp[ .][^;]*)")  # it is copied whole
@@ -138,10 +139,11 @@ def _least_width(table: Table) -> int:
 
 
 def _print_rows(table: Table, console: Any) -> None:
-    """Each row of a table as a sentence: its first cell, and what the columns say of it."""
+    """Each row of a table as a line: its first cell, and what the columns say of it in the order
+    that the first line tells.
+    """
     if table.title:
         _print_text(table.title, console, console.width)
-    for first, *rest in table.cells:
-        pairs = zip(table.columns[1:], rest, strict=True)
-        told = ", ".join(f"{column} {cell}" for column, cell in pairs if cell)
+    for first, *rest in [table.columns, *table.cells]:
+        told = ", ".join(cell or MISSING_CELL for cell in rest)
         _print_text(f"{first}: {told}", console, console.width)

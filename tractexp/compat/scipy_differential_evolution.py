@@ -8,7 +8,7 @@ Upstream: scipy/scipy#6923, a public class to step through, was closed without o
 drop this module and make the public class in the optimizer's `search`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 
 def generations(
     function: Callable[[np.ndarray], np.ndarray],
-    bounds: Any,
+    bounds: Sequence[tuple[float, float]],
     rng: np.random.Generator,
     **settings: Any,
 ) -> Iterator[None]:

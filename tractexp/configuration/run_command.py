@@ -89,6 +89,11 @@ def build_folder_command(*settings: str) -> str:
     return next((quoting.shell("tractexp", "again", str(f), *settings) for f in _placed), "")
 
 
+def find_folder() -> Path | None:
+    """The folder of this run; None where it has none, as from Python."""
+    return next(iter(_placed), None)
+
+
 def _not_taken_over(argument: str) -> bool:
     """Whether an argument keeps `tractexp again` from repeating this run by its folder."""
     # which is none of the settings that a folder keeps

@@ -72,5 +72,5 @@ def find_averaging(event: Event, model: Model | None) -> Averaging | None:
     if window is None or window == RECORDED:
         shape = event.record.window
     else:
-        shape = estimator_of(window).window(event.record.base.frequency)
+        shape = estimator_of(str(window)).window(event.record.base.frequency)
     return None if shape is None else Averaging(shape.compute_weights(step), shape.length)

@@ -1,7 +1,7 @@
 """What stands at the sites of a model, which of its effects edit it, and which others could."""
 
 from collections.abc import Collection, Mapping
-from typing import Any
+from typing import Protocol
 
 from tractexp.blocks import Table
 from tractexp.configuration.plugin import discover, get
@@ -10,7 +10,16 @@ from tractexp.model.model import Model
 from tractexp.model.sites import SITES
 
 
-def sites(model: Any) -> Table:
+class HoldsModel(Protocol):
+    """What carries a composed model, as what `tractexp.compose` makes does."""
+
+    @property
+    def model(self) -> Model:
+        """What simulates."""
+        ...
+
+
+def sites(model: "Model | HoldsModel") -> Table:
     """The sites of a model: what stands at each, which of its effects edit it, and which other ones
     could.
 

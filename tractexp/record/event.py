@@ -3,7 +3,7 @@ recording is.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from tractexp.record.no_dip import no_dip, no_such_dip
 from tractexp.record.record import Record
 from tractexp.record.steadiness import steady_part
 from tractexp.record.swing import Swing, find_swing
+
+if TYPE_CHECKING:
+    import pandas
 
 NO_POWER = 1e-9  # pu: nothing is a share of less
 LEAST_TOLD_NOISE = 1e-4  # of P: what shows less noise is not told from what shows so much
@@ -50,7 +53,7 @@ class Event:
         """The event in one sentence."""
         return describe(self)
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """The record as a pandas frame: `Record.to_frame`."""
         return self.record.to_frame()
 

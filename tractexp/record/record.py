@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from tractexp.record.gap import (
 from tractexp.record.waves import Waves
 from tractexp.record.window import Window
 from tractexp.storage.files import PACKAGE
+
+if TYPE_CHECKING:
+    import pandas
 
 LARGEST_JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
 # s: at coarser sampling a dip of 100 ms has fewer than two samples, and a transient time constant
@@ -135,7 +138,7 @@ class Record:
         span = f"{self.samples} samples of {', '.join(self.channels)}"
         return f"{self.name}: {span}, {self.t[0]:.3f} to {self.t[-1]:.3f} s, {self.rate:.0f} Hz"
 
-    def to_frame(self) -> Any:
+    def to_frame(self) -> "pandas.DataFrame":
         """A pandas frame of what a model reads: t [s], U, P, Q and, where recorded, f [Hz], U2 and
         U_angle [rad], per unit of `base`.
         """

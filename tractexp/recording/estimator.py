@@ -1,7 +1,8 @@
 """The interface of estimator plugins: the window over which phasors are averaged."""
 
 from abc import abstractmethod
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -84,7 +85,7 @@ class Estimator(Plugin):
         return Window(self.name, at, weights / weights.sum())
 
 
-def estimator_of(setting: Any = None) -> Estimator:
+def estimator_of(setting: str | Mapping[str, object] | None = None) -> Estimator:
     """The estimator of a setting: a name, a mapping of name and settings, or None for the usual
     one.
     """

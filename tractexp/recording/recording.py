@@ -273,7 +273,7 @@ class Recording:
                 together.append([segment])
         return together
 
-    def number(self, each: Any, where: str) -> int:
+    def number(self, each: int | str, where: str) -> int:
         """A channel's number, from 0, from its number or name; `where` is the setting
         in messages.
         """

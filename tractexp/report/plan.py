@@ -16,7 +16,7 @@ from tractexp.blocks.style import PALETTE
 from tractexp.domain import PHASORS, WAVES
 from tractexp.identification.plan import INERTIA, ChosenEvent, Forecast, Needed, column
 from tractexp.inference.problem import Problem
-from tractexp.text.wording import as_sentence
+from tractexp.text.wording import as_sentence, list_first
 
 DEPTH, DURATION, RATE = "depth", "duration [s]", "samples per second"
 JUMP, UNBALANCE = "phase jump [degrees]", "negative sequence, of the depth"
@@ -31,6 +31,7 @@ AXES = {  # of a scan: what its axis says, and what a value is multiplied by
 }
 LINES = [(color, dash) for dash in ("solid", "dash", "dot") for color in PALETTE]
 CEILING = 10.0  # times the value: wider intervals are not told
+MOST_TOLD_EVENTS = 4  # of the best that a line names
 ROWS, FEW = 20, 6  # of a table, about; of one on a terminal
 
 
@@ -68,6 +69,16 @@ def summary(content: Mapping[str, Any]) -> Report:
     return report.text(content["other_events"]) if content["other_events"] else report
 
 
+def screen(content: Mapping[str, Any]) -> Report:
+    """The answer first, then the forecasts by depth, and the best events."""
+    report = Report().text(f"how deep? {content['answer']}", content["dip"], "")
+    report.add(scan(content, DEPTH, FEW))
+    names = [event["name"] for event in content["best_events"]]
+    if names:
+        report.text(f"events that tell most together: {list_first(names, MOST_TOLD_EVENTS)}")
+    return report
+
+
 def scan(content: Mapping[str, Any], label: str, rows: int = ROWS) -> Table:
     """The forecasts over one property of the dip, about so many of them, in percent
     of the value.
@@ -79,7 +90,7 @@ def scan(content: Mapping[str, Any], label: str, rows: int = ROWS) -> Table:
         for f in picked
     ]
     title = (
-        f"half of the 95 % interval, % of the value, by {label}; a dash from ten times the value on"
+        f"half of the 95 % interval, % of the value, by {label}; -: ten times the value and more"
     )
     return Table([label.partition(",")[0].partition(" ")[0], *names], cells, title)
 

@@ -37,11 +37,7 @@ SHORT = {
 def screen(fit: "Identification") -> Report:
     """Which load, whether the model may be used and why, its parameters, its error, what next."""
     result = fit.result
-    names = [event["name"] for event in result.events if event["role"] == "train"]
-    page = Report().text(describe_load(result, names))
-    if fit.usability:
-        page.text(shorten(f"{fit.usability}: {fit.usability_reason}."))
-    page.text("").add(tabulate_parameters(fit))
+    page = describe_judged_load(fit).add(tabulate_parameters(fit))
     if len(rows := fit.own_parameters) > MOST_PARAMETERS:
         page.text(f"{count_noun(len(rows) - MOST_PARAMETERS, 'parameter')} more: --all prints all")
     page.text("")
@@ -51,6 +47,16 @@ def screen(fit: "Identification") -> Report:
         page.text(shorten(f"share: {bound['sentence']}."))
     page.text(describe_error(result))
     return page.text(*(f"next: {sentence}" for sentence in fit.next_steps[:1]))
+
+
+def describe_judged_load(fit: "Identification") -> Report:
+    """The load, and whether its model may be used and why: two sentences."""
+    result = fit.result
+    names = [event["name"] for event in result.events if event["role"] == "train"]
+    page = Report().text(describe_load(result, names))
+    if fit.usability:
+        page.text(shorten(f"{fit.usability}: {fit.usability_reason}."))
+    return page.text("")
 
 
 def describe_load(result: Result, names: Sequence[str]) -> str:
@@ -87,11 +93,16 @@ def tabulate_parameters(fit: "Identification") -> Table:
             with_error(e.value, e.standard_error or 0.0),
             e.unit,
             "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
-            SHORT.get(brief(e.verdict), brief(e.verdict)),
+            name_verdict(e.verdict),
         ]
         for e in fit.own_parameters[:MOST_PARAMETERS]
     ]
     return Table(["parameter", "value", "unit", "95 % interval", "known"], rows, words=(2, 4))
+
+
+def name_verdict(verdict: str) -> str:
+    """A verdict on a parameter in a word or two."""
+    return SHORT.get(brief(verdict), brief(verdict))
 
 
 def describe_error(result: Result) -> str:

@@ -32,6 +32,7 @@ CONSTANTS_CAPTION = (
     " them run. Intervals: 95 %, by leaving out one dip at a time. Differs: by how much a constant"
     " varies from dip to dip beyond chance, of those that do."
 )
+LEAST_DATED_SPAN = 1.0  # years: dips of a shorter span are drawn by their numbers
 MOST_NUMBERED = 20  # dips, each with a tick of its own
 TIME_CAPTION = (
     "Above: the model's error on each dip, of its response, as those before it predict it. Below:"
@@ -253,12 +254,14 @@ def _tabulate_events(load: Mapping[str, Any]) -> Table:
 def _draw_years(load: Mapping[str, Any]) -> Chart:
     """Errors of prediction and shares over the years, or by number where times are not known."""
     events = load["events"]
-    dated = all(event["when"] for event in events)
-    numbered = enumerate(events, 1)
-    x = np.array([_year(each["when"]) if dated else k for k, each in numbered])
+    years = np.array([_year(each["when"]) if each["when"] else np.nan for each in events])
+    dated = bool(np.ptp(years) > LEAST_DATED_SPAN)  # nan is not
+    x = years if dated else np.arange(1, len(events) + 1)
     label = "year" if dated else "dip, by its number"
     chart = Chart(label, ["error [%]", "motors, of P [%]"], pixels=460)
-    if len(x) <= MOST_NUMBERED and not dated:
+    if dated:
+        chart.ticks(None, np.arange(np.floor(x.min()), np.ceil(x.max()) + 1).tolist())
+    elif len(x) <= MOST_NUMBERED:
         chart.ticks(None, x.tolist())
     odd = np.array([bool(event["odd"]) for event in events])
     told = [f"{event['event']}, {event['known']} dips before it" for event in events]

@@ -55,7 +55,7 @@ def summary(content: Mapping[str, Any]) -> Report:
     report.text(*(f"  not read: {sentence}" for sentence in named[:MOST_UNREADABLE_FILES]))
     if len(unread) > MOST_UNREADABLE_FILES:
         report.text(f"  and {len(unread) - MOST_UNREADABLE_FILES} more, in the table")
-    return _best(report, content)
+    return _list_informative(report, content)
 
 
 def kinds(content: Mapping[str, Any]) -> Table:
@@ -95,7 +95,9 @@ def report(content: Mapping[str, Any]) -> Report:
     )
     worth = sum(row["worth"] for row in rows)
     lead = f"{content['files']} files, {len(rows)} rows, {worth} events worth fitting."
-    page = _best(Report(f"Survey of {content['folder']}", lead), content)
+    page = _list_informative(Report(f"Survey of {content['folder']}", lead), content)
+    if content["command"]:
+        page.text("to fit them together:").code(content["command"])
     return page.add(
         Markup(
             f"<style>{looks}</style>{SIEVE}<div"
@@ -128,10 +130,8 @@ def _heads() -> str:
     return "".join(heads)
 
 
-def _best(report: Report, content: Mapping[str, Any]) -> Report:
-    """The events that tell most, and the command that fits them; nothing where they were not asked
-    for.
-    """
+def _list_informative(report: Report, content: Mapping[str, Any]) -> Report:
+    """The events that tell most; nothing where they were not asked for."""
     best = content["informative"]
     if not best:
         return report
@@ -140,5 +140,4 @@ def _best(report: Report, content: Mapping[str, Any]) -> Report:
         f"{each['event']}, which narrows the intervals by {each['gain']:.0%}" for each in others
     ]
     report.verdict("most informative together, the best first:", kind="good")
-    report.items([first["event"], *narrower])
-    return report.text("to fit them together:").code(content["command"])
+    return report.items([first["event"], *narrower])

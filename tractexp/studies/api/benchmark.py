@@ -16,9 +16,10 @@ from tractexp.configuration.plugin import build, get, plugin
 from tractexp.errors import UserError, check_distinct, check_range
 from tractexp.outcome import Written
 from tractexp.storage import files
-from tractexp.text.progress import count_parts
+from tractexp.text.progress import Progress, count_parts
 
 if TYPE_CHECKING:
+    from tractexp.api.given import Several
     from tractexp.studies.bbob.runs import BbobRuns
     from tractexp.tracking import TrackedRun
 
@@ -113,7 +114,7 @@ class BenchmarkResult(Written):
 
 @public
 def benchmark(
-    optimizers: Any = None,
+    optimizers: "Several | None" = None,
     *,
     functions: Sequence[int] = FUNCTIONS,
     instances: Sequence[int] = INSTANCES,
@@ -122,7 +123,7 @@ def benchmark(
     targets: Sequence[float] = TARGETS,
     seed: int = 0,
     cores: int | None = None,
-    progress: Any = None,
+    progress: Progress = None,
 ) -> BenchmarkResult:
     """Run optimizers on the noiseless functions of BBOB; the same seed gives the same runs on any
     number of cores.

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING, Any, Self
 from tractexp.api.arguments import public
 from tractexp.api.task import Job, Task, print_paths
 from tractexp.blocks import Report, Table
+from tractexp.configuration.overrides import format_assignment
 from tractexp.configuration.plugin import plugin
+from tractexp.configuration.run_command import list_arguments
 from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Written
 from tractexp.storage import files
 from tractexp.studies.api.search import Searches
-from tractexp.text.progress import say
+from tractexp.text import quoting
+from tractexp.text.progress import Progress, say
 
 if TYPE_CHECKING:
     from tractexp.studies.comparison.comparison import Comparison
@@ -24,6 +27,9 @@ if TYPE_CHECKING:
 SWEEPS = Path("outputs", "sweeps")
 TARGETS = (10.0, 2.0, 1.01)
 APART = ("budget", "time_limit", "target")
+ENOUGH_SEEDS = 30  # of a sweep that is to settle something
+UNSETTLED = "Not settled"  # begins such an answer
+MOST_SCREEN_SENTENCES = 4  # of one screen
 MOST_TERMINAL_SENTENCES = 8  # sentences on the terminal; the page has all
 
 
@@ -120,6 +126,14 @@ class ComparisonResult(Written):
             report.text(f"- and {more} more sentences in {self.page}")
         return report
 
+    def screen(self) -> Report:
+        """The answer, the table, and what may be quoted first."""
+        if "problems" in self.content:
+            return self.summary()
+        page = Report().text(self.answer, "").add(self.table())
+        told = [*self.sentences[:MOST_SCREEN_SENTENCES], *self.content["notes"]]
+        return page.text(*(f"- {sentence}" for sentence in told))
+
     def _over_all(self) -> Iterator[Table]:
         """What several problems come to under each of the terms, the best variants first."""
         for overall in getattr(self.comparison, "overall", ()):
@@ -133,6 +147,20 @@ class ComparisonResult(Written):
                 cells,
                 f"{overall.terms}, {overall.where}: {overall.measure}",
             )
+
+    @property
+    def next_step(self) -> str:
+        """The command that runs more seeds in the folder of the sweep that ends here, where nothing
+        is settled; elsewhere the answer is the end.
+        """
+        given = list_arguments()
+        swept = {"-m", "--multirun"} & {*given} and self.folder is not None
+        if not swept or not self.answer.startswith(UNSETTLED):
+            return ""
+        kept = [each for each in given if not each.startswith(("seed=", "hydra.sweep.dir="))]
+        place = format_assignment("hydra.sweep.dir", str(self.folder))
+        command = quoting.shell("tractexp", *kept, f"seed=range(0,{ENOUGH_SEEDS})", place)
+        return f"run more seeds: {command}"
 
     def report(self) -> Report:
         """The page of the comparison."""
@@ -168,7 +196,7 @@ def compare(
     apart: Sequence[str] = (),
     bbob: int = 0,
     cores: int | None = None,
-    progress: Any = None,
+    progress: Progress = None,
 ) -> ComparisonResult:
     """Compare the variants in a sweep's folder, or what a `filter` finds, or what `tractexp.search`
     found.

@@ -16,9 +16,10 @@ from tractexp.configuration.plugin import plugin
 from tractexp.errors import check_choice, check_range
 from tractexp.outcome import Drawing, Written
 from tractexp.storage import files
-from tractexp.text.progress import NEXT_LINES, Pace, say, tell_stages
+from tractexp.text.progress import NEXT_LINES, Pace, Progress, say, tell_stages
 
 if TYPE_CHECKING:
+    from tractexp.api.given import Chosen, ModelGiven, Records
     from tractexp.studies.paper.claims import Claim
     from tractexp.studies.paper.study import Study
     from tractexp.tracking import TrackedRun
@@ -140,10 +141,10 @@ class PaperResult(Written):
 
 @public
 def paper(
-    records: Any,
-    model: Any = None,
+    records: "Records",
+    model: "ModelGiven | None" = None,
     *,
-    validate: Any = (),
+    validate: "Records" = (),
     parts: Sequence[str] = (),
     seeds: int = SEEDS,
     workers: int | None = None,
@@ -151,12 +152,12 @@ def paper(
     fixed: Mapping[str, float] | None = None,
     per_event: Sequence[str] | None = None,
     substeps: int | None = None,
-    objective: Any = None,
+    objective: "Chosen | None" = None,
     budget: int | None = None,
     time_limit: float | None = None,
     target: float | None = None,
     seed: int = 0,
-    progress: Any = None,
+    progress: Progress = None,
 ) -> PaperResult:
     """Measure what the paper claims, on dips that are fitted and on others held out.
 

@@ -17,6 +17,7 @@ from tractexp.storage import files
 from tractexp.text.progress import Progress, count_parts, tell
 
 if TYPE_CHECKING:
+    from tractexp.api.given import Chosen, ModelGiven, Records, Several
     from tractexp.studies.comparison.runs import SearchRun
 
 SEARCH_SEEDS = 30
@@ -68,23 +69,23 @@ class Searches(Written):
 
 @public
 def search(
-    records: Any,
-    model: Any = None,
+    records: "Records",
+    model: "ModelGiven | None" = None,
     *,
-    optimizers: Any = None,
+    optimizers: "Several | None" = None,
     switches: Sequence[str] = (),
     seeds: int = SEARCH_SEEDS,
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     per_event: Sequence[str] | None = None,
     substeps: int | None = None,
-    objective: Any = None,
+    objective: "Chosen | None" = None,
     budget: int | None = None,
     time_limit: float | None = None,
     target: float | None = None,
     seed: int = 0,
     cores: int | None = None,
-    progress: Any = None,
+    progress: Progress = None,
 ) -> Searches:
     """Fit a model by each optimizer under several seeds, for `tractexp.compare` to judge.
 
