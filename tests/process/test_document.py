@@ -73,6 +73,25 @@ def test_a_document_has_columns_by_their_words_and_equations_as_large_as_its_tex
     assert document.styles["Heading 1"].font.name == document.styles["Normal"].font.name
 
 
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("\x1b[2J\u202ea", "\\x1b[2J\\u202ea"),
+        ("a\0\udcff", "a\\x00\\udcff"),
+        ("x" * 300, "x" * 300),
+    ],
+)
+def test_names_that_xml_cannot_hold_are_shown_by_their_escapes(tmp_path, name, shown):
+    docx = pytest.importorskip("docx", reason="the extra [word] is not installed")
+    page = Report(f"Load {name}", name).heading(name).text(name).items([name]).code(name)
+    page.table([name], [[name]], name).equation(rf"\begin{{x}} {name}").verdict(name, kind="good")
+    document = docx.Document(str(page.save(tmp_path / "sheet.docx")))
+    told = [paragraph.text for paragraph in document.paragraphs]
+    assert told.count(shown) == 7
+    assert [cell.text for row in document.tables[0].rows for cell in row.cells] == [shown] * 2
+    assert document.core_properties.title == f"Load {shown}"[:255]
+
+
 def test_without_the_library_the_sentence_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "docx", None)
     with pytest.raises(UserError, match=r"pip install 'tractexp\[word\]'"):

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from unicodedata import category
 
 from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
@@ -26,6 +27,8 @@ LETTER, CELL_MARGIN = 0.18, 0.45  # cm of a table: one letter, both margins of a
 MOST_ROWS_TOGETHER = 12  # of a table that stands on one page
 LONGEST_WORD = 20  # letters that a column has room for; longer words, such as sums, are broken
 FIRST_ROW = 0x20  # of the flags by which a table's style is applied: there is a head
+SPACE = "Zs"  # category of what parts words and is shown, also without a break
+LONGEST_TITLE = 255  # characters of a document's property
 LEFT_OUT = "What the page moves or folds away, such as sliders, is left out of this document."
 
 
@@ -43,10 +46,10 @@ def save_document(report: Report, path: Path) -> Path:
     document = docx.Document()
     _set_paper(document.sections[0])
     _set_fonts(document)
-    document.core_properties.title = report.title
-    document.add_heading(report.title, 0)
+    document.core_properties.title = _visible(report.title)[:LONGEST_TITLE]
+    document.add_heading(_visible(report.title), 0)
     if report.lead:
-        document.add_paragraph(report.lead)
+        document.add_paragraph(_visible(report.lead))
     with tempfile.TemporaryDirectory() as folder:
         for block in report.blocks:
             _add_block(document, block, Path(folder))
@@ -61,25 +64,33 @@ def _add_block(document: Any, block: blocks.Block, folder: Path) -> None:
     """A block as paragraphs, a table or a picture; nothing for what only a page can show."""
     match block:
         case blocks.Heading(text, level):
-            document.add_heading(text, level - 1)
+            document.add_heading(_visible(text), level - 1)
         case blocks.Paragraphs(texts):
             for text in texts:
-                document.add_paragraph(text)
+                document.add_paragraph(_visible(text))
         case blocks.VerdictBlock(texts):
             for text in texts:
-                document.add_paragraph().add_run(text).bold = True
+                document.add_paragraph().add_run(_visible(text)).bold = True
         case blocks.Items(texts):
             for text in texts:
-                document.add_paragraph(text, style="List Bullet")
+                document.add_paragraph(_visible(text), style="List Bullet")
         case blocks.CodeBlock(text):
-            document.add_paragraph(text, style="No Spacing")
+            document.add_paragraph(_visible(text), style="No Spacing")
         case Table():
             _add_table(document, block)
         case blocks.ChartBlock(chart, caption):
             _add_picture(document, draw_chart(chart, folder / "chart.png"))
-            document.add_paragraph(caption, style="Caption")
+            document.add_paragraph(_visible(caption), style="Caption")
         case blocks.Equation(latex):
             _add_equation(document, latex, folder / "equation.png")
+
+
+def _visible(text: str) -> str:
+    """A text as a document can hold it: what cannot be printed, such as control characters in the
+    names of a record, as its escape.
+    """
+    kept = (c.isprintable() or c in "\n\t" or category(c) == SPACE for c in text)
+    return "".join(c if keep else ascii(c)[1:-1] for c, keep in zip(text, kept, strict=True))
 
 
 def _set_paper(section: Any) -> None:
@@ -120,7 +131,7 @@ def _add_equation(document: Any, latex: str, path: Path) -> None:
     """An equation as a picture; as LaTeX where mathtext cannot draw it."""
     drawn = draw_equation(latex, "png")
     if not drawn:
-        document.add_paragraph(latex)
+        document.add_paragraph(_visible(latex))
         return
     files.write(path, drawn)
     _add_picture(document, path, EQUATION_SCALE)
@@ -134,7 +145,7 @@ def _add_table(document: Any, table: Table) -> None:
     from docx.shared import Cm
 
     if table.title:
-        document.add_paragraph(table.title, style="Caption")
+        document.add_paragraph(_visible(table.title), style="Caption")
     head = [list(table.columns)] if any(table.columns) else []
     rows = [*head, *table.cells]
     grid = document.add_table(len(rows), len(table.columns), style=TABLE_STYLE)
@@ -154,7 +165,7 @@ def _add_table(document: Any, table: Table) -> None:
     else:
         _take_off_head(grid)
     if table.caption:
-        document.add_paragraph(table.caption, style="Caption")
+        document.add_paragraph(_visible(table.caption), style="Caption")
 
 
 def _fill_cell(cell: Any, text: str, to_the_right: bool) -> Any:
@@ -163,7 +174,7 @@ def _fill_cell(cell: Any, text: str, to_the_right: bool) -> Any:
     from docx.shared import Pt
 
     (paragraph,) = cell.paragraphs
-    paragraph.add_run(text).font.size = Pt(TABLE_FONT_SIZE)
+    paragraph.add_run(_visible(text)).font.size = Pt(TABLE_FONT_SIZE)
     paragraph.paragraph_format.space_after = Pt(0)
     if to_the_right:
         paragraph.alignment = WD_ALIGN_PARAGRAPH.RIGHT
