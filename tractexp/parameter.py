@@ -88,7 +88,9 @@ class Parameter:
         self._check_numbers(where)
 
     def _check_numbers(self, where: str) -> None:
-        """The same of the bounds, and of the numbers that lie within them."""
+        """Raise `UserError` unless the bounds are finite and in order, and the numbers lie
+        within them.
+        """
         low, high = self.bounds
         if not (np.isfinite([low, high]).all() and low < high):
             raise UserError(
@@ -132,7 +134,7 @@ class Box:
 
     @classmethod
     def from_parameters(cls, parameters: tuple[Parameter, ...]) -> "Box":
-        """The box of some parameters, named as they are."""
+        """The box of some parameters, with their names and bounds."""
         bounds = np.array([p.bounds for p in parameters], dtype=float).reshape(-1, 2)
         return cls(bounds[:, 0].copy(), bounds[:, 1].copy(), tuple(p.name for p in parameters))
 
@@ -140,12 +142,12 @@ class Box:
 
     @classmethod
     def unit(cls, dimension: int) -> "Box":
-        """The unit cube."""
+        """The unit cube of so many coordinates, without names."""
         return cls(np.zeros(dimension), np.ones(dimension))
 
     @property
     def dimension(self) -> int:
-        """How many coordinates there are, d."""
+        """The number d of coordinates."""
         return len(self.lower)
 
     @property
@@ -158,7 +160,13 @@ class Box:
         return np.clip(x, self.lower, self.upper)
 
     def uniform(self, rng: np.random.Generator, n: int) -> np.ndarray:
-        """(n, d) points drawn uniformly."""
+        """Points (n, d) of the box, drawn uniformly.
+
+        Examples
+        --------
+        >>> Box.unit(2).uniform(np.random.default_rng(1), 3).shape
+        (3, 2)
+        """
         return self.from_unit(rng.random((n, self.dimension)))
 
     def from_unit(self, unit: np.ndarray) -> np.ndarray:
@@ -168,7 +176,13 @@ class Box:
         return self.clip(self.lower + self.width * unit)
 
     def to_unit(self, x: np.ndarray) -> np.ndarray:
-        """Points (..., d) of this box in the unit cube."""
+        """The points (..., d) of this box in the unit cube.
+
+        Examples
+        --------
+        >>> Box(np.array([10.0]), np.array([30.0])).to_unit(np.array([15.0])).tolist()
+        [0.25]
+        """
         return (x - self.lower) / self.width
 
     def index(self, name: str) -> int:

@@ -10,8 +10,8 @@ CHANGE_CORNER = 0.02  # of a change: how rounded its corners are
 
 
 def since(eq, returned, name):
-    """Time [s] since the dip began, or since the voltage had `returned` from its lowest by more
-    than half; 0 before.
+    """The time [s] since the dip began, or since the voltage had come back from its lowest by more
+    than half, where `returned` is asked for; 0 before.
     """
     import sympy
 

@@ -4,12 +4,12 @@ three phases.
 
 
 def phases_of(eq, vector, zero):
-    """The three phases of a space vector in the frame and a zero sequence."""
+    """The three phases of a space vector in the turning frame and of a zero sequence."""
     return [eq.parts(eq.turn * (vector * _rotate_phase(-k)))[0] + zero for k in range(3)]
 
 
 def vector_of(eq, phases):
-    """The space vector in the frame of three phases, and their zero sequence."""
+    """The space vector in the turning frame of three phases, and their zero sequence."""
     from sympy import Rational, conjugate
 
     still = Rational(2, 3) * sum(_rotate_phase(k) * x for k, x in enumerate(phases))

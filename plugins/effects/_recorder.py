@@ -10,10 +10,19 @@ STEP = EVENT.index("step")
 
 
 def earlier(power, drive, delay):
-    """Make of power (C, n, N) what it was `delay` (E, n) [s] earlier.
+    """Replace power by what it was some time earlier.
 
     Between samples it is the cubic of Catmull and Rom (1974); beyond the ends of an event it goes
     on by one step of its slope, and stays there.
+
+    Parameters
+    ----------
+    power : (C, n, N) [pu]
+        Of n candidates, changed in place.
+    drive : Drive
+        E events of N samples in all.
+    delay : (E, n) [s]
+        How much earlier.
     """
     whole, part = _steps(delay / drive.event[:, [STEP]])
     _change(CUBIC, power, drive, {"shift": -whole}, {"r": part})
@@ -26,13 +35,24 @@ def _cubic(y, r):
 
 
 def delay_response(power, drive, delay, quiet):
-    """Make of power (C, n, N) what the voltage U, `delay` (E, n) [s] earlier, draws.
+    """Replace power by what the voltage of some time earlier draws.
 
-    Between samples U is the cubic of its slopes, as the equations have it, and the current y/U
-    follows it: by so much as both changed over the interval where that is more than `quiet`, of the
-    voltage before, by a straight line else. What bends besides is a parabola of the weaker of the
-    two bends beside the interval, so that no corner is smoothed. What lies beyond the first and
-    last sample of an event is as there.
+    Between samples the voltage U is the cubic of its slopes, as the equations have it, and the
+    current y/U follows it: by so much as both changed over the interval where that is more than
+    `quiet`, by a straight line else. What bends besides is a parabola of the weaker of the two
+    bends beside the interval, so that no corner is smoothed. Beyond the first and last sample of an
+    event all is as there.
+
+    Parameters
+    ----------
+    power : (C, n, N) [pu]
+        Of n candidates, changed in place.
+    drive : Drive
+        E events of N samples in all.
+    delay : (E, n) [s]
+        How much earlier.
+    quiet : float
+        A change of the voltage, over that before, that is too small to be followed.
     """
     whole, part = _steps(delay / drive.event[:, [STEP]])
     of_sample = np.repeat(np.arange(drive.events), np.diff(drive.first))  # its event
@@ -70,8 +90,16 @@ def _current(y, U, each, slope, follow, place, r):
 
 
 def add_drift(power, drive, rate):
-    """Make of power (C, n, N) what it is if it changes by `rate` (E, C, n) [1/s] from the first
-    sample of an event.
+    """Let power drift from the first sample of each event.
+
+    Parameters
+    ----------
+    power : (C, n, N) [pu]
+        Of n candidates, changed in place.
+    drive : Drive
+        E events of N samples in all.
+    rate : (E, C, n) [1/s]
+        By which share it changes in a second.
     """
     at_once = np.zeros(rate.shape, dtype=int)
     _change(
@@ -84,10 +112,18 @@ def _apply_drift(y, t, rate):
 
 
 def average_power(power, drive, window):
-    """Make of power (2, n, N) its mean over `window` (E, n) [s] around each sample.
+    """Replace power by its mean over a window around each sample.
 
-    It is linear between samples and keeps its first and last value beyond them. A window of 0
-    leaves it as it is.
+    It is linear between samples and keeps its first and last value beyond them.
+
+    Parameters
+    ----------
+    power : (2, n, N) [pu]
+        Of n candidates, changed in place.
+    drive : Drive
+        E events of N samples in all.
+    window : (E, n) [s]
+        Length of the window; 0 leaves the power as it is.
     """
     length = window / drive.event[:, [STEP]]
     whole, part = _steps(length / 2)

@@ -51,9 +51,10 @@ def _share(last, now):
 
 
 def stages(eq, first, last, delay, waits, margin, ramp, name):
-    """How much is open of equal stages, 0 to 1: relays with levels evenly from `first` to `last`,
-    one for each of `waits`, as `opened` has them. `name` begins the ends of the names of their
-    states.
+    """The share, 0 to 1, that is open of equal stages.
+
+    The relays have levels evenly spaced from `first` to `last`, one for each of `waits`, and open
+    as in `compute_open_share`. `name` begins the ends of the names of their states.
     """
     steps = len(waits) - 1
     return sum(

@@ -18,8 +18,24 @@ EXP_MAX = 700.0  # exp overflows beyond it; any box ends long before
 
 
 def produce(x: np.ndarray, alarmed: bool, iterations: int, rng: np.random.Generator) -> np.ndarray:
-    """Producers, Eq. (11), ranks 1 to k: x exp(-i / (alpha iter_max)), or x + Q L once R2 >= ST
-    (`alarmed`).
+    """The moves of the producers, Eq. (11).
+
+        x exp(-i/(alpha iter_max)), or x + Q L once R2 >= ST
+
+    Parameters
+    ----------
+    x : (k, d)
+        Positions of ranks 1 to k.
+    alarmed : bool
+        Whether R2 >= ST.
+    iterations : int
+        iter_max.
+    rng : numpy.random.Generator
+        Draws alpha and Q.
+
+    Returns
+    -------
+    (k, d) array
     """
     if alarmed:
         return x + rng.standard_normal((len(x), 1))

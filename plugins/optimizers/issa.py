@@ -35,7 +35,21 @@ def levy_sigma(beta: float) -> float:
 
 
 def levy_flight(shape: tuple[int, ...], formula: str, rng: np.random.Generator) -> np.ndarray:
-    """Levy steps: Mantegna's mu / |nu|^(1/beta), or Eq. (15) as "printed", -mu / |nu|^beta."""
+    """Levy steps.
+
+    Parameters
+    ----------
+    shape : tuple of ints
+        Of the result.
+    formula : str
+        "mantegna", mu/|nu|^(1/beta), or "printed" as Eq. (15) is, -mu/|nu|^beta.
+    rng : numpy.random.Generator
+        Draws mu and nu.
+
+    Returns
+    -------
+    array of that shape
+    """
     mu = levy_sigma(LEVY_BETA) * rng.standard_normal(shape)
     nu = np.abs(rng.standard_normal(shape))
     return mu / nu ** (1 / LEVY_BETA) if formula == "mantegna" else -mu / nu**LEVY_BETA

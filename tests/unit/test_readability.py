@@ -21,7 +21,7 @@ LIMITS = {
     "numbers' names with several homes": 0,
     "functions of complexity over 10, in percent": 3.1,
 }
-LEAST_DOCSTRINGS = 17.7  # percent of all lines
+LEAST_DOCSTRINGS = 21.0  # percent of all lines
 
 PARTICIPLE = re.compile(r"[a-z]+(ed|ing)")
 PREPOSITIONS = re.compile(

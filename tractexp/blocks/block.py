@@ -118,7 +118,13 @@ class Table:
 
 
 def cell_text(cell: Any) -> str:
-    """A cell as it is read: nothing for None, five digits of a number."""
+    """A cell as it is read: "" for None, five digits of a number.
+
+    Examples
+    --------
+    >>> cell_text(None), cell_text(0.1234567), cell_text(3)
+    ('', '0.12346', '3')
+    """
     if cell is None:
         return ""
     return f"{cell:.5g}" if isinstance(cell, float) else str(cell)

@@ -46,10 +46,19 @@ SETTINGS: Any = {
 def thin(
     x: np.ndarray, y: np.ndarray, points: int = MOST_POINTS_A_LINE
 ) -> tuple[np.ndarray, np.ndarray]:
-    """At most about `points` of (x, y), both (n,): the lowest and highest of each of `points`/2
-    stretches, and gaps.
+    """Thin a curve for drawing, so that no dip or spike is lost, however short.
 
-    No dip or spike is lost, however short. nan is kept, so that a gap stays a gap.
+    Parameters
+    ----------
+    x, y : (n,)
+        The curve; nan in y is a gap and stays one.
+    points : int
+        At most about so many are kept: the lowest and highest of each of half as many stretches.
+
+    Returns
+    -------
+    two (m,) arrays
+        x and y of the points kept; all of them where there are few.
     """
     if len(y) <= points:
         return x, y

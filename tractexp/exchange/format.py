@@ -21,9 +21,20 @@ from tractexp.text.wording import join_words
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """An identified load on a bus, and the base its per-unit values stand for.
+    """An identified load on a bus, and the base of the export.
 
-    `ratio` is how many per units of power of that base one of the base of the fit is.
+    Attributes
+    ----------
+    result : Result
+        The identification.
+    bus : int
+        Number of the bus.
+    power : float [MVA]
+        One per unit of power in the export.
+    voltage : float [kV]
+        One per unit of voltage.
+    ratio : float
+        Per units of power of that base in one of the base of the fit.
     """
 
     result: Result
@@ -34,8 +45,9 @@ class Identified:
 
     @cached_property
     def model(self) -> Model:
-        """In phasors, which every format is written for: there what carries the network alone is
-        static load.
+        """The model in phasors, for which every format is written.
+
+        What carries the network alone in waveforms is static load there.
         """
         motor, static, effects, integration, *_ = parts(self.result.model)
         own = [e for e in effects if not (e.waves_only or e.name in self.result.shown_effects)]
@@ -43,7 +55,7 @@ class Identified:
 
     @cached_property
     def values(self) -> dict[str, float]:
-        """The parameters on the base of the export."""
+        """{name: value} of the parameters on the base of the export."""
         exponents = {p.name: p.power_exponent for p in self.model.parameters}
         parameters = self.result.parameters
         return {
@@ -68,8 +80,9 @@ class Identified:
 
     @cached_property
     def steady_state(self) -> dict[str, float]:
-        """States and named quantities before the event. Raises `UserError` where there is no steady
-        state.
+        """{name: value} of states and named quantities before the event, on the base of the export.
+
+        Raises `UserError` where there is no steady state.
         """
         stored, flat = self.result.before, np.full(2, self.result.before["U0"])
         P0, Q0 = self.ratio * stored["P0"], self.ratio * stored["Q0"]
@@ -95,8 +108,14 @@ class Identified:
 class Restored:
     """A load as the numbers of a file describe it, on the base of the export.
 
-    `model` are its parts as a model's configuration names them; `static` is what the static part
-    draws before the event, P and Q.
+    Attributes
+    ----------
+    model : mapping
+        Its parts, as a model's configuration names them.
+    parameters : {name: value}
+        Of these.
+    static : (P, Q) [pu]
+        What the static part draws before the event.
     """
 
     model: Mapping[str, Any]
@@ -106,10 +125,18 @@ class Restored:
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What another simulator, named by `by`, had a load draw: U, P and Q (N,) [pu of the export],
-    every `step` [s].
+    """What another simulator had a load draw.
 
-    `speed` (N,) is that of the voltage's angle, relative to nominal [rad/s].
+    Attributes
+    ----------
+    by : str
+        Name of the simulator.
+    step : float [s]
+        Between samples.
+    U, P, Q : (N,) [pu of the export]
+        Voltage and power.
+    speed : (N,) [rad/s]
+        Of the voltage's angle, relative to nominal.
     """
 
     by: str
@@ -121,7 +148,17 @@ class Simulated:
 
 
 class Format(Plugin):
-    """Base of the export formats, chosen by `task.format=NAME`."""
+    """Base of the export formats, chosen by `task.format=NAME`.
+
+    Attributes
+    ----------
+    suffix : str
+        Of the file.
+    motors, statics, effects : names or None
+        The parts that it can represent; None: all.
+    lacks : {name: reason}
+        Why a part cannot be represented, where that is not plain.
+    """
 
     group: ClassVar[str] = "format"
     chosen: ClassVar[bool] = False
@@ -134,8 +171,21 @@ class Format(Plugin):
 
     @abstractmethod
     def text(self, load: Identified) -> str:
-        """The file's content. `check_parts` has passed; raises `UserError` for values it cannot
-        represent.
+        """The content of the file.
+
+        Parameters
+        ----------
+        load : Identified
+            That `check_parts` accepts.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        UserError
+            For values that the format cannot represent.
         """
 
     def notes(self, load: Identified) -> list[str]:
@@ -153,10 +203,24 @@ class Format(Plugin):
         return None
 
     def play_back_dip(self, text: str, load: Identified) -> Simulated | None:
-        """A dip that the simulator of this format has played through the file; None where that is
-        not at hand.
+        """A dip that the simulator of this format plays through the file.
 
-        Raises `UserError` where it is, and fails.
+        Parameters
+        ----------
+        text : str
+            Content of the file.
+        load : Identified
+            The load that was exported.
+
+        Returns
+        -------
+        Simulated or None
+            None where the simulator is not at hand.
+
+        Raises
+        ------
+        UserError
+            Where it is, and fails.
         """
         return None
 

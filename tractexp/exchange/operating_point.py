@@ -15,11 +15,20 @@ from tractexp.identification.verdict import rests_on_bound
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Powers [MW, Mvar, or pu of the file] before the first event that was fitted, and the motor
-    there.
+    """The powers before the first fitted event, and the motor there.
 
-    `slip` is per unit of the nominal speed, `H` [s] on the motor's own apparent power, `starting`
-    the current at standstill over that before the dip; None where this motor has no such figure.
+    Attributes
+    ----------
+    P, Q, P_motor, Q_motor : float
+        Of the load and of its motor, in `units`.
+    slip : float
+        Per unit of the nominal speed.
+    H : float or None [s]
+        On the motor's own apparent power; None where this motor has no such figure.
+    starting : float or None
+        Current at standstill over that before the dip.
+    units : (str, str)
+        MW and Mvar, or per unit of the file.
     """
 
     P: float

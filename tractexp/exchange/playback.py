@@ -23,8 +23,16 @@ STEPS_A_SAMPLE = 8  # Runge-Kutta steps a sample of another simulator's
 
 @dataclass(frozen=True)
 class Agreement:
-    """How far an exported load is off the fit at most, and how far the power moves in all: pairs of
-    P and Q [pu].
+    """How well an exported load agrees with the fit.
+
+    Attributes
+    ----------
+    by : str
+        What played it.
+    off : (P, Q) [pu]
+        How far it is off the fit at most.
+    moved : (P, Q) [pu]
+        How far the power moves in all.
     """
 
     by: str
@@ -52,7 +60,13 @@ class Agreement:
 
 
 def dip(step: float = STEP) -> np.ndarray:
-    """The voltage (N,) of the dip that exports are played along, over that before it."""
+    """The voltage (N,) of the dip along which exports are played, over that before it.
+
+    Parameters
+    ----------
+    step : float [s]
+        Between samples.
+    """
     t = np.arange(round(LENGTH / step) + 1) * step
     fallen, back = (
         0.5 - 0.5 * np.cos(np.pi * np.clip((t - at) / EDGE, 0, 1)) for at in (FALL, RISE)

@@ -45,7 +45,17 @@ ABOUT = {
 
 @dataclass(frozen=True)
 class RatedQuantity:
-    """A figure of the motor on its own rating, and the least and largest of typical machines."""
+    """A figure of the motor on its own rating.
+
+    Attributes
+    ----------
+    name, about, unit : str
+        Its name, what it is, and its unit.
+    value : float
+        Of this motor.
+    low, high : float
+        The least and the largest of typical machines.
+    """
 
     name: str
     about: str
@@ -71,9 +81,10 @@ class RatedMachine:
 
 
 def compute_rating(result: Result) -> float:
-    """What the motor draws before the dip, in apparent power [pu of the fit].
+    """The apparent power that the motor draws before the dip [pu of the fit].
 
-    Raises `UserError` where the model has no such motor.
+    It stands for the motor's rating. Raises `UserError` where the model has no motor that draws
+    power.
     """
     before = Identified(result).steady_state
     drawn = float(np.hypot(before.get("P_motor", 0.0), before.get("Q_motor", 0.0)))
@@ -83,8 +94,21 @@ def compute_rating(result: Result) -> float:
 
 
 def rate_machine(result: Result) -> RatedMachine:
-    """The motor of a model on its own rating. Raises `UserError` where it has none, or no circuit
-    of one.
+    """The motor of a model on its own rating, beside typical machines.
+
+    Parameters
+    ----------
+    result : Result
+        The identification.
+
+    Returns
+    -------
+    RatedMachine
+
+    Raises
+    ------
+    UserError
+        Where the model has no motor, or none that is a single machine.
     """
     rating = compute_rating(result)
     load = Identified(result, ratio=1 / rating)

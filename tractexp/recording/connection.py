@@ -22,7 +22,8 @@ SINGLE = (
 class Connection(Plugin):
     """Base of the connections, chosen by `data.connection=NAME`, or by name and settings.
 
-    Linear and without memory: one matrix for the voltages, one for the currents.
+    A connection turns recorded channels into the voltages and currents of a load's phases. It is
+    linear and without memory: one matrix for the voltages, one for the currents.
     """
 
     group: ClassVar[str] = "connection"
@@ -54,12 +55,12 @@ class Connection(Plugin):
 
     @property
     def voltages(self) -> int:
-        """How many voltage channels it takes."""
+        """The number of voltage channels that it takes."""
         return self.voltage().shape[1]
 
     @property
     def currents(self) -> int:
-        """How many current channels it takes."""
+        """The number of current channels that it takes."""
         return self.current().shape[1]
 
     @property

@@ -98,7 +98,7 @@ def estimator_of(setting: str | Mapping[str, object] | None = None) -> Estimator
 
 
 def estimators(nominal: float) -> list[Estimator]:
-    """All that are registered and support a nominal frequency [Hz], by their default settings."""
+    """The estimators that support a nominal frequency [Hz], each with its default settings."""
     supporting: list[Estimator] = []
     for name in sorted(discover()[Estimator.group]):
         one = estimator_of(name)

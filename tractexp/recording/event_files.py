@@ -35,8 +35,12 @@ ORDERS = ("abc", "rst", "uvw", "ryb", "rwb")  # of phases in files' names, besid
 
 
 def tell_apart(paths: Sequence[str]) -> list[str]:
-    """What each file's name has that the others' have not, folders of their own included: "L1" of
-    ev_L1.csv.
+    """What each file's name has that the others' have not, the names of their folders included.
+
+    Examples
+    --------
+    >>> tell_apart(["bay/ev_L1.csv", "bay/ev_L2.csv"])
+    ['L1', 'L2']
     """
     names = [Path(path).with_suffix("").parts for path in paths]
     common = 0
@@ -202,8 +206,25 @@ def _seconds(one: SampledFile, other: SampledFile) -> float:
 
 
 def move_samples(values: np.ndarray, first: int, count: int, late: float) -> np.ndarray:
-    """Values (count,) from sample `first` on, at instants that lie `late` steps after the samples,
-    by cubic splines; nan stays where it is.
+    """Values at instants that lie between the samples, by cubic splines.
+
+    Parameters
+    ----------
+    values : (N,)
+        At even times; nan stays where it is.
+    first, count : int
+        Sample to begin with, and how many are wanted.
+    late : float
+        Steps by which the instants lie after the samples.
+
+    Returns
+    -------
+    (count,) array
+
+    Examples
+    --------
+    >>> move_samples(np.arange(6.0) ** 3, 1, 2, 0.5).round(9).tolist()
+    [3.375, 15.625]
     """
     if abs(late) <= SAME_INSTANT:
         return values[first : first + count]

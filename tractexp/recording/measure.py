@@ -106,12 +106,33 @@ def phasors_of(
     harmonics: Sequence[int] = (),
     tracked: dict[int, np.ndarray] | None = None,
 ) -> Phasors:
-    """The phasors of a feeder within one segment, by an estimator: its name, or name and settings;
-    None: the usual one.
+    """Measure the phasors of a feeder within one segment.
 
-    `skew` corrects what the file says of late channels; `harmonics` are measured besides the
-    fundamental; `tracked` is what the loads of a bus share (`measure`). Raises `UserError` for a
-    segment that is too short, and for harmonics the sampling cannot show.
+    Parameters
+    ----------
+    recording : Recording
+        With all channels.
+    feeder : Feeder
+        Which of them are the load's.
+    segment : Segment
+        The samples.
+    estimator : name, mapping or None
+        A name, or name and settings; None: the usual one.
+    skew : bool
+        Whether what the file says of late channels is corrected.
+    harmonics : ints
+        Measured besides the fundamental.
+    tracked : dict or None
+        Frequencies that the loads of a bus share, as in `tractexp.record.phasor.measure`.
+
+    Returns
+    -------
+    Phasors
+
+    Raises
+    ------
+    UserError
+        For a segment that is too short, and for harmonics that the sampling cannot show.
     """
     for h in harmonics:
         if h < 2 or h * 1.1 * recording.frequency >= segment.rate / 2:

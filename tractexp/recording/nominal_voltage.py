@@ -49,7 +49,15 @@ FAR = 0.08  # of every nominal voltage: what is farther has none
 
 
 def off_nominal(voltage: float) -> float:
-    """How far a line voltage [kV] is off the nearest nominal one, as a natural logarithm."""
+    """How far a line voltage [kV] is off the nearest nominal one, as a natural logarithm.
+
+    Infinite of a voltage that is not positive.
+
+    Examples
+    --------
+    >>> round(off_nominal(110.0), 6), off_nominal(0.0)
+    (0.0, inf)
+    """
     return (
         min(abs(float(np.log(voltage / each))) for each in NOMINAL_VOLTAGES)
         if voltage > 0
@@ -58,15 +66,15 @@ def off_nominal(voltage: float) -> float:
 
 
 def is_between_phases(voltage: float) -> bool:
-    """Whether a voltage [kV] is near a nominal one as it stands, and times sqrt 3 near none."""
+    """Whether a voltage [kV] is near a nominal one as it stands, and not so times sqrt 3."""
     return (
         off_nominal(voltage) < LARGEST_NOMINAL_DISTANCE and off_nominal(np.sqrt(3) * voltage) > FAR
     )
 
 
 def is_to_ground(voltage: float) -> bool:
-    """Whether a voltage [kV] is near no nominal one as it stands, and times sqrt 3 near one of
-    three phases.
+    """Whether a voltage [kV] is near no nominal one as it stands, and near one of three phases
+    times sqrt 3.
     """
     line = float(np.sqrt(3)) * voltage
     nearest = min(NOMINAL_VOLTAGES, key=lambda each: abs(np.log(max(line, 1e-12) / each)))

@@ -75,7 +75,13 @@ class PhaseMark:
 
 @functools.lru_cache(maxsize=MOST_KNOWN_NAMES)
 def plain(text: str) -> str:
-    """Lower case, full-width and Roman characters and look-alike Cyrillic letters as Latin ones."""
+    """A text in lower case, with full-width, Roman and look-alike Cyrillic letters as Latin ones.
+
+    Examples
+    --------
+    >>> plain(" ＵＡ ")
+    'ua'
+    """
     return unicodedata.normalize("NFKC", text).strip().lower().translate(CYRILLIC)
 
 
@@ -120,11 +126,22 @@ def quantity_before(text: str, at: int) -> bool:
 
 
 def spell_marks(name: str, letters: str) -> tuple[str, bool]:
-    """(a name in plain letters with the mark of its phases as a, b, c or ab, bc, ca, whether ground
-    is said).
+    """A name with the mark of its phases in plain letters.
 
-    `letters` is the order of phases of the table, in capitals where two letters side by side are no
-    two phases (UU, UV, UW); L1, L2, L3 mean the same in any.
+    Parameters
+    ----------
+    name : str
+        Of a channel.
+    letters : str
+        The order of phases of the table, in capitals where two letters side by side are no two
+        phases (UU, UV, UW); L1, L2, L3 mean the same in any.
+
+    Returns
+    -------
+    str
+        The mark is a, b, c or ab, bc, ca.
+    bool
+        Whether the name says that it is to ground.
     """
     name = unicodedata.normalize("NFKC", name).strip().lower()
     for pattern, word in SAID:

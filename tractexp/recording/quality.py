@@ -361,8 +361,28 @@ def _fit(
 
 
 def spectrum(wave: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (M,) [Hz] and RMS values (M,) of a wave (N,), by a Hann window (a sinusoid is
-    right at its peak).
+    """The spectrum of a wave, by a Hann window.
+
+    Parameters
+    ----------
+    wave : (N,)
+        Samples at even times; their mean is taken out.
+    rate : float [Hz]
+        Of the samples.
+
+    Returns
+    -------
+    (M,) array [Hz]
+        Frequencies.
+    (M,) array
+        RMS values in the unit of the wave: that of a sinusoid is right at its peak.
+
+    Examples
+    --------
+    >>> wave = np.sqrt(2) * np.sin(2 * np.pi * 50 * np.arange(400) / 2000)
+    >>> f, size = spectrum(wave, 2000.0)
+    >>> float(f[size.argmax()]), round(float(size.max()), 6)
+    (50.0, 1.0)
     """
     window = np.hanning(len(wave) + 1)[:-1]
     lines = np.fft.rfft((wave - wave.mean()) * window)

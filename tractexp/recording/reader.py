@@ -101,8 +101,16 @@ class WaveformReader(Reader):
 
     @abstractmethod
     def recording(self) -> Recording:
-        """The file as it was recorded, all channels; raises `UserError` naming the file, the place
-        and the value.
+        """Read the file as it was recorded, all channels.
+
+        Returns
+        -------
+        Recording
+
+        Raises
+        ------
+        UserError
+            With the file, the place and the value of what is wrong.
         """
 
     def check(self) -> None:
@@ -118,7 +126,13 @@ class WaveformReader(Reader):
         check_range("data.post", self.post, 0.1)
 
     def read(self) -> Events:
-        """The dips that are fitted and held out, as phasors, with what was noted on the way."""
+        """Read the dips that are fitted and held out.
+
+        Returns
+        -------
+        Events
+            Phasors; what was noted on the way is in their notes.
+        """
         recording = self.open_recording()
         feeder = self.feeder(recording)
         dips = self.dips(

@@ -88,8 +88,16 @@ def quantity_of(text: str) -> str:
 
 @dataclass(frozen=True)
 class Segment:
-    """Samples of one rate: numbers from `first` up to but not including `stop`, from `start` [s]
-    on.
+    """A stretch of samples of one rate.
+
+    Attributes
+    ----------
+    first, stop : int
+        Sample numbers, from `first` up to but not including `stop`.
+    rate : float [Hz]
+        Of the samples.
+    start : float [s]
+        Time of the first.
 
     Examples
     --------
@@ -133,11 +141,37 @@ class Segment:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One measured quantity: value = (gain raw + offset) in `unit`, times `ratio` on the primary
+    """One measured quantity: value = gain raw + offset in `unit`, times `ratio` on the primary
     side.
 
-    `raw` (N,) is as the file stores it, a view where possible: ten minutes of waveforms are held
-    once, as integers.
+    Ten minutes of waveforms are held once, as the file's integers.
+
+    Attributes
+    ----------
+    name : str
+        As the file has it.
+    raw : (N,)
+        As the file stores it, a view where possible.
+    unit : str
+        Of the values, "" where it is not known.
+    quantity, phase, circuit : str
+        What is measured, and where, as far as is known.
+    gain, offset : float
+        From raw values to the unit.
+    ratio : float
+        From the values recorded to primary ones.
+    skew : float [s]
+        How much later than its time stamp it is sampled.
+    limits : (float, float) or None
+        The least and the greatest raw value that the file declares.
+    missing : float or None
+        The raw value that stands for none.
+    side : str
+        P or S, primary or secondary, as the file says.
+    form : str
+        "waveform", or what else its values are.
+    bridged : (samples, values)
+        What stands in place of short gaps.
     """
 
     name: str
@@ -195,8 +229,18 @@ class Channel:
 class StatusChannel:
     """One binary channel: contacts, trips, breaker positions.
 
-    `raw` (N,) is 0 or 1, or the words of which bit `bit` is meant: a hundred channels share the
-    file's few words.
+    Attributes
+    ----------
+    name : str
+        As the file has it.
+    raw : (N,)
+        0 or 1, or words of which one bit is meant: a hundred channels share the file's few words.
+    phase, circuit : str
+        Where it is, as far as the file says.
+    normal : int
+        Its normal state, 0 or 1.
+    bit : int or None
+        The bit of the words.
     """
 
     name: str
@@ -218,8 +262,34 @@ class StatusChannel:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What one file holds. Channels have equal lengths; each segment of them is
-    sampled uniformly.
+    """What one file holds.
+
+    Channels have equal lengths; each segment of them is sampled uniformly.
+
+    Attributes
+    ----------
+    source : str
+        The file.
+    channels : sequence of Channel
+        All that were recorded.
+    segments : sequence of Segment
+        In order of time.
+    frequency : float [Hz]
+        Nominal, of the network.
+    station, device : str
+        "" where the file does not say.
+    start : datetime or None
+        Moment of the first sample.
+    trigger : float or None [s]
+        When the recorder was triggered, after the first sample.
+    status : sequence of StatusChannel
+        Binary channels.
+    notes : sequence of str
+        What was odd in the file, a sentence each.
+    extra : mapping
+        Fields of the file that have no attribute here, to be written again.
+    triggers : sequence of float [s]
+        All triggers, where there are several.
     """
 
     source: str  # the path, as messages name it
@@ -238,7 +308,7 @@ class Recording:
 
     @property
     def samples(self) -> int:
-        """How many samples each channel has."""
+        """The number of samples of each channel."""
         return len(self.channels[0].raw)
 
     def waveforms(self) -> list[Segment]:
@@ -300,8 +370,24 @@ class Recording:
         return names.index(str(each))
 
     def matrix(self, numbers: Sequence[int], segment: Segment) -> np.ndarray:
-        """Primary values (K, M) of channels within a segment; raises `UserError` where one is
-        missing.
+        """The primary values of some channels within a segment.
+
+        Parameters
+        ----------
+        numbers : K ints
+            Of the channels, from 0.
+        segment : Segment
+            With M samples.
+
+        Returns
+        -------
+        (K, M) array
+            In kV, kA, MW, Mvar, Hz or rad.
+
+        Raises
+        ------
+        UserError
+            Where a value is missing.
         """
         rows = np.empty((len(numbers), segment.stop - segment.first))
         for row, number in zip(rows, numbers, strict=True):

@@ -25,8 +25,16 @@ SMALLEST_VARIANCE = 1e-30
 
 @dataclass(frozen=True)
 class StaticExponent:
-    """P or Q goes with the voltage to the power of `value`; 95 % interval, and the share of the
-    channel's variance that this explains.
+    """The exponent of a power law by which P or Q follows the voltage.
+
+    Attributes
+    ----------
+    channel : str
+        P or Q.
+    value, low, high : float
+        The exponent, and its 95 % interval.
+    explained : float
+        The share of the channel's variance that this explains.
     """
 
     channel: str
@@ -36,15 +44,30 @@ class StaticExponent:
     explained: float
 
     def __str__(self) -> str:
+        """ "P with U^1.50 (1.30 to 1.70)"."""
         return f"{self.channel} with U^{self.value:.2f} ({self.low:.2f} to {self.high:.2f})"
 
 
 def find_exponents(
     trace: Trace, start: int, end: int, first: int, stop: int, *, lasting: bool
 ) -> tuple[StaticExponent, ...]:
-    """The exponents of P and Q about what happened from sample `start` up to `end`, nothing else
-    happening from `first` up to `stop`. Where the voltage stays where it went (`lasting`) the edge
-    is left out and the load may drift.
+    """The exponents of P and Q about an event.
+
+    Parameters
+    ----------
+    trace : Trace
+        Voltage and powers.
+    start, end : int
+        Samples between which the voltage changed.
+    first, stop : int
+        Samples between which nothing else happened.
+    lasting : bool
+        Whether the voltage stays where it went: then the edge is left out and the load may drift.
+
+    Returns
+    -------
+    tuple of StaticExponent
+        Of those channels that show one.
     """
     reach = round(AROUND_CHANGE / trace.step)
     at = np.arange(max(first, start - reach), min(stop, end + reach))
