@@ -1,5 +1,5 @@
 """Loads of simulators that nobody here wrote, as judges of names: python benchmarks/strangers.py
-[--count 60] [--minutes 9] [--simulator DPsim] [--tables]
+[--count 60] [--minutes 9] [--simulator DPsim] [--docs]
 
 Loads of motulator, ANDES, DPsim and HERMESS (`strangers_motulator`, `andes_loads`,
 `strangers_dpsim`, `strangers_hermess`) in turn, three dips each of which the last is held out, with
@@ -38,6 +38,7 @@ from hidden_effects.noise import Noise  # noqa: E402
 from tractexp.errors import UserError  # noqa: E402
 
 STORED = Path(__file__).with_suffix(".jsonl")
+PAGE, MARK = STORED.with_suffix(".md"), "benchmarks/strangers.py --docs"
 SERIES = "strangers"
 DIPS = 3
 LEVELS = (0.0005, 0.01)  # pu, of the noise of P and Q
@@ -147,6 +148,7 @@ def judge_stranger(number: int, simulator: str) -> dict[str, Any]:
     except UserError as error:
         return row | {"refused": f"UserError: {error}"}
     told = {"verdict": found.verdict, "sets": found.content["name_sets"], "reason": found.reason}
+    told["error"] = found.content["gap"]["validate"]["before"]["model_error"]["value"]
     row |= told | {"outcome": rate(told, stranger.truth, stranger.outside)}
     return row | {"seconds": sum(os.times()[:4]) - begun}
 
@@ -209,10 +211,14 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further set after")
     parser.add_argument("--simulator", choices=SIMULATORS, help="default: all in turn")
-    parser.add_argument("--tables", action="store_true", help="print the stored rows' table")
+    parser.add_argument(
+        "--docs", action="store_true", help="write the stored rows into the page, and stop"
+    )
     asked = parser.parse_args()
     rows = read_rows()
-    if not asked.tables:
+    if asked.docs:
+        marked.replace(PAGE, MARK, make_tables(rows))
+    else:
         done = {(row["number"], row["simulator"]) for row in rows}
         end = time.monotonic() + 60 * asked.minutes
         for number, simulator in itertools.islice(make_strangers(), asked.count):

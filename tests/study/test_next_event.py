@@ -19,7 +19,12 @@ import tractexp
 from hidden_effects import Case, Noise
 from hidden_effects.generator import scene
 from independent import Dip
-from tractexp.discrepancy.classes import LEAST_PARTING, compare_predictions
+from tractexp.discrepancy.classes import (
+    LEAST_PARTING,
+    compare_predictions,
+    describe_classes,
+    group_alike,
+)
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import CONFIRMED_SHARE
 from tractexp.discrepancy.discrepancy_json import content
@@ -152,19 +157,38 @@ def test_what_is_recommended_stands_in_what_machines_read(tied):
     assert {"words", "depth", "duration", "probability"} <= told["next_event"]["tried"][0].keys()
 
 
-def test_what_is_tied_is_a_class_with_the_dip_from_which_it_parts(tied):
-    (told,) = content(tied)["classes"]
-    assert [tuple(names) for names in told["sets"]] == [*tied.verdict.sets]
-    assert told["part_at"] is None or told["by"] > LEAST_PARTING
-    assert tied.reason.endswith(str(tied.effect_class))
+def test_what_is_tied_is_classes_with_the_dip_from_which_they_part(tied):
+    told = content(tied)["classes"]
+    assert [tuple(names) for one in told for names in one["sets"]] == [*tied.verdict.sets]
+    assert len(told) == 1 or all(one["by"] > LEAST_PARTING for one in told)
+    assert tied.reason.endswith(describe_classes(tied.effect_classes))
+    assert f"; {len(told)} class" in tied.reason or "; one class" in tied.reason
 
 
-def test_sets_that_are_one_function_of_the_voltage_never_part(alike):
+def test_sets_that_are_one_function_of_the_voltage_are_one_class(alike):
+    """Beside them another effect is a class of its own, from the mildest dip on in which it differs
+    from either.
+    """
     bench, _, _, fits = alike
-    pair = [fits["stator_resistance"], fits["leakage_loss"]]
-    one = compare_predictions(bench, pair, [fit.names for fit in pair], 0.0)
+    every = [fits[name] for name in ("stator_resistance", "speed_dependent_torque", "leakage_loss")]
+    pair = [every[0], every[2]]
+    (one,) = compare_predictions(bench, pair, [fit.names for fit in pair], 0.0)
     assert one.part_at is None
     assert one.by < LEAST_PARTING
+    assert describe_classes([one]).startswith("one class: they predict alike within ")
+    both, other = compare_predictions(bench, every, [fit.names for fit in every], 0.0)
+    assert both.sets == (("stator_resistance",), ("leakage_loss",))
+    assert other.sets == (("speed_dependent_torque",),)
+    assert both.part_at == other.part_at
+    told = describe_classes([both, other])
+    assert told.startswith("2 classes: they predict alike in milder dips, and part by ")
+    assert told.endswith("; no dip tried parts stator_resistance and leakage_loss")
+
+
+def test_each_joins_the_first_group_of_which_it_is_parted_from_none():
+    parted = np.zeros((4, 4), bool)
+    parted[0, 1] = parted[1, 0] = parted[3, 2] = parted[2, 3] = True
+    assert group_alike(parted) == [[0, 2], [1, 3]]
 
 
 def test_an_equation_in_another_parameter_is_proved_to_be_the_same(alike):

@@ -2,6 +2,7 @@
 
 import itertools
 
+import marked
 import numpy as np
 import pytest
 import strangers
@@ -83,3 +84,11 @@ def test_tables_tell_shares_with_intervals():
     told = strangers.make_tables(rows)
     assert "right, class or silent: 50.0% (7%-93%)" in told
     assert "wrong: 25.0% (1%-81%)" in told
+
+
+def test_the_page_holds_what_the_stored_rows_hold():
+    rows = strangers.read_rows()
+    _, made, _ = marked.parted(strangers.PAGE.read_text(encoding="utf-8"), strangers.MARK)
+    assert made.strip() == strangers.make_tables(rows)
+    of_each = [(row["number"], row["simulator"]) for row in rows]
+    assert len({*of_each}) == len(of_each)

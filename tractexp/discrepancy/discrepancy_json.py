@@ -45,7 +45,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "name_sets": [
             list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets
         ],
-        "classes": [] if (one := investigation.effect_class) is None else [one.to_dict()],
+        "classes": [one.to_dict() for one in investigation.effect_classes],
         "forms": by_name(forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
         "gap": gaps(investigation),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.discrepancy.classes import EffectClass, compare_predictions
+from tractexp.discrepancy.classes import EffectClass, compare_predictions, describe_classes
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import (
     NONE,
@@ -114,13 +114,16 @@ class Findings:
             self.explanations.base.context,
             all_fitted=self.all_fitted,
         )
-        return f"{sentence}; {self.effect_class}" if self.effect_class else sentence
+        classes = self.effect_classes
+        return f"{sentence}; {describe_classes(classes)}" if classes else sentence
 
     @functools.cached_property
-    def effect_class(self) -> EffectClass | None:
-        """The sets that are tied, and the dip from which they part; None where none are."""
+    def effect_classes(self) -> tuple[EffectClass, ...]:
+        """The sets that are tied, by what no dip tells apart, and the dip from which they part;
+        none where none are tied.
+        """
         if self.verdict.word != TIED:
-            return None
+            return ()
         context = self.explanations.base.context
         fits = [row.reported_fit for row in self.verdict.kept]
         error = measure_least_error(self.verdict, self.evidence, context)
