@@ -296,7 +296,7 @@ class Findings:
 
     @property
     def graded_overlays(self) -> list[Overlay]:
-        """The same as the graded models calculate them."""
+        """Measured, before and after of every event, as the graded models calculate them."""
         return draw_graded(self.overlays, self.base_grade, self.final_grade if self.names else None)
 
     @functools.cached_property
@@ -323,11 +323,11 @@ class Findings:
 
     @functools.cached_property
     def remainder_of_base(self) -> list[Remainder]:
-        """The same of what the base model alone leaves: the nearest candidates may have patched
-        something up.
+        """The shapes in what the base model alone leaves, for the nearest candidates may have
+        patched something up.
 
-        As least squares fit it or as the likelihood does, by whichever shapes tell more: least
-        squares spread over a record what happens at one moment.
+        It is as least squares fit it or as the likelihood does, by whichever shapes tell more:
+        least squares spread over a record what happens at one moment.
         """
         if self.names:
             return []

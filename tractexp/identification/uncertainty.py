@@ -119,7 +119,7 @@ class Uncertainty:
         return self.factors * self.information.standard_errors
 
     def judge_point(self, unit: np.ndarray) -> "Uncertainty":
-        """The same judgement of another point (D,) of the same likelihood."""
+        """The judgement of another point (D,) of the likelihood."""
         return conclude(self.likelihood, unit, None if self.exact else self.of_noise, self.notes)
 
     @property

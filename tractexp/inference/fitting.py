@@ -23,7 +23,19 @@ Start = tuple[Sequence[str], np.ndarray]  # names of effects, and coordinates (D
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """The best fit of one set of effects: coordinates (D,) of the whole context and deviance."""
+    """The best fit of one set of effects.
+
+    Attributes
+    ----------
+    names : names
+        The effects.
+    unit : (D,)
+        Coordinates of the whole context.
+    deviance : float
+        The sum of squares of the whitened residuals.
+    parameters : int
+        Number of parameters of the effects.
+    """
 
     names: Names
     unit: np.ndarray
@@ -32,8 +44,13 @@ class Refit:
 
     @property
     def cost(self) -> float:
-        """Akaike's criterion, by which sets of the same number of effects are compared: a parameter
-        costs 2.
+        """Akaike's criterion of the set, but for a constant: the deviance, and 2 for each
+        parameter.
+
+        Examples
+        --------
+        >>> Refit(("trip",), np.zeros(3), 10.0, 2).cost
+        14.0
         """
         return self.deviance + 2 * self.parameters
 
@@ -49,17 +66,31 @@ def best_of(fits: Iterable[Refit]) -> list[Refit]:
 def refit(
     context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None
 ) -> list[Refit]:
-    """Fit sets of effects side by side, with the named faults of the measurement free beside each
-    (by default all).
+    """Fit sets of effects side by side.
 
-    Of several starts of one set the best is returned; the result is in order of cost.
+    Parameters
+    ----------
+    context : Context
+        The records and models.
+    noise : Noise
+        Under which they are fitted.
+    wanted : sequence of (names, (D,))
+        Sets, and coordinates to start from; a set may have several starts.
+    faults : names or None
+        Faults of the measurement that are free beside each set; None: all.
+
+    Returns
+    -------
+    list of Refit
+        The best of each set, in order of cost.
     """
     return best_of(_run_descents(context, noise, wanted, faults, fit_effort.EXACT_DESCENT))
 
 
 def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
-    """As `refit`, good enough to rank sets that are far apart; what falls behind early
-    is given up.
+    """Fit sets of effects as far as is needed to rank those that are far apart.
+
+    What falls behind in the first iterations is given up. Parameters and result are as of `refit`.
     """
     begun = _run_descents(
         context, noise, wanted, None, (fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1])
@@ -89,7 +120,7 @@ def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list
 
 
 def _far(costs: Sequence[float]) -> float:
-    """How far behind the best of these a rough fit is given up."""
+    """How far in cost behind the best of these a rough fit is given up."""
     return max(fit_effort.FAR_BEHIND, fit_effort.FAR_SHARE * (max(costs) - min(costs)))
 
 
@@ -100,11 +131,22 @@ def wide_refit(
     faults: Sequence[str] | None = None,
     again: int = fit_effort.SCATTER_ROUNDS,
 ) -> list[Refit]:
-    """As `refit`, for one set whose thresholds and times have hardly a slope: moved far and
-    descended in turn.
+    """Fit one set whose thresholds and times have hardly a slope: move them far, and descend, in
+    turn.
 
     A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted.
-    Around the best it is begun `again` so often.
+
+    Parameters
+    ----------
+    context, noise, wanted, faults
+        As of `refit`; all starts are of one set.
+    again : int
+        How often the search begins again around the best, as long as that gains.
+
+    Returns
+    -------
+    list of Refit
+        In order of cost.
     """
     return _around(context, noise, _in_turns(context, noise, wanted, faults), faults, again)
 
@@ -158,6 +200,17 @@ def scatter_starts(context: Context, fit: Refit) -> list[Start]:
     Two relays may each be at its best beside the other and still have each other's times: one
     parameter at a time leads nowhere then. The points are Roberts' (2018) sequence R_d, the
     fractional parts of k / phi, k / phi^2, ...
+
+    Parameters
+    ----------
+    context : Context
+        The records and models.
+    fit : Refit
+        Around which they lie.
+
+    Returns
+    -------
+    list of (names, (D,))
     """
     columns = context.coordinates.settings(fit.names)
     phi = 2.0
@@ -183,11 +236,26 @@ def wide_refits(
     most: int,
     others: Iterable[Refit] = (),
 ) -> list[Refit]:
-    """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few
-    iterations.
+    """Fit several sets by `wide_refit`, those that come nearest in a few iterations.
 
     What is far behind the best of them and of `others` after these, or after its turns, is given
     up.
+
+    Parameters
+    ----------
+    context, noise
+        As of `refit`.
+    wanted : starts of each set
+        As of `wide_refit`.
+    most : int
+        How many sets are searched to the end.
+    others : iterable of Refit
+        Fits that are known.
+
+    Returns
+    -------
+    list of Refit
+        In order of cost.
     """
     costs = [fit.cost for fit in others]
 
@@ -246,8 +314,19 @@ def _begun(
 def moved_across(
     context: Context, noise: Noise, fit: Refit, faults: Sequence[str] | None = None
 ) -> np.ndarray:
-    """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and
-    by any reach.
+    """Move what an effect has beside its sizes, one parameter at a time and by any reach.
+
+    Parameters
+    ----------
+    context, noise, faults
+        As of `refit`.
+    fit : Refit
+        Where it begins.
+
+    Returns
+    -------
+    (D,) array
+        Coordinates of less deviance; those of the fit where no move gains.
     """
     columns = context.coordinates.settings(fit.names)
     if not columns:
@@ -271,7 +350,22 @@ def moved_across(
 def no_worse_than_subsets(
     context: Context, noise: Noise, refits: Mapping[Names, Refit], fits: Sequence[Refit]
 ) -> list[Refit]:
-    """Refit from its best subset any set that came out worse than that subset."""
+    """Refit any set that came out worse than a subset of it, from the best subset.
+
+    Parameters
+    ----------
+    context, noise
+        As of `refit`.
+    refits : {names: Refit}
+        All sets that were fitted.
+    fits : sequence of Refit
+        Those to mend.
+
+    Returns
+    -------
+    list of Refit
+        In the order of `fits`.
+    """
     again = []
     for fit in fits:
         subsets = [refits[s] for s in refits if set(s) < set(fit.names)]
@@ -291,11 +385,11 @@ def _run_descents(
     faults: Sequence[str] | None,
     effort: tuple[int, float],
 ) -> list[Refit]:
-    """The end of a descent from each start; of one that was made before, as by a run that was
-    stopped, as it was.
+    """The end of a descent from each start; what was made before, as by a run that was stopped, is
+    read.
 
-    `TOGETHER` of them take their steps in the same calls, whatever the number of cores: a fit's
-    last bits hang on it.
+    `FITS_AT_ONCE` of them take their steps in the same calls, whatever the number of cores: the
+    last bits of a fit hang on it.
     """
     at, spent = context.coordinates, context.effort.total
     measured, prior = _with_prior(context, [names for names, _ in wanted], faults)
@@ -361,8 +455,22 @@ def _with_prior(
 
 
 def off_bounds(context: Context, unit: np.ndarray, to: float | None = None) -> list[np.ndarray]:
-    """Coordinates (D,) with what rests on a bound of the base model back at its default or at `to`:
-    there it has no slope. None where nothing rests.
+    """Coordinates with what rests on a bound of the base model moved off it, for there it has no
+    slope.
+
+    Parameters
+    ----------
+    context : Context
+        The records and models.
+    unit : (D,)
+        Coordinates of a fit.
+    to : float or None
+        Where it is moved to, 0 to 1; None: to its default.
+
+    Returns
+    -------
+    list of (D,) arrays
+        One, or none where nothing rests on a bound.
     """
     moved, base = unit.copy(), context.coordinates.base
     resting = base[
@@ -375,8 +483,23 @@ def off_bounds(context: Context, unit: np.ndarray, to: float | None = None) -> l
 def fit_initial_power(
     context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str]
 ) -> np.ndarray:
-    """Coordinates (D,) with P0 and Q0 of each event fitted where they are free, and
-    nothing else.
+    """Fit P0 and Q0 of each event alone.
+
+    Parameters
+    ----------
+    context : Context
+        The records and models.
+    unit : (D,)
+        Coordinates to begin with.
+    noise : Noise
+        Under which they are fitted.
+    names : names
+        The effects of the model.
+
+    Returns
+    -------
+    (D,) array
+        As it was where P0 and Q0 are not free.
     """
     before = context.coordinates.before
     if not len(before):

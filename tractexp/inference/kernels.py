@@ -38,8 +38,16 @@ class Family:
     catalogue: Catalogue
 
     def with_effects(self, names: Iterable[str]) -> Model:
-        """The model with these load effects, every fault of the measurement and, where they are
-        named, the pushes.
+        """The model with some load effects and with every fault of the measurement.
+
+        Parameters
+        ----------
+        names : names
+            Of effects, or of the injected perturbations.
+
+        Returns
+        -------
+        Model
         """
         effects = [self._effect(name) for name in {*names, *self.catalogue.of_measurement}]
         base = self.model
@@ -70,8 +78,19 @@ class Family:
         )
 
     def key(self, names: Iterable[str], beside: str = "") -> Key:
-        """The kernel that fits a set of names, or that tells what one more effect, or the pushes,
-        change beside it.
+        """The kernel that fits a set of effects, or that tests one more beside it.
+
+        Parameters
+        ----------
+        names : names
+            The effects of the fit.
+        beside : str
+            One more effect, or the injected perturbations; "": none.
+
+        Returns
+        -------
+        (frozenset, frozenset)
+            The fitted effects of the load, and what is tested beside them.
         """
         load = frozenset(names) - {*self.catalogue.of_measurement}
         tested = frozenset[str]()
@@ -110,9 +129,22 @@ class Kernels:
         *,
         priors: bool = False,
     ):
-        """The kernels of a family of models on some events: with `bounds` {name: (lower, upper)}
-        and `fixed` {name: value} of the base model, `substeps` per sample (None: as many as
-        needed), and with `priors` on the motor.
+        """Prepare the kernels of a family of models on some events.
+
+        Parameters
+        ----------
+        family : Family
+            A base model with all sets of effects.
+        events : sequence of Event
+            What drives them.
+        bounds : {name: (lower, upper)}
+            Of the base model's parameters, in their units.
+        fixed : {name: value}
+            Parameters that are held.
+        substeps : int or None
+            Runge-Kutta steps per sample; None: as many as needed.
+        priors : bool
+            Whether there is a prior on the motor.
         """
         self.family, self.events, self.bounds, self.fixed = family, tuple(events), bounds, fixed
         self.bare = Problem(family.model, events, bounds, fixed, substeps, priors=priors)
@@ -156,13 +188,40 @@ class Kernels:
         return fit_problem.residuals(unit[:, columns])
 
     def select_problem(self, names: Iterable[str], unit: np.ndarray) -> tuple[Problem, np.ndarray]:
-        """The problem of a set of names, and its free values (..., d) at coordinates (..., D)."""
+        """The problem of a set of effects, and its free values.
+
+        Parameters
+        ----------
+        names : names
+            The effects.
+        unit : (..., D)
+            Coordinates of the whole context.
+
+        Returns
+        -------
+        Problem
+        (..., d) array
+            In physical units.
+        """
         fit_problem, columns = self._build_fit_problem(self.family.key(names))
         return fit_problem.problem, fit_problem.values(unit[..., columns])
 
     def simulate(self, names: Iterable[str], unit: np.ndarray, drive: Drive) -> np.ndarray:
-        """What is compared (n, C, N) [pu] under other voltages, with these effects at coordinates
-        (n, D).
+        """Simulate a set of effects under other voltages.
+
+        Parameters
+        ----------
+        names : names
+            The effects.
+        unit : (n, D)
+            Coordinates of the whole context.
+        drive : Drive
+            The other events.
+
+        Returns
+        -------
+        (n, C, N) array [pu]
+            What is compared.
         """
         problem, free = self.select_problem(names, unit)
         return problem.model.simulate(drive, problem.full(free), self.substeps).by_candidate

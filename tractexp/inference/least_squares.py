@@ -21,8 +21,16 @@ MOST_NUMBERS = 8_000_000  # of all differences held at once
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """Where each lane ended: `unit` (n, D) in the unit cube, `deviance` (n,) its sum of squares
-    (inf: never begun).
+    """Where descents ended, one lane each.
+
+    Attributes
+    ----------
+    unit : (n, D)
+        Coordinates in the unit cube.
+    deviance : (n,)
+        Sums of squares there; inf of a lane that could not be begun.
+    simulations : int
+        What they cost.
     """
 
     unit: np.ndarray

@@ -24,8 +24,9 @@ from tractexp.record import Event
 
 
 def before_the_event(event: Event) -> Pair:
-    """Level and color of each channel's noise before the dip: what is known of it before anything
-    is fitted.
+    """The noise of each channel before a dip: what is known of it before anything is fitted.
+
+    Returns the autoregression of each channel, as loud as the event's level [pu].
     """
     pair = []
     for quiet, level in zip(event.calm, event.levels, strict=True):
@@ -38,10 +39,17 @@ def before_the_event(event: Event) -> Pair:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Likelihood(FitProblem):
-    """A fit problem under a noise. `prior` is the weight of rows that hold the motor to what
-    machines usually are.
+    """A fit problem under a noise.
 
-    These rows come last; 0 is without.
+    Attributes
+    ----------
+    problem, valid, initial_power
+        As of `FitProblem`.
+    noise : Noise
+        By which residuals are whitened.
+    prior : float
+        Weight of rows that hold the motor to what machines usually are; they come last. 0 is
+        without.
     """
 
     noise: Noise
@@ -68,16 +76,16 @@ class Likelihood(FitProblem):
 
     @property
     def with_initial_power(self) -> "Likelihood":
-        """The same with P0 and Q0 of each event free."""
+        """The likelihood with P0 and Q0 of each event free."""
         return replace(self, initial_power=True)
 
     def scale_noise(self, factor: float) -> "Likelihood":
-        """The same with noise `factor` times as loud."""
+        """The likelihood under noise `factor` times as loud."""
         return replace(self, noise=self.noise.scale_noise(factor), prior=self.prior / factor)
 
     @property
     def of_records(self) -> "Likelihood":
-        """The same without the rows of a prior."""
+        """The likelihood without the rows of a prior."""
         return replace(self, prior=0.0)
 
     def whiten(self, residuals: np.ndarray) -> np.ndarray:
@@ -96,15 +104,26 @@ class Likelihood(FitProblem):
         return self.noise.whiten(residuals, self.problem.drive, self.valid)
 
     def rows(self, unit: np.ndarray, lanes: np.ndarray | None = None) -> np.ndarray:
-        """Whitened residuals (n, 2 N); their sum of squares is the deviance. Does not depend on the
-        lane.
+        """The rows whose sum of squares is the deviance.
+
+        Parameters
+        ----------
+        unit : (n, D)
+            Coordinates in the unit cube.
+        lanes : (n,) ints
+            Not used: no row depends on the lane.
+
+        Returns
+        -------
+        (n, C N + k) array
+            Whitened residuals, then the k rows of the prior, where there is one.
         """
         rows = self.whiten(self.residuals(unit))
         return np.concatenate([rows, self.prior_rows(unit)], axis=1) if self.prior else rows
 
     def prior_rows(self, unit: np.ndarray) -> np.ndarray:
-        """How far coordinates (n, D) are from what machines usually are, (n, k); none where nothing
-        holds them.
+        """The rows of the prior (n, k) at coordinates (n, D): weighted departures from what
+        machines usually are. k is 0 without a prior.
         """
         if not self.prior:
             return np.empty((len(unit), 0))

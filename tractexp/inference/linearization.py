@@ -88,12 +88,24 @@ class Linearization:
 
 
 def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
-    """Differences of everything at a fit, in one batch. What is fitted, and faults of the
-    measurement, are nuisances.
+    """Linearize everything at a fit, in one batch of simulations.
 
-    A parameter of the base model on a wall that would leave the box is held there: what only values
-    beyond its bounds explain is left. Those of effects are not: they belong to a formula, not to
-    the load.
+    What is fitted, and faults of the measurement, are nuisances. A parameter of the base model on a
+    bound that would leave the box is held there: what only values beyond its bounds explain is
+    left. Those of effects are not: they belong to a formula, not to the load.
+
+    Parameters
+    ----------
+    context : Context
+        The records and models.
+    fit : Refit
+        Where the differences are taken.
+    noise : Noise
+        By which it is judged which bounds hold a parameter.
+
+    Returns
+    -------
+    Linearization
     """
     at = context.coordinates
     faults = {name: at.sizes([name]) for name in context.catalogue.of_measurement}
@@ -150,10 +162,22 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
 def find_active_bounds(
     context: Context, unit: np.ndarray, columns: Sequence[int] | np.ndarray, gradient: np.ndarray
 ) -> np.ndarray:
-    """Which of the columns are parameters of the base model on a wall beyond which the deviance
-    falls.
+    """Which parameters of the base model rest on a bound beyond which the deviance falls.
 
-    `gradient` of the deviance is needed for its sign only.
+    Parameters
+    ----------
+    context : Context
+        The records and models.
+    unit : (D,)
+        Coordinates of the fit.
+    columns : k columns
+        The coordinates that are asked for.
+    gradient : (k,)
+        Of the deviance; only its sign counts.
+
+    Returns
+    -------
+    (k,) array of bools
     """
     x = unit[list(columns)]
     leaving = ((x <= BOUND_MARGIN) & (gradient > 0)) | ((x >= 1 - BOUND_MARGIN) & (gradient < 0))
@@ -189,11 +213,21 @@ def _candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, np.ndar
 
 
 def rich_residuals(t: Linearization, residuals: np.ndarray) -> np.ndarray:
-    """Residuals (b, C, N) with everything any column explains taken away, unweighted: what noise is
-    estimated from.
+    """Residuals without everything that any column explains: what noise is estimated from.
 
     Each is divided by what is left of its variance then, so that the noise does not come out too
     small.
+
+    Parameters
+    ----------
+    t : Linearization
+        With all columns of the fit and of the candidates.
+    residuals : (b, C, N) [pu]
+        Of a fit or of draws.
+
+    Returns
+    -------
+    (b, C, N) array [pu]
     """
     right = compute_basis(t.explaining_columns.reshape(-1, residuals[0].size), 1e-6)
     flat = residuals.reshape(len(residuals), -1)

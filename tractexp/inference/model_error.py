@@ -29,11 +29,20 @@ LARGEST_TOLD_PERCENT = 10_000  # percent: more tells no more
 
 @dataclass(frozen=True)
 class ModelError:
-    """A model's error as a share of the response, its 95 % interval, and as a share of the apparent
-    power.
+    """The error of a model.
 
-    `square` is the square of it as reckoned, below zero where less is left than noise leaves in the
-    mean. `stalls` names the events on which the motor stalls: there it has no size.
+    Attributes
+    ----------
+    value : float
+        As a share of the response.
+    interval : (low, high)
+        Its 95 % interval.
+    of_S : float
+        As a share of the apparent power.
+    square : float
+        Its square as reckoned: below zero where less is left than noise leaves in the mean.
+    stalls : names
+        Events on which the motor stalls: there the error has no size.
     """
 
     value: float
@@ -62,7 +71,7 @@ class ModelError:
 
     @classmethod
     def of_stall(cls, events: Sequence[str]) -> "ModelError":
-        """Of a model whose motor stalls on these events: beyond that of any that does not."""
+        """The error of a model whose motor stalls on these events: infinite."""
         return cls(np.inf, (np.inf, np.inf), np.inf, np.inf, tuple(events))
 
     def __str__(self) -> str:
@@ -71,18 +80,34 @@ class ModelError:
 
 
 def weigh_error(error: float, response: float, variance: float, step: float) -> float:
-    """By how many times noise's variance [pu²] what a model misses adds to it in what an event
-    tells.
+    """How many times noise's variance the error of a model adds to it, in what an event tells.
 
-    `error` is the model's, of the response, whose mean square in a channel is `response` [pu²]. It
-    hangs together within a block, as long as `LENGTH`: what a block's samples add up to of it
+    The error hangs together within a block of `LENGTH` [s]: what a block's samples add up to of it
     counts so many times, and it does not grow less where the same event is recorded again.
+
+    Parameters
+    ----------
+    error : float
+        The model's, as a share of the response.
+    response, variance : float [pu²]
+        Mean square of the response in a channel, and variance of its noise.
+    step : float [s]
+        Between samples.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> round(weigh_error(0.1, 0.01, 1e-4, 0.01), 6)
+    10.0
     """
     return error**2 * response / max(variance, 1e-30) * max(LENGTH / step, 1.0)
 
 
 def describe_stall(events: Sequence[str]) -> str:
-    """What is said in place of a model's error where its motor stalls on these events."""
+    """The words in place of a model's error where its motor stalls on these events."""
     return f"{STALL} in this model on {join_words(events)}"
 
 
@@ -95,7 +120,13 @@ def tell_error(entry: Mapping[str, Any]) -> str:
 
 
 def in_percent(share: float) -> str:
-    """A share to two digits: '0.57 %', '12 %'; 'over 10000 %' where that tells no more."""
+    """A share to two digits, in percent.
+
+    Examples
+    --------
+    >>> in_percent(0.0057), in_percent(0.12), in_percent(1e6)
+    ('0.57 %', '12 %', 'over 10000 %')
+    """
     percent = 100 * share
     if percent > LARGEST_TOLD_PERCENT:
         return f"over {LARGEST_TOLD_PERCENT} %"
@@ -103,7 +134,18 @@ def in_percent(share: float) -> str:
 
 
 def model_error(played: Sequence[Playback]) -> ModelError:
-    """The error of a model over some events together."""
+    """The error of a model over some events together.
+
+    Parameters
+    ----------
+    played : sequence of Playback
+        What it calculates of each event.
+
+    Returns
+    -------
+    ModelError
+        Infinite where the motor stalls on one, or there is no steady state.
+    """
     if stalls := [one.event.record.name for one in played if one.stalls]:
         return ModelError.of_stall(stalls)
     sums = np.concatenate(block_sums(played))  # (blocks, 3)
@@ -120,9 +162,23 @@ def model_error(played: Sequence[Playback]) -> ModelError:
 
 
 def block_sums(played: Sequence[Playback], sharing: float = 0.0) -> list[np.ndarray]:
-    """Squares of what is left, of the response, both less those of the noise, and of the power: (b,
-    3) by the blocks of each event. Blocks are shortened, to a cycle at most, until `sharing` of
-    them share the response: the inverse of the sum of squares of their shares.
+    """Sums over blocks of time, from each dip on.
+
+    Blocks are shortened, to a cycle at most, until `sharing` of them share the response: the
+    inverse of the sum of squares of their shares.
+
+    Parameters
+    ----------
+    played : sequence of Playback
+        What a model calculates of each event.
+    sharing : float
+        How many blocks are to share the response.
+
+    Returns
+    -------
+    list of (b, 3) arrays [pu²]
+        By event and block: squares of what is left and of the response, both less those of the
+        noise, and of the power.
     """
     seconds = sum(
         (one.event.record.samples - one.event.start) * one.event.record.step for one in played

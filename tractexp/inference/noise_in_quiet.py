@@ -17,11 +17,15 @@ from tractexp.noise import Noise
 
 @dataclass(frozen=True, eq=False)
 class QuietNoise:
-    """Estimates noise. `input_modes` (k, C, N) [pu] are what errors of the record do to what is
-    compared.
+    """Estimates the noise of the fits of one context.
 
-    Those of the voltage's noise, None where it has none; of waveforms those of the channels'
-    offsets.
+    Attributes
+    ----------
+    context : Context
+        The records and models.
+    input_modes : (k, C, N) [pu] or None
+        What errors of the record do to what is compared: those of the voltage's noise, None where
+        it has none; of waveforms those of the channels' offsets.
     """
 
     context: Context
@@ -29,7 +33,7 @@ class QuietNoise:
 
     @classmethod
     def from_context(cls, context: Context, unit: np.ndarray) -> "QuietNoise":
-        """Where errors of the record act as they do on the base model at coordinates (D,)."""
+        """The estimator whose errors of the record act as on the base model at coordinates (D,)."""
         observed = Observed(context.kernels.bare, context.records.smoothed)
         return cls(
             context,
@@ -47,11 +51,27 @@ class QuietNoise:
         left: np.ndarray | None = None,
         columns: np.ndarray | None = None,
     ) -> Noise:
-        """The noise of one residual (C, N) in quiet stretches, at coordinates (D,).
+        """The noise of one residual, from its quiet stretches.
 
-        What a fit leaves (C, N), and columns of all that could explain it (k, C, N), tell more of
-        how the load wanders. Of waveforms the model there tells how noise of the voltage is passed
-        on.
+        Parameters
+        ----------
+        unit : (D,)
+            Coordinates of the model; of waveforms it tells how noise of the voltage is passed on.
+        residual : (C, N) [pu]
+            Whose noise is estimated.
+        left : (C, N) [pu] or None
+            What a fit leaves; it tells more of how the load wanders.
+        columns : (k, C, N) [pu] or None
+            What could explain that.
+
+        Returns
+        -------
+        Noise
+
+        Raises
+        ------
+        UserError
+            Where too few samples are quiet.
         """
         context, problem = self.context, self.context.problem
         errors = [

@@ -29,14 +29,22 @@ MOST_SAMPLES = 2_000_000  # of voltages with an error that are simulated at once
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """A problem driven by smoothed voltages, and what may still be wrong with these."""
+    """A problem driven by smoothed voltages.
+
+    Attributes
+    ----------
+    problem : Problem
+        Driven by these.
+    smoothed : tuple of SmoothedEvent
+        The events, and what may still be wrong with their voltages.
+    """
 
     problem: Problem
     smoothed: tuple[SmoothedEvent, ...]
 
     @classmethod
     def from_problem(cls, problem: Problem) -> "Observed":
-        """The same problem with the noise taken out of the voltage of each event."""
+        """A problem with the noise taken out of the voltage of each event."""
         clean = tuple(map(problem.domain.smooth_event, problem.events))
         return cls(problem.driven_by([s.event for s in clean]), clean)
 
@@ -106,10 +114,18 @@ class Observed:
         return self.problem.quiet
 
     def input_errors(self, values: np.ndarray) -> np.ndarray | None:
-        """What errors of the record do to what is compared at free values (d,): (k, C, N) [pu],
-        None where it has none.
+        """The errors of the record, as what is compared shows them at free values.
 
-        Those of the voltage's noise, or what the domain says.
+        Parameters
+        ----------
+        values : (d,)
+            Free values of the problem.
+
+        Returns
+        -------
+        (k, C, N) array [pu] or None
+            One standard deviation each: of the voltage's noise, or what the domain says. None where
+            there is none.
         """
         if (errors := self.problem.domain.input_errors(self.problem, values)) is not None:
             return errors
@@ -148,12 +164,37 @@ def estimate_noise(
     left: np.ndarray | None,
     columns: np.ndarray | None,
 ) -> Noise:
-    """Return the noise of a residual (C, N) in the quiet stretches of the records.
+    """The noise of a residual, from the quiet stretches of the records.
 
-    `model` with its free values (d,) tells how noise of the voltage is passed on, `input_errors`
-    (k, C, N) what errors of the record do. What the fit leaves, `left` (C, N), and the columns of
-    all that could explain it (k, C, N) tell more of how the load wanders. Raises `UserError` where
-    too few samples are quiet.
+    Parameters
+    ----------
+    records : Problem
+        The events.
+    residual : (C, N) [pu]
+        Whose noise is estimated.
+    valid : (C, N) bools
+        Which samples count.
+    quiet : sequence of slice
+        Where little happens.
+    model : (Problem, (d,))
+        With its free values it tells how noise of the voltage is passed on.
+    input_errors : (k, C, N) [pu] or None
+        What errors of the record do.
+    left : (C, N) [pu] or None
+        What a fit leaves; it tells more of how the load wanders.
+    columns : (k, C, N) [pu] or None
+        What could explain that.
+    seen : float
+        Gain of twice the log-likelihood from which a load is said to wander.
+
+    Returns
+    -------
+    Noise
+
+    Raises
+    ------
+    UserError
+        Where too few samples are quiet.
     """
     walk = functools.partial(
         walk_of_load, records.events, records.drive, records.power, left, columns, valid

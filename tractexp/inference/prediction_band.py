@@ -30,8 +30,16 @@ NO_CHANGE = 1e-9  # pu: an event that changes S by less tells nothing of a share
 
 @dataclass(frozen=True)
 class PredictionBand:
-    """What the width of the band hangs on, of P and of Q: `noise` (2,) [pu], its standard
-    deviation, `share` (2,) of the largest change of S; from so many `events`.
+    """What the width of the band hangs on.
+
+    Attributes
+    ----------
+    noise : (P, Q) [pu]
+        Standard deviations.
+    share : (P, Q)
+        What the model misses, of the largest change of S.
+    events : int
+        Number of events that this is known from.
     """
 
     noise: tuple[float, float]
@@ -39,10 +47,20 @@ class PredictionBand:
     events: int
 
     def find_half_width(self, change: float, samples: int, scatter: np.ndarray) -> np.ndarray:
-        """Half the band of P and of Q (2,) [pu] of an event that changes S by `change` [pu] at
-        most, in so many samples from the dip on.
+        """Half the band of P and of Q for an event.
 
-        `scatter` (2,) [pu] is the standard error of what is calculated, where it is largest.
+        Parameters
+        ----------
+        change : float [pu]
+            The largest change of S that is calculated.
+        samples : int
+            From the dip on.
+        scatter : (2,) [pu]
+            Standard error of what is calculated, where it is largest.
+
+        Returns
+        -------
+        (2,) array [pu]
         """
         noise = find_noise_peak(samples) * np.array(self.noise)
         model = _find_reserve(self.events) * np.array(self.share) * change
@@ -50,8 +68,17 @@ class PredictionBand:
 
 
 def measure_band(played: Sequence[Playback]) -> PredictionBand | None:
-    """The band of a model that was played over these events; None where its motor stalls on one, or
-    where none changes the load.
+    """The band of a model, from what it missed of events.
+
+    Parameters
+    ----------
+    played : sequence of Playback
+        What it calculates of each event.
+
+    Returns
+    -------
+    PredictionBand or None
+        None where its motor stalls on one, or where none changes the load.
     """
     missed = []
     noises = []
@@ -77,15 +104,40 @@ def measure_band(played: Sequence[Playback]) -> PredictionBand | None:
 
 
 def find_noise_peak(samples: int) -> float:
-    """Standard deviations that no sample of white noise exceeds in 95 % of cases."""
+    """The standard deviations that no sample of white noise exceeds in 95 % of cases.
+
+    Examples
+    --------
+    >>> round(find_noise_peak(1), 2), round(find_noise_peak(1000), 2)
+    (1.96, 4.05)
+    """
     from scipy.special import ndtri
 
     return float(ndtri((1 + INTERVAL_LEVEL ** (1 / max(samples, 1))) / 2))
 
 
 def find_largest_change(change: np.ndarray, step: float, frequency: float) -> float:
-    """The largest of means over a cycle of a change of S (N,) [pu], at samples `step` [s] apart:
-    decaying offsets of waveforms are no change of the load.
+    """The largest change of S, as means over a cycle.
+
+    Decaying offsets of waveforms are no change of the load.
+
+    Parameters
+    ----------
+    change : (N,) complex [pu]
+        P + jQ less that before.
+    step : float [s]
+        Between samples.
+    frequency : float [Hz]
+        Of the network.
+
+    Returns
+    -------
+    float [pu]
+
+    Examples
+    --------
+    >>> find_largest_change(np.array([0.0, 0.1, 0.3, 0.1]), 0.01, 50.0)
+    0.2
     """
     samples = min(max(1, round(1 / (frequency * step))), len(change))
     means = np.convolve(change, np.full(samples, 1 / samples), "valid")
@@ -95,10 +147,21 @@ def find_largest_change(change: np.ndarray, step: float, frequency: float) -> fl
 def find_scatter(
     calculate: Callable[[np.ndarray], np.ndarray], values: np.ndarray, root: np.ndarray
 ) -> np.ndarray:
-    """The largest standard error (2,) of P and Q that `calculate` gives (2, N) at values (d,).
+    """The largest standard error of calculated P and Q.
 
-    `root` (k, d) are rows whose products add up to the covariance of the values. A row to neither
-    side of which there is a steady state tells nothing.
+    Parameters
+    ----------
+    calculate : (d,) -> (2, N) [pu]
+        P and Q for values of the parameters.
+    values : (d,)
+        The estimate.
+    root : (k, d)
+        Rows whose products add up to the covariance of the values. A row to neither side of which
+        there is a steady state tells nothing.
+
+    Returns
+    -------
+    (2,) array [pu]
     """
     here = calculate(values)
     squares = np.zeros_like(here)

@@ -25,9 +25,27 @@ def select_promising_starts(
     nuisances: Sequence[int],
     most: int,
 ) -> np.ndarray:
-    """The starts (n, D) of one set of effects that promise most, at most so many, in their order.
+    """The starts of one set of effects that promise most, by one simulation each.
 
-    `nuisances` are the coordinates that give way.
+    Parameters
+    ----------
+    context : Context
+        The records and models.
+    noise : Noise
+        Under which they are fitted.
+    names : names
+        The effects.
+    units : (n, D)
+        Coordinates of the starts.
+    nuisances : columns
+        Coordinates that give way.
+    most : int
+        How many are chosen.
+
+    Returns
+    -------
+    (at most `most`, D) array
+        In their order.
     """
     if len(units) <= most:
         return units

@@ -19,10 +19,16 @@ CYCLES = (1, 2, 3, 4, 5, 6)
 
 @dataclass(frozen=True, eq=False)
 class RecorderWindow(Measurement):
-    """A recorder that forms phasors over a window [s]: a plain mean, or the weights of an
-    estimator.
+    """A recorder that forms phasors over a window.
 
-    `said`: the records say that it is this one.
+    Attributes
+    ----------
+    window : float [s]
+        Its length.
+    shape : Window or None
+        The weights of an estimator; None: a plain mean.
+    said : bool
+        Whether the records say that it is this one.
     """
 
     window: float
@@ -35,14 +41,14 @@ class RecorderWindow(Measurement):
 
     @property
     def setting(self) -> float | str:
-        """How `model.window` names it."""
+        """The value of `model.window` that names it."""
         if self.said:
             return RECORDED
         return self.shape.name if self.shape else self.window
 
     @property
     def averages(self) -> bool:
-        """Whether no sample counts less than nothing."""
+        """Whether no sample has a negative weight."""
         return self.shape is None or bool((self.shape.weights >= 0).all())
 
     def describe(self) -> str:
@@ -52,7 +58,7 @@ class RecorderWindow(Measurement):
         return f"the recorder averages phasors over {1000 * self.window:.0f} ms{weights}{said}"
 
     def weights(self, step: float) -> np.ndarray:
-        """What each sample, `step` [s] apart, counts around the middle one, (odd,)."""
+        """The weights (odd,) of samples `step` [s] apart around the middle one."""
         return (
             mean_weights(self.window / step)
             if self.shape is None
@@ -60,8 +66,9 @@ class RecorderWindow(Measurement):
         )
 
     def observe(self, power: np.ndarray, drive: Drive, values: dict[str, np.ndarray]) -> np.ndarray:
-        """Powers (2, n, N) as a recorder shows them: the current averaged over its window, times
-        the voltage recorded.
+        """Powers (2, n, N) [pu] as the recorder shows them.
+
+        The current is averaged over the window, and multiplied by the voltage recorded.
         """
         shown = np.empty_like(power)
         for e in range(drive.events):

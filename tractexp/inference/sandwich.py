@@ -36,10 +36,18 @@ WALL = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """The scatter of least squares: its `information`, and beside it what intervals need.
+    """The scatter of an estimate by least squares.
 
-    `quantile` is Student's t at 97.5 %; `ratio` (d,) is each standard error over that of
-    independent residuals, and `spread` their geometric mean over all directions.
+    Attributes
+    ----------
+    information : Information
+        Whose covariance is that of the scatter.
+    quantile : float
+        Student's t at 97.5 %.
+    ratio : (d,)
+        Each standard error over that of independent residuals.
+    spread : float
+        The geometric mean of that over all directions.
     """
 
     information: Information
@@ -49,10 +57,21 @@ class Scatter:
 
 
 def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
-    """Of a fit by Eq. (8) at coordinates (d,), whose rows are in units of what it leaves.
+    """How far a fit by Eq. (8) scatters.
 
     Parameters inside their bounds are told with those on a bound held there; one on a bound as if
     all were free, beyond the bounds, too.
+
+    Parameters
+    ----------
+    likelihood : Likelihood
+        That of Eq. (8), its rows in units of what the fit leaves.
+    unit : (d,)
+        Coordinates of the fit.
+
+    Returns
+    -------
+    Scatter
     """
     problem, whole = likelihood.problem, likelihood.of_records.with_initial_power
     rows, J = whole.jacobian(whole.place_parameters(unit[None])[0])

@@ -23,8 +23,16 @@ from tractexp.noise.span import compute_basis
 
 @dataclass(frozen=True, eq=False)
 class CandidateColumn:
-    """A candidate with one setting of its scanned parameters: differences (k, C, N) per unit of
-    each size.
+    """A candidate with one setting of its scanned parameters.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        The effect.
+    setting : {name: value}
+        Of the parameters that are no sizes.
+    raw : (k, C, N)
+        Changes of the residual [pu] per unit of each size.
     """
 
     candidate: Candidate
@@ -34,7 +42,21 @@ class CandidateColumn:
 
 @dataclass(frozen=True)
 class Score:
-    """What the score test says of one candidate at one setting."""
+    """What the score test says of one candidate at one setting.
+
+    Attributes
+    ----------
+    name : str
+        Of the effect.
+    drop : float
+        Of the deviance.
+    p : float
+        Of this drop alone, not corrected for the others.
+    size, deviation : {name: value}
+        One-step estimates of its sizes, and their standard deviations.
+    setting : {name: value}
+        Of its other parameters.
+    """
 
     name: str
     drop: float  # of the deviance
@@ -63,8 +85,16 @@ class ScoreTest:
     perturbed: np.ndarray  # (c, R)
 
     def replace_residuals(self, white: np.ndarray) -> "ScoreTest":
-        """The same columns with other whitened residuals (b, C N) in place of the fit's own, off no
-        prior mean.
+        """The score test of other residuals, such as draws, in place of the fit's own.
+
+        Parameters
+        ----------
+        white : (b, C N)
+            Whitened residuals; they stand at no departure from a prior mean.
+
+        Returns
+        -------
+        ScoreTest
         """
         rows = np.concatenate([white, np.zeros((len(white), len(self.Q) - white.shape[1]))], axis=1)
         along = rows @ self.Q
@@ -111,8 +141,8 @@ class ScoreTest:
         )
 
     def fault_p(self) -> dict[str, np.ndarray]:
-        """p of each fault of the measurement, (b,): its estimate over its standard deviation, prior
-        included.
+        """{name: p (b,)} of each fault of the measurement: its estimate over its standard
+        deviation, prior included.
         """
         result = {}
         inverse = np.linalg.pinv(self.R, rcond=1e-12)  # N'N = R'R
@@ -127,8 +157,9 @@ class ScoreTest:
         return result
 
     def variance_component(self) -> np.ndarray:
-        """How much injections of all balances and windows still find, (b,): the structured test of
-        adequacy.
+        """How much injected perturbations of all balances and windows still find, (b,).
+
+        It is the structured test of adequacy: a score test of a variance component (Lin 1997).
         """
         power = np.einsum("cr,cr->c", self.perturbed, self.perturbed)
         counted = power > 1e-8 * power.max(initial=1e-300)
@@ -148,8 +179,8 @@ class ScoreTest:
         return self.r[:, : drive.measurements.size].reshape(len(self.r), drive.channels, -1)
 
     def statistics(self, problem: Problem) -> dict[str, np.ndarray]:
-        """What no candidate accounts for, by what each test looks for: a sum (b,), or the largest
-        of many (b, k).
+        """{test: statistic} of what no candidate accounts for: a sum (b,), or the largest of
+        many (b, k).
         """
         by_test = {
             "pushes into the balances": self.variance_component(),

@@ -19,10 +19,16 @@ from tractexp.noise.span import compute_basis
 
 @dataclass(frozen=True, eq=False)
 class SeparableColumns:
-    """Coordinates (E, m) of E events, each of which acts on `rows[e]` (R_e,) only, the indices of
-    its event's rows.
+    """Coordinates of E events, each of which acts on the residuals of its own event only.
 
     One simulation moves a coordinate of every event at once and has the differences of all of them.
+
+    Attributes
+    ----------
+    coordinates : (E, m) ints
+        Their columns, m an event.
+    rows : E arrays (R_e,) of ints
+        The residuals of each event.
     """
 
     coordinates: np.ndarray
@@ -46,14 +52,22 @@ class SeparableColumns:
         return self.coordinates.shape[1]
 
     def find_shared_columns(self, size: int) -> np.ndarray:
-        """Which of so many coordinates act on all rows, (k,)."""
+        """The columns (k,) of `size` coordinates that act on all residuals.
+
+        Examples
+        --------
+        >>> two = SeparableColumns(np.array([[2], [3]]), (np.arange(5), np.arange(5, 9)))
+        >>> two.find_shared_columns(4).tolist(), two.moves(4).astype(int).tolist()
+        ([0, 1], [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 1]])
+        """
         shared = np.ones(size, dtype=bool)
         shared[self.coordinates] = False
         return np.flatnonzero(shared)
 
     def moves(self, size: int) -> np.ndarray:
-        """Which of so many coordinates move in each simulation, (k + m, size): first those that act
-        on all rows.
+        """Which of `size` coordinates move in each simulation, (k + m, size).
+
+        The k shared ones come first, each by itself, then the m of all events at once.
         """
         shared = self.find_shared_columns(size)
         moves = np.zeros((len(shared) + self.count, size))
@@ -68,10 +82,18 @@ NOT_SEPARABLE = SeparableColumns(np.empty((0, 0), dtype=int), ())
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Derivatives `columns` (k + m, R) of rows to `k` coordinates of all rows, then to the m of
-    each row's own event.
+    """Derivatives of residuals by shared coordinates, and by those of each event.
 
     Coordinates stand in this order: the k shared ones, then the m of each event.
+
+    Attributes
+    ----------
+    columns : (k + m, R)
+        By the shared coordinates, then by the m of each residual's own event.
+    k : int
+        Number of shared coordinates.
+    rows : E arrays (R_e,) of ints
+        The residuals of each event.
     """
 
     columns: np.ndarray
@@ -80,15 +102,17 @@ class Sensitivities:
 
     @property
     def shared_columns(self) -> np.ndarray:
-        """(R, k)."""
+        """The derivatives (R, k) by the shared coordinates."""
         return self.columns[: self.k].T
 
     def own(self, event: int) -> np.ndarray:
-        """(R_e, m) of one event."""
+        """The derivatives (R_e, m) of one event's residuals by its own coordinates."""
         return self.columns[self.k :, self.rows[event]].T
 
     def only(self, coordinates: np.ndarray) -> "Sensitivities":
-        """Those to the coordinates that a mask (k + m E,) has; of an event the others are zero."""
+        """The derivatives by the coordinates that a mask (k + m E,) has; of an event the others
+        are zero.
+        """
         own = self.columns[self.k :].copy()
         for rows, mine in zip(
             self.rows, coordinates[self.k :].reshape(len(self.rows), -1), strict=True
@@ -117,12 +141,14 @@ class Sensitivities:
 
     @property
     def without_own(self) -> np.ndarray:
-        """The shared ones (R, k), less what each event's own coordinates do as well."""
+        """The derivatives (R, k) by the shared coordinates, less what each event's own do as
+        well.
+        """
         return self._own_basis().without_own(self.columns[: self.k]).T
 
     def basis(self, distinct: float = 0.0, least: float = 0.0) -> "SeparableBasis":
-        """Of the rows that they can reach; see `spanned` for what is left out of each
-        event's own.
+        """An orthonormal basis of the changes that the coordinates can make; `compute_basis` says
+        what `distinct` and `least` leave out of it.
         """
         alone = self._own_basis(distinct, least)
         return replace(
@@ -139,7 +165,17 @@ class Sensitivities:
 
 @dataclass(frozen=True, eq=False)
 class SeparableBasis:
-    """Orthonormal rows: `shared` (k, R), and of each event `own` (m, R_e) on its `rows` (R_e,)."""
+    """Orthonormal rows.
+
+    Attributes
+    ----------
+    shared : (k, R)
+        Over the residuals of all events.
+    own : E arrays (m, R_e)
+        Of each event.
+    rows : E arrays (R_e,) of ints
+        The residuals of each event.
+    """
 
     shared: np.ndarray
     own: tuple[np.ndarray, ...]
@@ -168,7 +204,7 @@ class SeparableBasis:
 
     @property
     def leverage(self) -> np.ndarray:
-        """How much of the variance of each row (R,) the span takes."""
+        """The share (R,) of the variance of each residual that the span takes."""
         leverage = (self.shared**2).sum(axis=0)
         for basis, mine in zip(self.own, self.rows, strict=True):
             leverage[mine] += (basis**2).sum(axis=0)
@@ -177,10 +213,20 @@ class SeparableBasis:
 
 @dataclass(frozen=True, eq=False)
 class NormalMatrix:
-    """Gauss-Newton matrices of n lanes: `shared` (n, k, k), `cross` (n, E, m, k) and `own` (n, E,
-    m, m).
+    """Gauss-Newton matrices of n lanes, in blocks.
 
-    `positions` (k,) and `columns` say which coordinates these are.
+    Attributes
+    ----------
+    shared : (n, k, k)
+        Of the shared coordinates.
+    cross : (n, E, m, k)
+        Of each event's own with the shared ones.
+    own : (n, E, m, m)
+        Of each event's own.
+    positions : (k,) ints
+        Columns of the shared coordinates.
+    columns : SeparableColumns
+        Those of the events' own.
     """
 
     shared: np.ndarray
@@ -191,17 +237,28 @@ class NormalMatrix:
 
     @property
     def diagonal(self) -> np.ndarray:
-        """(n, D)."""
+        """The diagonals (n, D) of the matrices."""
         whole = np.zeros((len(self.shared), len(self.positions) + self.columns.coordinates.size))
         whole[:, self.positions] = np.einsum("nkk->nk", self.shared)
         whole[:, self.columns.coordinates] = np.einsum("nemm->nem", self.own)
         return whole
 
     def solve(self, side: np.ndarray, kept: np.ndarray, added: Sequence[np.ndarray]) -> np.ndarray:
-        """Solutions (n, q, D) for a `side` (n, D) and q diagonals, the sum of the `added` (n, q,
-        D).
+        """Solve for several damped steps of each lane.
 
-        Rows and columns that are not `kept` (n, D) are those of the diagonals alone.
+        Parameters
+        ----------
+        side : (n, D)
+            Right-hand sides.
+        kept : (n, D) bools
+            Coordinates that take part; rows and columns of the others are those of the diagonals
+            alone.
+        added : arrays (n, q, D)
+            What is added to the diagonals, for q dampings.
+
+        Returns
+        -------
+        (n, q, D) array
         """
         at, apart = self.positions, self.columns.coordinates
         mask, own_mask = kept[:, at], kept[:, apart]

@@ -75,12 +75,35 @@ class Kernel:
     ) -> None:
         """Simulate candidates over events and sum their weighted squared errors.
 
-        candidates (E, given, n): parameters, then P0 and Q0; event (E, columns as in EVENT); first
-        (E + 1,) where each event begins in the samples; inputs (rows as in INPUTS or
-        PHASOR_INPUTS, N); measured, weights (C, N); substeps (E,) Runge-Kutta steps a sample.
-        Written are sums (E, C, n), miss (E, n), and, unless they are empty, outputs (C, n, N) and
-        starts (E, K, n): states and memories before the event. All are C-contiguous, of float64,
-        `first` and `substeps` of int64. Raises `ValueError` for anything else.
+        All arrays are C-contiguous, of float64; `first` and `substeps` are of int64.
+
+        Parameters
+        ----------
+        candidates : (E, given, n)
+            Parameters, then P0 and Q0.
+        event : (E, columns as in EVENT)
+            Numbers of each event.
+        first : (E + 1,)
+            Where each event begins in the samples, and the end.
+        inputs : (rows as in INPUTS or PHASOR_INPUTS, N)
+            What drives the load.
+        measured, weights : (C, N)
+            What it is compared with, and weights of squared errors.
+        substeps : (E,)
+            Runge-Kutta steps per sample.
+        sums : (E, C, n)
+            Written: sums of weighted squared errors.
+        miss : (E, n)
+            Written: how far a candidate is from a steady state.
+        outputs : (C, n, N)
+            Written, unless it is empty.
+        starts : (E, K, n)
+            Written, unless it is empty: states and memories before the event.
+
+        Raises
+        ------
+        ValueError
+            For an array of another shape, order or type.
         """
         room = self.room
         rows = len(PHASOR_INPUTS), len(INPUTS)
