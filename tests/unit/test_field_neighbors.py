@@ -426,3 +426,12 @@ def test_whole_waves_are_not_called_clipped(tmp_path):
     path = write(tmp_path, *station(*three()))
     assert "clipped" not in loads_of(path)[2]
     assert not any("clipped" in note for note in tractexp.read(path)[0].record.notes)
+
+
+def test_a_dip_out_of_a_voltage_that_swings_has_nothing_steady_before_it(tmp_path):
+    """At 2 Hz by 3 % to either side: the level from which the dip falls is not known."""
+    V, I = three()
+    swing = 1 + 0.03 * np.sin(2 * np.pi * 2 * T)
+    seen = tractexp.look(write(tmp_path, *station(V * swing, I * swing)), progress=False)
+    [why] = [event["why"] for event in seen.events if event["depth"] > 0.2]
+    assert "the voltage is not steady before the dip, from which P0, Q0" in why

@@ -150,6 +150,7 @@ REFUSED = [
     ({"a.csv": TABLE}, lambda data: b"", "not a whole .zip"),
     ({"a.csv": TABLE}, lambda data: data[:99] + b"\xff" * 9 + data[108:], "'a.csv' is damaged"),
     ({}, lambda data: data, "there is no record in r.zip: it is empty"),
+    ({"../a.csv": TABLE}, lambda data: data, "or its files are hidden or named as if they lay"),
     ({"a.pdf": b"%PDF"}, lambda data: data, "no record in r.zip: it holds a.pdf; endings"),
     ({"b.zip": b""}, lambda data: data, "holds another archive, 'b.zip': extract it"),
     ({"a.csv": bytes(40 << 20)}, lambda data: data, "has 41.94 MB, packed as .* MB, and at most"),

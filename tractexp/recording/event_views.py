@@ -17,6 +17,7 @@ from tractexp.storage import files
 from tractexp.text.quoting import shell
 from tractexp.text.wording import join_words
 
+EMPTY = "it is empty, or its files are hidden or named as if they lay elsewhere: extract it"
 MOST_UNNAMED = 6  # files that are tried together although their names do not say so
 
 
@@ -43,7 +44,7 @@ def _settings_of_archive(archive: Path) -> dict[str, Any]:
     if not inside:
         names = [str(path.relative_to(archive)) for path in files.list_packed(archive)]
         more = " and more" if len(names) > 5 else ""
-        held = f"it holds {join_words(names[:5])}{more}" if names else "it is empty"
+        held = f"it holds {join_words(names[:5])}{more}" if names else EMPTY
         raise UserError(
             f"there is no record in {archive}: {held}; endings that can be read:"
             f" {', '.join(endings())}"

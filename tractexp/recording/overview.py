@@ -482,13 +482,19 @@ def _number_events(
     for what, number in zip(changes, _numbers(changes, dips), strict=True):
         event, why = _event(results.get(number) if number else None, refused)
         if event is not None and abs(event.t_start - what.start) > LATEST_START:
-            why, event = (
-                f"the reader's dip {number} begins at {event.t_start:.3f} s, with something else",
-                None,
-            )
+            why, event = _explain_start(event.t_start, what.start), None
         yield LoadEvent(
             what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: "))
         )
+
+
+def _explain_start(start: float, fall: float) -> str:
+    """Why the dip that a reader cuts out [s] begins at another moment than the fall, one clause."""
+    when = "after" if start > fall else "before"
+    return (
+        f"what would be fitted begins {abs(start - fall):.2g} s {when} it: the voltage is not"
+        " steady before the dip, from which P0, Q0 and the depth are counted; choose another event"
+    )
 
 
 def _event(result: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
