@@ -2,7 +2,7 @@
 shrink.
 
 The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in
-`_steps`, `_estimated` and `Investigation.write_results`.
+`_steps`, `_estimate_extended_model` and `Investigation.write_results`.
 """
 
 import functools

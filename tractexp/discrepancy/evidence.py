@@ -28,11 +28,20 @@ LEAST_SQUARED_ERROR = 1e-12  # pu^2, the least squared error of a model without 
 
 @dataclass(frozen=True, eq=False)
 class PredictedError:
-    """What a fit leaves of the held-out events in S, in blocks of time.
+    """What a fit leaves of the held-out events in S, in b blocks of time.
 
-    `squares` (b,) is what is left in each block [pu^2], noise included; `noise` (b,) of that is
-    expected of the noise, and `response` (b,) is what the load did. `unit` (D,) are the coordinates
-    on the held-out events. `stalls` names those on which the motor stalls: there all is left.
+    Attributes
+    ----------
+    squares : (b,) [pu²]
+        What is left in each block, noise included.
+    noise : (b,) [pu²]
+        What of that is expected of the noise.
+    response : (b,) [pu²]
+        What the load did.
+    unit : (D,)
+        Coordinates on the held-out events.
+    stalls : names
+        Events on which the motor stalls: there all is left.
     """
 
     squares: np.ndarray
@@ -73,8 +82,16 @@ class PredictedDeviance:
     """What a fit leaves of the deviance on the held-out events, where the base model leaves no more
     than the noise.
 
-    `beyond_chance` is what pushes into the balances would still gain; up to `least` that may be
-    chance. `is_rejected` tells whether the fitted events reject the set.
+    Attributes
+    ----------
+    beyond_chance : float
+        What perturbations of the balances would still gain.
+    curves : Curves
+        What it calculates there.
+    is_rejected : bool
+        Whether the fitted events reject the set.
+    least : float
+        What may be chance, up to which nothing is left.
     """
 
     beyond_chance: float

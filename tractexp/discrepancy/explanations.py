@@ -318,8 +318,8 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
     """Starts of one effect from all over the base model's box, by one simulation each: the effect
     as it was fitted, but of relevant size.
 
-    Where an effect is missing, a wrong valley of the base model may fit better than the right one.
-    There a right effect may have no size at all.
+    Where an effect is missing, a wrong local minimum of the base model may fit better than the
+    right one. There a right effect may have no size at all.
     """
     at, candidate = context.coordinates, context.catalogue[fit.names[0]]
     points = even(BOX_POINTS, len(at.base))

@@ -1,10 +1,10 @@
 """Explanations that leave more than noise, where none leaves less: named by what they predict of
 held-out events.
 
-What is left has two measures. Where the disagreement is of the noise's size it is what pushes into
-the balances would still gain of the deviance, with the fits of the search by likelihood. Where it
-is far above the noise it is the squared error in S, with every set fitted by least squares
-(`least_squares`).
+What is left has two measures. Where the disagreement is of the noise's size it is what
+perturbations of the balances would still gain of the deviance, with the fits of the search by
+likelihood. Where it is far above the noise it is the squared error in S, with every set fitted by
+least squares (`least_squares`).
 """
 
 from collections.abc import Sequence

@@ -3,8 +3,8 @@ nothing.
 
 A rival is rejected by its relative likelihood (Akaike 1978). That weighs fits which leave noise
 only; sets that leave more are judged by what they predict. What is named must leave nothing that a
-push into some balance, or other parameters in each event, would still explain: that is tested at
-the best sets that are not rejected.
+perturbation of some balance, or other parameters in each event, would still explain: that is tested
+at the best sets that are not rejected.
 """
 
 from dataclasses import replace

@@ -57,10 +57,16 @@ REMEMBERED = 4  # problems whose valleys are kept: the jobs of a sweep share one
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """One descent: where it began ("search", "box", "beside the best") and the parameters (d,) it
-    ended at.
+    """One descent of an estimate.
 
-    `above` is its sum of squares above the best's, in mean squares of what the best leaves.
+    Attributes
+    ----------
+    origin : str
+        Where it began: "search", "box" or "beside the best".
+    values : (d,)
+        The parameters it ended at, in their units.
+    above : float
+        Its sum of squares above the best's, in mean squares of what the best leaves.
     """
 
     origin: str
@@ -78,8 +84,16 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class EstimationResult:
-    """An estimate, how surprising what it leaves is, and the valleys it was chosen from, the best
-    first.
+    """An estimate.
+
+    Attributes
+    ----------
+    uncertainty : Uncertainty
+        Values, intervals and verdicts.
+    surprise : Surprise
+        How often noise alone leaves as much.
+    starts : tuple of Start
+        The descents that it was chosen from, the best first.
     """
 
     uncertainty: Uncertainty
@@ -89,8 +103,18 @@ class EstimationResult:
 
 @dataclass(frozen=True, eq=False)
 class DescentEnds:
-    """Where descents by least squares ended: coordinates (n, d), sums of squares (n,) over
-    `likelihood`'s, origins.
+    """Where descents by least squares ended.
+
+    Attributes
+    ----------
+    observed : Observed
+        The problem, driven by smoothed voltages.
+    likelihood : Likelihood
+        That of the least squares.
+    descent : Descent
+        Coordinates (n, d) and sums of squares (n,).
+    origins : n texts
+        Where each began.
     """
 
     observed: Observed
@@ -110,7 +134,9 @@ class DescentEnds:
 
     @property
     def near(self) -> np.ndarray:
-        """Coordinates (at most 4, d) of distinct valleys that are not hopeless, the best first."""
+        """Coordinates (at most 4, d) of distinct local minima that are not hopeless, the best
+        first.
+        """
         near = self.descent.deviance <= LARGEST_MINIMUM_RATIO * self.lowest
         return distinct(
             Descent(self.descent.unit[near], self.descent.deviance[near], 0), self.likelihood.free
@@ -158,8 +184,21 @@ _remembered: OrderedDict[str, tuple[DescentEnds, EstimationResult]] = OrderedDic
 
 
 def estimate_without_search(problem: Problem) -> EstimationResult:
-    """The estimate where nothing was searched. Raises `UserError` where nothing of the box can be
-    simulated.
+    """Estimate the parameters of a problem that was not searched, from all over its box.
+
+    Parameters
+    ----------
+    problem : Problem
+        The model on its events.
+
+    Returns
+    -------
+    EstimationResult
+
+    Raises
+    ------
+    UserError
+        Where nothing of the box can be simulated.
     """
     _, best = _of_box(problem)
     if best is None:
@@ -172,10 +211,21 @@ def estimate_without_search(problem: Problem) -> EstimationResult:
 
 
 def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
-    """The estimate for a problem whose search ended at free `values` (d,).
+    """Estimate the parameters of a problem whose search has ended.
 
     A robust loss takes samples more than `OUTLIER` standard deviations off the fit for outliers;
     what is left of the records is then fitted from where the search ended.
+
+    Parameters
+    ----------
+    problem : Problem
+        The model on its events.
+    values : (d,)
+        Free values at which the search ended.
+
+    Returns
+    -------
+    EstimationResult
     """
     if not problem.loss.quadratic:
         return _robust(problem, values)
@@ -233,7 +283,7 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
 
 
 def _in_own_units(ends: DescentEnds) -> DescentEnds:
-    """The same in mean squares of what the best leaves: there a descent's tolerance means the same
+    """The ends in mean squares of what the best leaves: there a descent's tolerance means the same
     for any record.
     """
     variance = max(ends.lowest / ends.likelihood.samples, 1e-12)
@@ -242,8 +292,8 @@ def _in_own_units(ends: DescentEnds) -> DescentEnds:
 
 
 def _without_offsets(ends: DescentEnds) -> DescentEnds:
-    """The ends of waveforms where what their channels' offsets do is left out of the sum of
-    squares; else the same.
+    """The ends of waveforms without what their channels' offsets do in the sum of squares; other
+    ends as they are.
 
     Offsets of the currents, and of the voltage as the model passes them on, are larger than a
     model's error there.
@@ -300,16 +350,17 @@ def _of_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> Estimat
 
 
 def held_to_usual(squares: Likelihood) -> Likelihood:
-    """The same, whose rows are in units of what is left, with a prior beside which a block of
-    samples counts as one.
+    """The likelihood whose rows are in units of what is left, with a prior.
+
+    A block of samples counts as one row of the prior.
     """
     problem = squares.problem
     return replace(squares, prior=weigh_prior(problem.events, problem.drive, squares.free))
 
 
 def _find_prior_minima(likelihood: Likelihood, near: np.ndarray) -> np.ndarray:
-    """Coordinates (at most 4, d) of the valleys of a likelihood with a prior, from those without it
-    and the usual.
+    """Coordinates (at most 4, d) of the local minima with a prior, from those without it and the
+    usual.
     """
     space, defaults = likelihood.problem.space, likelihood.problem.defaults
     starts = np.concatenate([near, space.to_unit(defaults)[None]])
@@ -345,11 +396,27 @@ def noise_at(
     input_modes: np.ndarray | None,
     whole: bool = False,
 ) -> Noise:
-    """The noise that a fit at coordinates (D,) leaves in quiet; of the `whole` residual where too
-    little is quiet.
+    """The noise that a fit leaves in quiet.
 
-    The whole tells more, too, where only noise is left. `input_modes` is that of
-    `Observed.input_errors`.
+    Where only noise is left the whole residual tells more; and where too little is quiet, it has to
+    do.
+
+    Parameters
+    ----------
+    observed : Observed
+        The problem, driven by smoothed voltages.
+    likelihood : Likelihood
+        Whose residuals they are.
+    unit : (D,)
+        Coordinates of the fit.
+    input_modes : (k, C, N) [pu] or None
+        That of `Observed.input_errors`.
+    whole : bool
+        Whether the whole residual is taken.
+
+    Returns
+    -------
+    Noise
     """
     measured = likelihood.problem.drive.measurements
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
@@ -399,11 +466,22 @@ def drop_outliers(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
 
 
 def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertainty:
-    """The judgement with other valleys (n, D) that the records do not rule out: intervals reach
-    over them.
+    """The judgement with other local minima that the records do not rule out: intervals reach over
+    them.
 
-    A parameter that has another value in another valley is not identified, however narrow either
-    valley is.
+    A parameter that has another value at another minimum is not identified, however narrow either
+    is.
+
+    Parameters
+    ----------
+    uncertainty : Uncertainty
+        The judgement of the best.
+    units : (n, D)
+        Coordinates of the others.
+
+    Returns
+    -------
+    Uncertainty
     """
     rows = uncertainty.likelihood.rows(units) if len(units) else np.empty((0, 1))
     above = (rows**2).sum(axis=1) - uncertainty.deviance

@@ -118,7 +118,19 @@ class DipShape:
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """What recording `shape` would tell: half 95 % intervals (d,) of the parameters `names`."""
+    """What recording a dip would tell of the parameters.
+
+    Attributes
+    ----------
+    shape : DipShape
+        The dip.
+    names : names
+        The d parameters.
+    values : (d,)
+        Their values, in their units.
+    half : (d,)
+        Half of the 95 % intervals to be expected.
+    """
 
     shape: DipShape
     names: tuple[str, ...]
@@ -201,14 +213,24 @@ def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> li
 
 
 def add_information(informations: Sequence[Information]) -> Information:
-    """What several independent records say together."""
+    """The information of several independent records together."""
     return replace(informations[0], J=np.concatenate([i.J for i in informations]))
 
 
 @dataclass(frozen=True, eq=False)
 class Needed:
-    """How deep a dip must be to know a parameter within a share of its value; `depth` None: no dip
-    is.
+    """How deep a dip must be to tell a parameter.
+
+    Attributes
+    ----------
+    parameter : str
+        Its name.
+    within : float
+        The share of its value within which it is to be known.
+    depth : float or None
+        The depth needed; None where no dip is deep enough.
+    depths, relative : arrays
+        Depths that were tried, and half intervals over the value there.
     """
 
     parameter: str

@@ -2,10 +2,10 @@
 
 Where the likelihood is no parabola, the interval of the information matrix misleads; the profile
 does not. Its lanes end where the deviance has risen too far, though beyond a crest it may fall
-again: so the rest of each range is looked at, too, from every valley, and lanes go on from where
-the records fit as well. Every point of a profile that the records do not rule out belongs to the
-intervals of all parameters, not only of the profiled one: where it lies beyond another's, a lane of
-that goes on from there.
+again: so the rest of each range is looked at, too, from every local minimum, and lanes go on from
+where the records fit as well. Every point of a profile that the records do not rule out belongs to
+the intervals of all parameters, not only of the profiled one: where it lies beyond another's, a
+lane of that goes on from there.
 
 Deviances are told over what a parameter's may rise by, in units of the chi-squared quantile: under
 least squares, that of another scatter (`Uncertainty.limits`), one threshold holds for all. Source:

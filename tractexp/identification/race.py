@@ -39,8 +39,19 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Entry:
-    """How a structure did: its number of free parameters, what it leaves of the load's response
-    where it is fitted and where it predicts, as fractions (inf: it cannot be simulated, `why`).
+    """How a structure did in the race.
+
+    Attributes
+    ----------
+    name : str
+        Of the structure.
+    parameters : int
+        Number of its free parameters.
+    fitted, predicted : float
+        What it leaves of the load's response where it is fitted and where it predicts, as
+        fractions; inf where it cannot be simulated.
+    why : str
+        Why it cannot; "" where it can.
     """
 
     name: str

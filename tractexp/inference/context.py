@@ -195,7 +195,9 @@ class Context:
 
     @property
     def problem(self) -> Problem:
-        """The problem of everything: base model, all candidates, pushes. It is not simulated."""
+        """The problem of everything: base model, all candidates, injected perturbations. It is
+        not simulated.
+        """
         return self.kernels.whole
 
     @property

@@ -62,12 +62,14 @@ class Family:
         return model.place_behind_recorder(base.recorder)
 
     def _effect(self, name: str) -> Effect:
-        """The effect of a name, or the pushes into all balances."""
+        """The effect of a name, or the injected perturbations of all balances."""
         return Injection() if name == PUSHES else self.catalogue[name].effect
 
     @functools.cached_property
     def whole(self) -> Model:
-        """The model with every textbook effect and the pushes; too large to be simulated."""
+        """The model with every textbook effect and the injected perturbations; too large to be
+        simulated.
+        """
         return self.with_effects((*self.catalogue.of_load, PUSHES))
 
     @functools.cached_property

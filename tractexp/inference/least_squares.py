@@ -134,7 +134,7 @@ def descend(
     """Levenberg-Marquardt in the unit cube, many lanes at once.
 
     A lane ends when a step lowers its deviance by less than `tolerance`, or when no damping helps.
-    A coordinate on a wall that would leave the box rests for that step.
+    A coordinate on a bound that would leave the box rests for that step.
 
     Forward differences are enough for an estimate, whose standard errors are far wider than what
     they truncate. The minimum itself, to more than four digits, takes `central` ones.

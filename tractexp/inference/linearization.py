@@ -1,5 +1,5 @@
-"""The linearised problem around a fit: what each parameter, candidate and push would change, in one
-batch.
+"""The linearized problem around a fit: what each parameter, candidate and injected perturbation
+would change, in one batch.
 """
 
 import functools
@@ -25,15 +25,42 @@ LEAST_VARIANCE = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """Raw residuals and differences at a fit; `whitened` turns them into a `ScoreTest` under a
-    noise model.
+    """Raw residuals and derivatives at a fit; `build_score_test` makes a `ScoreTest` of them under
+    a noise.
+
+    Attributes
+    ----------
+    context : Context
+        The records and models.
+    unit : (D,)
+        Coordinates of the fit.
+    residual : (C, N) [pu]
+        What it leaves.
+    nuisance : (k, C, N)
+        Derivatives by what was fitted and by the faults of the measurement.
+    prior : (rows, k)
+        Whitened rows of the priors of the nuisances.
+    estimate : (k,)
+        Departure of the nuisances from their prior mean.
+    faults : {name: positions}
+        Which nuisances belong to which fault of the measurement.
+    columns : tuple of CandidateColumn
+        Changes by each candidate.
+    split : (e, C, N)
+        Derivatives by fitted parameters but thresholds and times, each in one event only.
+    perturbed : (c, C, N)
+        Responses to injected perturbations.
+    groups : (c,) ints
+        Which balance each perturbs.
+    held : tuple of columns
+        The base model's parameters that rest on a bound.
     """
 
     context: Context
     unit: np.ndarray  # (D,) coordinates of the fit
     residual: np.ndarray  # (C, N)
     nuisance: np.ndarray  # (k, C, N)
-    prior: np.ndarray  # (k, k) prior rows of the nuisances, whitened
+    prior: np.ndarray  # (rows, k) prior rows of the nuisances, whitened
     # (k,) the nuisances' departure from their prior mean, in its standard deviations (or 0)
     estimate: np.ndarray
     faults: dict[str, list[int]]  # which nuisances belong to which fault of the measurement

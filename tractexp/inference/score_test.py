@@ -1,5 +1,5 @@
-"""A tangent under one noise, all nuisances projected out: what each candidate, push or event of its
-own would gain.
+"""The score test at a fit under one noise, all nuisances projected out: what each candidate,
+perturbation or event of its own would gain.
 
 Notation of the score test with nuisances (Rao 1948; Neyman 1959): r whitened residuals, N nuisance
 columns with their prior, M = I - N (N'N)^-1 N', s = M W dy/deta of a candidate. Adding the

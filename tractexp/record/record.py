@@ -104,14 +104,40 @@ class Base:
 class Record:
     """Positive-sequence voltage and power of one event, P and Q positive when consumed.
 
-    Arrays have shape (N,), are finite except where `P` or `Q` is missing (nan: a gap, in no sum),
-    and are sampled uniformly. `window` is the averaging window of its phasors, None where no one
-    says it; `more` are further channels, which no model reads. `source` says where the record came
-    from, `notes` what was changed in it or is odd about it, one sentence each. `original_base` is
-    the base of the file, None where that is `base`; where `U_angle` is recorded, f is the frequency
-    at which it turns between its jumps; `identity` says which load it is: station,
-    device, load, channels; `digest` is the SHA-256 of its channels as they were read, "" where they
-    still are that.
+    All arrays are sampled uniformly, and finite but for gaps of P and Q.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    t : (N,) [s]
+        Times.
+    U, P, Q : (N,) [pu of `base`]
+        Voltage and powers; nan is a gap of P or Q, which counts in no sum.
+    f : (N,) or None [Hz]
+        Frequency; where `U_angle` is recorded that at which it turns between its jumps.
+    U2 : (N,) or None [pu]
+        Negative-sequence voltage.
+    base : Base
+        What one per unit stands for.
+    source : str
+        Where it came from.
+    notes : tuple of str
+        What was changed in it or is odd about it, one sentence each.
+    window : Window or None
+        The averaging window of its phasors; None where no one says it.
+    more : {name: (N,)}
+        Further channels, which no model reads.
+    waves : Waves or None
+        The waveforms that it was measured from.
+    original_base : Base or None
+        That of the file; None where that is `base`.
+    identity : {key: text}
+        Which load it is: station, device, load, channels.
+    digest : str
+        SHA-256 of its channels as they were read; "" where they still are that.
+    U_angle : (N,) or None [rad]
+        The voltage's angle.
     """
 
     name: str
@@ -211,13 +237,26 @@ class Record:
         return self
 
     def uniform(self, place: Callable[[int], str] | None = None) -> "Record":
-        """The record on a uniform time grid; a note says so where more than `JITTER` of a step was
-        moved.
+        """The record on a uniform time grid.
 
         Single missing rows and voltages are bridged, and a few in a row of a steady voltage.
         Jitter, and the event instants and steps of a simulator, are resampled linearly; of two rows
         of one time the second holds from then on.
-        Raises `UserError` for more missing rows: steps that are multiples of the usual one.
+
+        Parameters
+        ----------
+        place : int -> str
+            Says where sample i stands in the file; None: by sample and time.
+
+        Returns
+        -------
+        Record
+            A note says so where more than `LARGEST_JITTER` of a step was moved.
+
+        Raises
+        ------
+        UserError
+            For more missing rows: steps that are multiples of the usual one.
         """
         given = place or self._place
         if any(values.shape != self.t.shape for values in self.channels.values()):

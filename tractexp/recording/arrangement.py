@@ -135,7 +135,7 @@ def arrange_feeder(recording: Recording, feeder: Feeder) -> Feeder:
 
 
 def _arrange_order(recording: Recording, feeder: Feeder) -> Feeder:
-    """As `arranged`; raises `_OtherOrder` with an order that nobody has tried yet."""
+    """As `arrange_feeder`; raises `_OtherOrder` with an order that nobody has tried yet."""
     _residuals(recording, feeder)
     feeder = _lines_by_label(recording, feeder)
     connection = chosen("connection", feeder.connection)

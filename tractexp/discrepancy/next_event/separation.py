@@ -30,11 +30,22 @@ POWER_DIFFERENCE = 1e-3  # of P0 and Q0, for their differences [pu]
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One explanation on the recorded events: k parameters of the model and its effects, and P0 and
-    Q0 of each event.
+    """One explanation on the recorded events, with k parameters of the model and its effects.
 
-    `r` (R,) and `J` (k, R) are whitened, faults of the measurement with their priors; `own` (k, m)
-    and `s` (m,) are priors of the explanation's own. Rows of parameters on a wall are 0.
+    P0 and Q0 of each event are free beside them. Rows of parameters on a bound are 0.
+
+    Attributes
+    ----------
+    fit : Refit
+        Where it is linearized.
+    columns : tuple of ints
+        The parameters' columns.
+    free : (k,) bools
+        Which of them are on no bound.
+    r, J : (R,), (k, R)
+        Whitened residuals and derivatives, faults of the measurement with their priors.
+    own, s : (k, m), (m,)
+        Priors of the explanation's own.
     """
 
     fit: Refit

@@ -3,7 +3,7 @@ fit is biased.
 
 The best terms get their instants, levels and times from ever finer grids, then everything is fitted
 at once, from the base fit, from the same with what rests on its bounds moved into the middle, and
-from the base model's other valleys.
+from the base model's other local minima.
 """
 
 import itertools
