@@ -28,6 +28,7 @@ default_role = "code"  # single backticks of docstrings
 autodoc_typehints = "signature"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+napoleon_use_ivar = True  # attributes are no targets of links: several classes have a name
 autodoc_member_order = "bysource"
 # types of signatures are no links; links of pages are checked all the same
 nitpick_ignore_regex = [("py:.*", ".*")]
