@@ -237,22 +237,14 @@ class CSV(Tabular, Reader):
         lacks_voltage = voltage is None and absolute_U
         lacks_power = power is None and absolute_P
         if lacks_voltage or lacks_power:
-            U, S = level(record)
-            if S < 1e-9:
-                raise UserError(
-                    f"{record.where}: P and Q are zero or missing before the first dip, so they"
-                    " give no base; say it: "
-                    f"{DATA.base_power} (MVA)"
-                )
-            if absolute_U:
-                check_load(record.where, U, S if absolute_P else 0.0)
-            if lacks_voltage:
-                voltage = U
-                sources.append(f"{U:.4g} kV line to line")
-            if lacks_power:
-                power = S
-                origin = LOAD
-                sources.append(f"{S:.4g} MVA")
+            U, S = _measure_level(record, bool(absolute_U), bool(absolute_P))
+        if lacks_voltage:
+            voltage = U
+            sources.append(f"{U:.4g} kV line to line")
+        if lacks_power:
+            power = S
+            origin = LOAD
+            sources.append(f"{S:.4g} MVA")
         base = Base(voltage or 1.0, power or 1.0, quantities.frequency, origin)
         if not sources:
             return base, []
@@ -264,3 +256,18 @@ def _one_of(absolute: bool | None, size: float, given: Any) -> float:
     absolute, or have no unit and the user has `given` that size; else 1.
     """
     return size if absolute or (absolute is None and given) else 1.0
+
+
+def _measure_level(record: Record, absolute_U: bool, absolute_P: bool) -> tuple[float, float]:
+    """Voltage [kV] and apparent power [MVA] before the first dip. Raises `UserError` for a record
+    without power there, or of a voltage that no load has.
+    """
+    U, S = level(record)
+    if S < 1e-9:
+        raise UserError(
+            f"{record.where}: P and Q are zero or missing before the first dip, so they give no"
+            f" base; say it: {DATA.base_power} (MVA)"
+        )
+    if absolute_U:
+        check_load(record.where, U, S if absolute_P else 0.0)
+    return U, S

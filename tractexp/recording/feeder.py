@@ -443,13 +443,8 @@ def _buses(
     if len(buses) == 1:
         return [(buses[0], "the only ones in the file")]
     loaded = phasors.size(load.numbers) > UNLOADED * level
-    greatest = max(phasors.size(bus.numbers) for bus in buses)
-    alive = [
-        b
-        for b in buses
-        if not _dead(phasors, b.numbers) and phasors.size(b.numbers) > PICK_UP * greatest
-    ]
-    buses = alive if alive and loaded else buses
+    if loaded:
+        buses = _select_alive(phasors, buses) or buses
     if len(buses) == 1:
         return [(buses[0], "the only ones alive")]
     ties, why = _named_alike(recording, phasors, load, buses)
@@ -464,6 +459,22 @@ def _buses(
                 " is taken",
             )
         ]
+    return _follow_voltages(phasors, load, buses, ties, loaded)
+
+
+def _select_alive(phasors: Snapshots, buses: Sequence[Group]) -> list[Group]:
+    """The voltages that are no dead line's, nor small beside the greatest."""
+    greatest = max(phasors.size(bus.numbers) for bus in buses)
+    alive = [bus for bus in buses if not _dead(phasors, bus.numbers)]
+    return [bus for bus in alive if phasors.size(bus.numbers) > PICK_UP * greatest]
+
+
+def _follow_voltages(
+    phasors: Snapshots, load: Group, buses: Sequence[Group], ties: Sequence[Group], loaded: bool
+) -> list[tuple[Group, str]]:
+    """The voltages that the currents of a load follow best, one of the `ties` of names where it
+    follows as well; several where another of these does.
+    """
     stray = {id(bus): _stray(phasors, bus, load) for bus in buses}
     best = min(buses, key=lambda bus: stray[id(bus)])
     # one of those whose names say as much

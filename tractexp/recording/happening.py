@@ -101,6 +101,16 @@ def happenings_of(record: Record) -> list[Happening]:
     return happenings_in(of_record(record))
 
 
+def _is_within(trace: Trace, e: Excursion, slips: Sequence[Excursion]) -> bool:
+    """Whether an excursion is a part of a pole slip."""
+    return any(_part(trace, e, slip) for slip in slips)
+
+
+def _name_load_change(change: Change) -> str:
+    """What a change of a load's own is called."""
+    return "load loss" if change.ratio < SMALL_LOAD_SHARE else "load step"
+
+
 def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]:
     """The events in a trace, in order of time; `trigger` [s] is that of the recorder."""
     if len(trace.t) < FEWEST_HALF_CYCLES:
@@ -111,24 +121,16 @@ def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]
         )
         return [replace(_describe(trace, "dead line", whole, []), why=NO_SYSTEM)]
     slips = _pole_slips(trace)
-    outside = [
-        e for e in excursions(trace, trigger) if not any(_part(trace, e, slip) for slip in slips)
-    ]
+    outside = [e for e in excursions(trace, trigger) if not _is_within(trace, e, slips)]
     lasting = _extend_lasting_falls(trace, outside)
     spans = [(kind, part) for e in lasting for kind, part in _kinds(trace, e)]
     spans += [("pole slip", slip) for slip in slips]
     spans += _open_alone(trace, spans)
-    spans += [
-        (kind, e) for kind, e in _inrush(trace) if not any(_part(trace, e, slip) for slip in slips)
-    ]
+    spans += [(kind, e) for kind, e in _inrush(trace) if not _is_within(trace, e, slips)]
     changes = _own_changes(trace, [e for _, e in spans])
-    listed = (c for c in changes if abs(c.ratio - 1) > LEAST_LISTED_STEP)
+    listed = [c for c in changes if abs(c.ratio - 1) > LEAST_LISTED_STEP]
     spans += [
-        (
-            "load loss" if c.ratio < SMALL_LOAD_SHARE else "load step",
-            _build_current_span(trace, c.first + 1, c.stop),
-        )
-        for c in listed
+        (_name_load_change(c), _build_current_span(trace, c.first + 1, c.stop)) for c in listed
     ]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
     bounds = [(e.start, _find_steady_end(kind, e, spans)) for kind, e in spans]
@@ -424,6 +426,17 @@ def _even(t: np.ndarray) -> bool:
     )
 
 
+def _measure_unbalance(trace: Trace, e: Excursion) -> float:
+    """The greatest negative-sequence voltage in an event, of the voltage before it; nan where none
+    is measured.
+    """
+    U2 = trace.U2[e.start : max(e.end, e.start + 1)]
+    # at its ends a window holds two states, whose difference looks unbalanced
+    edge = round(trace.cycle / trace.step)
+    U2 = U2[edge : -edge or None] if e.end - e.start > 3 * edge else U2
+    return float(np.nanmax(U2) / e.reference) if np.isfinite(U2).any() else float("nan")
+
+
 def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int]]) -> Happening:
     """An event; `bounds` are the first and the last sample of all that changes voltage or load."""
     first = max((b for _, b in bounds if b <= e.start), default=0)
@@ -435,9 +448,6 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     before = _power(trace, max(begin, onset - count - 1), max(onset - 1, begin))
     after = _power(trace, min(e.end + 1, stop), min(e.end + 1 + count // 2, stop))
     inside = slice(e.start, max(e.end, e.start + 1))
-    # where a window holds two states, whose difference looks unbalanced
-    edge = round(trace.cycle / trace.step)
-    U2 = trace.U2[inside][edge : -edge or None] if e.end - e.start > 3 * edge else trace.U2[inside]
     extreme = np.max if e.worst > 0 else np.min
     depth = -e.worst if e.new_level or e.dead else 1 - float(extreme(trace.U[inside])) / e.reference
     last = min(e.end, len(trace.t) - 1)
@@ -446,16 +456,15 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     if kind in OF_STATICS or (kind == "dip" and not e.sudden):
         lasting = kind == "step"
         exponents = find_exponents(trace, e.start, e.end, first, stop, lasting=lasting)
-    if exponents:
         told = ", ".join(map(str, exponents))
-        why = f"{why}; worth fitting for the static part: {told}, motors included"
+        why += f"; worth fitting for the static part: {told}, motors included" if told else ""
     return Happening(
         kind,
         float(trace.t[e.start]),
         float(trace.t[last]),
         float(depth),
         trace.jump(e.start),
-        float(np.nanmax(U2) / e.reference) if np.isfinite(U2).any() else float("nan"),
+        _measure_unbalance(trace, e),
         before,
         after,
         worth,

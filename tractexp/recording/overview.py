@@ -72,6 +72,17 @@ class LoadEvent:
         return self.what.worth and self.event is not None
 
 
+def _select_before(changes: Sequence[Happening], phasors: Phasors) -> np.ndarray | slice:
+    """The phasors after the last change of a load before the first event that is none; the first
+    one where there are none.
+    """
+    loud = [what for what in changes if what.kind not in OF_LOADS]
+    stop = min((what.start for what in (loud or changes)[:1]), default=np.inf)
+    begin = max((what.end for what in changes if what.end < stop), default=-np.inf)
+    before = np.flatnonzero((phasors.t > begin) & (phasors.t < stop))
+    return before if len(before) else slice(0, 1)
+
+
 def _find_first_powers(record: Record) -> tuple[float, float, float]:
     """Voltage [kV], P [MW] and Q [Mvar] at the beginning of a record; nan of what it has not."""
     first = slice(0, max(1, record.samples // 20))
@@ -154,15 +165,7 @@ class Sight:
         if not self.phasors:
             return None
         p = self.phasors[0]
-        changes = [each.what for each in self.events]
-        first = next(
-            (what for what in changes if what.kind not in OF_LOADS), changes[0] if changes else None
-        )
-        stop = np.inf if first is None else first.start
-        begin = max((what.end for what in changes if what.end < stop), default=-np.inf)
-        before = np.flatnonzero((p.t > begin) & (p.t < stop))
-        if not len(before):
-            before = slice(0, 1)
+        before = _select_before([each.what for each in self.events], p)
         if self.feeder is not None and not self.feeder.currents:
             return float(np.median(p.U[before])), float("nan"), float("nan")
         return tuple(float(np.median(v[before])) for v in (p.U, np.real(p.S), np.imag(p.S)))  # type: ignore[return-value]
@@ -339,6 +342,12 @@ def _measure_stretch(
     return [join_phasors(parts)] if parts else [], join_traces(traces) if traces else None, said
 
 
+def _find_trigger(recording: Recording, trace: Trace) -> float | None:
+    """When the recorder was triggered first within a trace [s]; None where it was not."""
+    within = (x for x in recording.find_triggers() if trace.t[0] <= x <= trace.t[-1])
+    return next(within, None)
+
+
 def _cut_dips(
     reader: WaveformReader, recording: Recording, feeder: Feeder, phasors: Sequence[Phasors]
 ) -> tuple[list[FileDip], str]:
@@ -378,8 +387,7 @@ def sight(
         phasors += measured
         said += refusals
         if trace is not None:
-            within = (x for x in recording.find_triggers() if trace.t[0] <= x <= trace.t[-1])
-            changes += happenings_in(trace, next(within, None))
+            changes += happenings_in(trace, _find_trigger(recording, trace))
             dead = dead or find_dead_phases(trace)
             brief.append(len(trace.t) < FEWEST_HALF_CYCLES)
     dips, refused = [], ""
@@ -387,8 +395,8 @@ def sight(
         dips, refused = _cut_dips(reader, recording, feeder, phasors)
     numbered = _number_events(changes, dips, reader.path, refused)
     said += [TOO_SHORT] if brief and all(brief) else []
-    unexamined = "; ".join(said) if said and (not phasors or TOO_SHORT in said) else ""
-    if events and phasors and (slow := _describe_slow_segments(recording)):
+    unexamined = "; ".join(said) if not phasors or TOO_SHORT in said else ""
+    if slow := _describe_slow_segments(recording) if events and phasors else "":
         unexamined = unexamined or ("" if changes else f"{slow}; the rest shows nothing")
         feeder = replace(feeder, why=(*feeder.why, f"{slow}: not examined"))
     secondary = secondary_of(recording, feeder.channels)
