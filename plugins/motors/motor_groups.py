@@ -46,9 +46,7 @@ class MotorGroups(Motor):
 
     def __post_init__(self):
         self._check_names()
-        members: tuple[Motor, ...] = tuple(
-            build("model/motor", m if isinstance(m, Mapping) else {"name": m}) for m in self.of
-        )
+        members: tuple[Motor, ...] = tuple(map(_build_member, self.of))
         fields = {
             "members": members,
             "parameters": tuple(
@@ -138,3 +136,8 @@ def _own(motor, k, groups):
                 symbol=symbol,
                 about=f"{p.about}, of group {k}",
             )
+
+
+def _build_member(choice):
+    """The motor that a name, or a name and its settings, asks for."""
+    return build("model/motor", choice if isinstance(choice, Mapping) else {"name": choice})

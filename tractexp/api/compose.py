@@ -310,15 +310,12 @@ def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
     from tractexp.model.parts import Effect
 
     names = discover()["effect"].keys() - {effect.name for effect in model.effects}
-    showing = [
-        cls()
-        for cls in (get("effect", name) for name in sorted(names))
-        if cls.describe_sign is not Effect.describe_sign
-    ]
+    classes = [get("effect", name) for name in sorted(names)]
+    showing = [cls() for cls in classes if cls.describe_sign is not Effect.describe_sign]
     taken = [effect for effect in showing if model.acceptance(effect).refusal is None]
     seen = domain_of(model).events(events) if taken else ()
-    how = {effect.name: next(filter(None, map(effect.describe_sign, seen)), "") for effect in taken}
-    return {name: sentence for name, sentence in how.items() if sentence}
+    signs = {effect.name: [*filter(None, map(effect.describe_sign, seen))] for effect in taken}
+    return {name: several[0] for name, several in signs.items() if several}
 
 
 def model_of(given: Any, domain: str | None = None) -> LoadModel:

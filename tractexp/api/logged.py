@@ -17,6 +17,7 @@ from tractexp.text import quoting
 if TYPE_CHECKING:
     from tractexp.api.identify import Estimate, Identification
     from tractexp.api.task import Job
+    from tractexp.identification.result import Result
 
 FLOOR = 1.01  # times the estimate's objective: from there a search has found what the noise leaves
 ENDED = ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
@@ -80,13 +81,20 @@ def _errors(fit: "Identification") -> dict[str, float]:
     for channel in "PQ":
         if (within := result.next_dip.get(channel)) is not None:
             metrics[f"next_dip_{channel}"] = within
-    for k, event in enumerate(result.events, start=1):
-        metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in result.epsilons}
     if "epsilon_i" in result.epsilons:
         metrics["epsilon_i"] = max(e["epsilon_i"] for e in result.events if e["role"] == "train")
     if fit.grade:
         metrics["grade"] = GRADES.index(fit.grade)
-    return metrics
+    return metrics | _epsilons(result)
+
+
+def _epsilons(result: "Result") -> dict[str, float]:
+    """The errors of each event, by its role and number."""
+    return {
+        f"{event['role']}_{k}_{name}": event[name]
+        for k, event in enumerate(result.events, start=1)
+        for name in result.epsilons
+    }
 
 
 def _of_search(fit: "Identification") -> dict[str, float]:

@@ -162,7 +162,8 @@ def _look_at_all(
     `keep` has no rows.
     """
     store, names = Store(ROWS, folder=Path(keep or "")), keys(place, paths)
-    entries = {name: store.read_json(key) for name, key in names.items()} if keep else {}
+    kept = names if keep else {}
+    entries = {name: store.read_json(key) for name, key in kept.items()}
     rows = {name: entry for name, entry in entries.items() if entry is not None}
     fresh = [name for name in names if name not in rows]
     with count_parts("files", len(fresh), progress) as count:

@@ -322,6 +322,9 @@ def _element(text: str) -> str:
     return text if quoted or PLAIN.fullmatch(text) else _quote_override_value(text)
 
 
+DEEPER = {"[": 1, "(": 1, "{": 1, "]": -1, ")": -1, "}": -1}  # levels of brackets, by letter
+
+
 def _parts(inner: str) -> list[str]:
     """What commas outside quotes and brackets part."""
     parts, depth, mark, start = [], 0, "", 0
@@ -330,10 +333,8 @@ def _parts(inner: str) -> list[str]:
             mark = "" if letter == mark else mark
         elif letter in "'\"" and not inner[start:i].strip():  # an apostrophe within a name is none
             mark = letter
-        elif letter in "[({":
-            depth += 1
-        elif letter in "])}":
-            depth -= 1
+        elif letter in DEEPER:
+            depth += DEEPER[letter]
         elif letter == "," and depth == 0:
             parts.append(inner[start:i])
             start = i + 1

@@ -220,12 +220,13 @@ def remainders(
     """
     ends = np.cumsum([0, *(event.record.samples for event in events)])
     parts = [slice(a, b) for a, b in itertools.pairwise(ends.tolist())]
+    modes = noise.input_modes
     stretches = [
         _Stretch.from_event(
             event,
             residual[:, part],
             noise.select_event(e),
-            None if noise.input_modes is None else noise.input_modes[:, :, part],
+            None if modes is None else modes[:, :, part],
         )
         for e, (event, part) in enumerate(zip(events, parts, strict=True))
     ]
@@ -327,33 +328,32 @@ def _list_neighbors(shape: _Shape, zoom: float, samples: int) -> list[_Shape]:
     return [shape._replace(decay=float(d), frequency=float(f)) for d, f in pairs]
 
 
+def _name_kind(shape: _Shape, time_constant: float | None) -> str:
+    """What a shape is called."""
+    if shape.frequency:
+        return "ringing"
+    if time_constant is None:
+        return "step"
+    return "pulse" if shape.decay < PULSE else "decay"
+
+
 def _describe_shape(
     stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, share: float
 ) -> Remainder:
     """A shape as a person reads it."""
     event, step = stretch.event, stretch.event.record.step
-    ringing = bool(shape.frequency)
     rest = stretch.residual.shape[1] - shape.start
     tau = shape.decay * step if shape.decay < STAYS * rest else None
-    kind = (
-        "ringing"
-        if ringing
-        else "step"
-        if tau is None
-        else "pulse"
-        if shape.decay < PULSE
-        else "decay"
-    )
-    size = float(np.hypot(*sizes)) if ringing else float(sizes[0])
+    size = float(np.hypot(*sizes)) if shape.frequency else float(sizes[0])
     level = max(event.levels[channel], SMALLEST_DEVIATION)
     start = float(event.record.t[shape.start])
     ended = start > event.t_end - 1.5 * step
-    frequency = shape.frequency / step if ringing else None
+    frequency = shape.frequency / step if shape.frequency else None
     pace = None if tau is None or frequency is None else np.hypot(2 * np.pi * frequency * tau, 1.0)
     return Remainder(
         event=event.record.name,
         channel=stretch.drive.labels[channel],
-        kind=kind,
+        kind=_name_kind(shape, tau),
         start=start,
         after=start - (event.t_end if ended else event.t_start),
         ended=ended,

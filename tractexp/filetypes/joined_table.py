@@ -1,6 +1,6 @@
 """One table of the files of one event: their columns beside one time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from operator import itemgetter
@@ -126,6 +126,16 @@ def _check_rows(part: TableFile, own: np.ndarray, t: np.ndarray, other: str) -> 
         )
 
 
+def _list_columns(
+    parts: Sequence[TableFile], times: Sequence[set[int]]
+) -> Iterator[tuple[int, int, str, str]]:
+    """(part, number, name, unit) of each column but times."""
+    for k, part in enumerate(parts):
+        for number, name in enumerate(part.heading.names):
+            if number not in times[k]:
+                yield k, number, name.strip(), part.heading.units[number]
+
+
 def _columns(
     parts: Sequence[TableFile], times: Sequence[set[int]], told: Sequence[str]
 ) -> tuple[list[tuple[int, int]], list[tuple[str, str]], list[str]]:
@@ -133,12 +143,7 @@ def _columns(
 
     A name that several files have, or that says nothing, is made of what the files' names say.
     """
-    every = [
-        (k, number, name.strip(), part.heading.units[number])
-        for k, part in enumerate(parts)
-        for number, name in enumerate(part.heading.names)
-        if number not in times[k]
-    ]
+    every = list(_list_columns(parts, times))
     columns, names, notes = [], [], []
     for k, number, name, unit in every:
         alike = [one for one in every if one[0] != k and one[2].lower() == name.lower()]

@@ -325,9 +325,9 @@ def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value:
     if not letter or definition.value not in values:
         return ""
     name = letter + mark if letter in "UI" or mark in "ABC" else letter
-    if definition.characteristic in FUNDAMENTAL:
-        return f"{name} fundamental"
-    return name if definition.characteristic in (*PLAIN, *SEQUENCES) else ""
+    endings = dict.fromkeys((*PLAIN, *SEQUENCES), "") | dict.fromkeys(FUNDAMENTAL, " fundamental")
+    ending = endings.get(definition.characteristic)
+    return "" if ending is None else f"{name}{ending}"
 
 
 def _longest(

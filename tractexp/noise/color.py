@@ -203,19 +203,16 @@ def fit_autoregression(
     count = sum(map(len, stretches))
     power = sum(float(x @ x) for x in stretches) / max(count, 1)
     highest = min(highest, count // 10, max(map(len, stretches), default=1) - 1)
-    forward, backward = [x[1:] for x in stretches], [x[:-1] for x in stretches]
+    errors = [(x[1:], x[:-1]) for x in stretches]  # of prediction, forward and backward
     table, variance = [np.empty(0)], [max(power, SMALLEST_DEVIATION**2)]
     for _ in range(highest):
-        both = sum(float(f @ b) for f, b in zip(forward, backward, strict=True))
-        energy = sum(float(f @ f + b @ b) for f, b in zip(forward, backward, strict=True))
+        both = sum(float(f @ b) for f, b in errors)
+        energy = sum(float(f @ f + b @ b) for f, b in errors)
         reflection = 2 * both / energy if energy > 0 else 0.0
         last = table[-1]
         table.append(np.concatenate((last - reflection * last[::-1], [reflection])))
         variance.append(max(variance[-1] * (1 - reflection**2), SMALLEST_DEVIATION**2))
-        pairs = [
-            (f - reflection * b, b - reflection * f) for f, b in zip(forward, backward, strict=True)
-        ]
-        forward, backward = [f[1:] for f, _ in pairs], [b[:-1] for _, b in pairs]
+        errors = [((f - reflection * b)[1:], (b - reflection * f)[:-1]) for f, b in errors]
     orders = np.arange(len(variance))
     price = np.log(max(count, 2)) if sparing else 2 * count / np.maximum(count - orders - 2, 1)
     criterion = count * np.log(variance) + (orders + 1) * price

@@ -263,6 +263,11 @@ def _zero(x: np.ndarray) -> np.ndarray:
     return np.abs(x.mean(axis=0))
 
 
+def _names_ground(recording: Recording, numbers: Sequence[int]) -> bool:
+    """Whether the name of a voltage says that it is to ground."""
+    return any(is_to_ground(recording.channels[i]) for i in numbers)
+
+
 def _lines_by_shape(recording: Recording, feeder: Feeder, live: _LivePhasors) -> str:
     """Why three voltages must be line to line though no label says so; "" where
     nothing shows it.
@@ -281,19 +286,14 @@ def _lines_by_shape(recording: Recording, feeder: Feeder, live: _LivePhasors) ->
     size = _level(recording, feeder.voltages)
     for numbers, other in _levels(recording):
         alike = abs(size / max(other, 1e-12) / np.sqrt(3) - 1) < 5 * ROOT3
-        if (
-            alike
-            and not {*numbers} & {*feeder.voltages}
-            and _root3(recording, feeder.voltages, numbers)
-        ):
+        alike &= {*numbers}.isdisjoint(feeder.voltages)
+        if alike and _root3(recording, feeder.voltages, numbers):
             others = ", ".join(_name_channel(recording, i) for i in numbers)
             return (
                 f"the voltages are sqrt 3 times, and 30 degrees ahead of, those of {others}: {used}"
             )
     level = float(np.median(V1[live.calm]))
-    if is_between_phases(level) and not any(
-        is_to_ground(recording.channels[i]) for i in feeder.voltages
-    ):
+    if is_between_phases(level) and not _names_ground(recording, feeder.voltages):
         return f"{level:.4g} kV is near a nominal voltage, and times sqrt 3 near none: {used}"
     return ""
 

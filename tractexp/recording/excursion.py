@@ -84,7 +84,8 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
         if inside:
             k += inside
             continue
-        event = _one(trace, levels, limits, reference, k, events[-1].end if events else 0)
+        last = events[-1].end if events else 0
+        event = _one(trace, levels, limits, reference, k, last)
         slide = _find_slide(trace, event, k, count)
         events.append(slide or event)
         if slide is not None:

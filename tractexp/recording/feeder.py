@@ -154,22 +154,16 @@ def buses_alone(recording: Recording) -> list[Feeder]:
     phasors = snapshots(recording, volts, f)
     if not volts or phasors is None or strange or direct_voltage(recording):
         return []
-    grouped = [
-        g for g in _groups(recording, phasors, volts) if any(phasors.pure(i) for i in g.numbers)
-    ]
+    pure = {i for i in volts if phasors.pure(i)}
+    grouped = [g for g in _groups(recording, phasors, volts) if not pure.isdisjoint(g.numbers)]
     taken = {i for g in grouped for i in g.numbers}
     alone = _select_free(recording, phasors, volts, taken)
     feeders = [_bus_alone(recording, phasors, group) for group in grouped]
+    why = (_why_alone(recording),)
+    names = [recording.channels[i].name.strip() for i in alone]
     return feeders + [
-        Feeder(
-            (i,),
-            (),
-            usual(1, 1),
-            name=recording.channels[i].name.strip(),
-            why=(_why_alone(recording),),
-            loaded=False,
-        )
-        for i in alone
+        Feeder((i,), (), usual(1, 1), name=name, why=why, loaded=False)
+        for i, name in zip(alone, names, strict=True)
     ]
 
 
@@ -226,7 +220,6 @@ def can_be_named(recording: Recording) -> bool:
 
 def explain_unrecognized(recording: Recording) -> str:
     """Why a recording shows no load by itself, one clause."""
-    kinds = [kind(c) for c in recording.channels if c.form == "waveform"]
     longest = max(recording.segments, key=lambda s: (s.stop - s.first) / s.rate)
     seconds = (longest.stop - longest.first) / longest.rate
     try:
@@ -240,7 +233,8 @@ def explain_unrecognized(recording: Recording) -> str:
         )
     if direct := direct_voltage(recording):
         return direct
-    if lacking := next((each for each in ("voltage", "current") if each not in kinds), ""):
+    quantities = ("voltage", "current")
+    if lacking := next((each for each in quantities if not _list_waves(recording, each)), ""):
         units = ", ".join(sorted({f"'{c.unit.strip()}'" for c in recording.channels}))
         return f"no channel is a {lacking} by its unit, of which there are {units}, or by its name"
     return _explain_voltages(recording)
@@ -416,11 +410,9 @@ def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
     if bus.missing not in (None, 2):
         settings["pairs"] = [["bc", "ca"], ["ab", "ca"]][bus.missing]
     if bus.backward:
-        pairs = settings.get("pairs", ["ab", "bc"])
-        down = (number in bus.backward for number in voltages)
-        settings["pairs"] = [
-            pair[::-1] if turned else pair for pair, turned in zip(pairs, down, strict=True)
-        ]
+        pairs = zip(settings.get("pairs", ["ab", "bc"]), voltages, strict=True)
+        steps = [(pair, -1 if number in bus.backward else 1) for pair, number in pairs]
+        settings["pairs"] = [pair[::step] for pair, step in steps]
     if isinstance(connection, str) and settings:
         return voltages, {"name": connection, **settings}
     return voltages, settings or connection
@@ -656,11 +648,10 @@ def _part_of_railway(
             "the current of a return conductor or the rail: what the contact line brings flows back"
             " in it",
         )
-    others = [
-        i for i in volts if i != voltage and phasors.pure(i) and is_opposite(phasors, voltage, i)
-    ]
-    if others:
-        return (f"{HALF}: no current goes with the other voltage, {_names(recording, others[:1])}",)
+    pure = [i for i in volts if i != voltage and phasors.pure(i)]
+    opposite = next((i for i in pure if is_opposite(phasors, voltage, i)), None)
+    if opposite is not None:
+        return (f"{HALF}: no current goes with the other voltage, {_names(recording, [opposite])}",)
     other = other_conductor(recording, phasors, current, [i for i in amps if phasors.pure(i)])
     if other is not None:
         return (f"{HALF}: no voltage goes with the other current, {_names(recording, [other])}",)
@@ -728,13 +719,12 @@ def _explain_no_load(
             f"no load here: a bus coupler, as its name says ('{named[0]}'): its current is that of"
             " other feeders"
         )
-    if not any(phasors.pure(i) for i in feeder.currents):
+    if not any(map(phasors.pure, feeder.currents)):
         return "no load here: the currents are no more than noise or harmonics"
     size = phasors.size(feeder.currents)
-    step = max(
-        abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents)
-    )
-    integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)
+    currents = [recording.channels[i] for i in feeder.currents]
+    step = max(abs(c.gain * c.ratio * c.factor) for c in currents)
+    integral = {c.raw.dtype.kind for c in currents} <= {"i", "u"}
     if size > UNLOADED * level and not (integral and size < STEPS_LOADED * step):
         return ""
     return (

@@ -250,17 +250,15 @@ def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
     """The span in which voltages are lost while all currents stay: a fuse of the voltage
     transformers; else None.
     """
-    edge, before = (
-        round(trace.cycle / trace.step),
-        slice(max(e.start - FUSE_SAMPLES, 0), max(e.start - 1, 0)),
-    )
     if e.dead or not len(trace.I) or e.start < 4:
         return None
+    edge = round(trace.cycle / trace.step)
+    before = slice(max(e.start - FUSE_SAMPLES, 0), max(e.start - 1, 0))
     current, voltage = (
         np.maximum(np.median(x[:, before], axis=1), 1e-12) for x in (trace.I, trace.phases)
     )
     lost = (trace.phases / voltage[:, None])[:, e.start + edge :].min(axis=0) < LOST_VOLTAGE
-    end = e.start + edge + (len(lost) if lost.all() else int(np.argmin(lost)))
+    end = e.start + edge + int(np.argmin([*lost, False]))
     inside = slice(e.start + edge, end - edge * (end < len(trace.t)))
     flows = (
         current.min() > CARRIES * np.percentile(trace.I, 95)
@@ -359,6 +357,14 @@ def _build_current_span(trace: Trace, a: int, b: int) -> Excursion:
     return Excursion(a, b, 0.0, True, False, True, max(float(np.median(trace.U)), 1e-12))
 
 
+def _find_even_end(trace: Trace, lows: Sequence[int], first: int) -> int:
+    """The number of the low after the last that follows the `first` at even distances."""
+    last = first + 1
+    while last < len(lows) and _even(trace.t[lows[first : last + 1]]):
+        last += 1
+    return last
+
+
 def _pole_slips(trace: Trace) -> list[Excursion]:
     """Spans of two or more smooth balanced swings of the voltage, of about one period each."""
     width = max(1, round(2 * trace.cycle / trace.step)) | 1
@@ -370,9 +376,7 @@ def _pole_slips(trace: Trace) -> list[Excursion]:
     lows = [k for k in lows if not trace.U2[k] > LARGEST_SWING_UNBALANCE * max(trace.U[k], level)]
     slips, first = [], 0
     while first < len(lows):
-        last = first + 1
-        while last < len(lows) and _even(trace.t[lows[first : last + 1]]):
-            last += 1
+        last = _find_even_end(trace, lows, first)
         if last - first >= SWINGS:
             half = int(np.diff(lows[first:last]).max()) // 2
             a, b = max(lows[first] - half, 0), min(lows[last - 1] + half + 1, len(U))

@@ -19,6 +19,13 @@ LARGEST_TIE_DIFFERENCE = 0.1  # of a tie's current, by which it is off the sum o
 CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
 
 
+BY_SIGN = {
+    -1: " once this one's polarity is reversed",
+    0: ": a bus tie, or one of another bus",
+    1: "",
+}  # of a feeder in a sum that closes, what is said of it
+
+
 def _find_loaded(phasors: Snapshots, feeders: "list[Feeder]") -> list[int]:
     """The numbers of the feeders of three currents that are not small beside the greatest."""
     sizes = {k: phasors.size(f.currents) for k, f in enumerate(feeders) if len(f.currents) == 3}
@@ -131,9 +138,7 @@ def _describe_closure(
             " of their magnitudes"
         )
         said += f", without {' and '.join(out)}" if out else ""
-        said += ": a bus tie, or one of another bus" if sign == 0 else ""
-        if sign < 0:
-            said += " once this one's polarity is reversed"
+        said += BY_SIGN[int(sign)]
         alone = sign == 0 and len(out) == 1
         coupler = alone and _ties_buses(phasors, feeders, loaded, signs, k)
         said += ", and no load of this one" if coupler else ""

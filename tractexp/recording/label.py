@@ -338,8 +338,13 @@ def _single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int
         likely = sorted(several, key=lambda mark: -mark[1])[:MOST_PLACES]
         for size in range(1, min(len(likely), MOST_MARKS) + 1):
             for those in itertools.combinations(likely, size):
-                key = "".join("*" if i in dict(those) else c for i, c in enumerate(text))
-                yield key, letters, False, place, max(score for _, score in those)
+                places, scores = zip(*those, strict=True)
+                yield _mask(text, places), letters, False, place, max(scores)
+
+
+def _mask(text: str, places: Collection[int]) -> str:
+    """A text with a star at each of some places."""
+    return "".join("*" if i in places else letter for i, letter in enumerate(text))
 
 
 def _by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Group]:

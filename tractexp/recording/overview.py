@@ -156,10 +156,10 @@ class Sight:
 
         Of a load's own steps, what it draws after the last before that. None without measurements.
         """
-        for event in (each.event for each in self.events if each.worth):
-            if event is not None:
-                base = event.record.base
-                return event.U0 * base.voltage, event.P0 * base.power, event.Q0 * base.power
+        fitted = next((each.event for each in self.events if each.worth), None)
+        if fitted is not None:
+            base = fitted.record.base
+            return fitted.U0 * base.voltage, fitted.P0 * base.power, fitted.Q0 * base.power
         if self.record is not None:
             return _find_first_powers(self.record)
         if not self.phasors:
@@ -272,6 +272,19 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
     return View(source, node, overview(reader, recording), recording)
 
 
+def _arrange(
+    recording: Recording, feeder: Feeder, is_examined: bool
+) -> tuple[Feeder, tuple[str, ...]]:
+    """A feeder with its currents in order, where it `is_examined`; and why that cannot be, at most
+    one sentence.
+    """
+    try:
+        check_doubt(recording, feeder.channels)
+        return (arrange_feeder(recording, feeder) if is_examined else feeder), ()
+    except UserError as error:
+        return feeder, (str(error),)
+
+
 def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     """The loads of a recording as they are proposed, each with what happened to it; `reader` is
     that of its file.
@@ -285,14 +298,8 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     loaded = any(feeder.loaded for feeder in feeders)
     sights = []
     buses = dict[str, _Bus]()
-    for feeder in feeders:
-        said = ()
-        try:
-            check_doubt(recording, feeder.channels)
-            if feeder.loaded or not loaded:
-                feeder = arrange_feeder(recording, feeder)
-        except UserError as error:
-            said = (str(error),)
+    for proposed in feeders:
+        feeder, said = _arrange(recording, proposed, proposed.loaded or not loaded)
         bus = buses.setdefault(str((feeder.voltages, feeder.connection)), _Bus())
         shown = sight(reader, recording, feeder, feeder.loaded or not loaded, bus)
         shown = replace(shown, said=(*said, *shown.said))

@@ -1,5 +1,6 @@
 """Readers of waveform files: from channels to the dips of one load, numbered in order of time."""
 
+import itertools
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -161,7 +162,7 @@ class WaveformReader(Reader):
         """
         wholes = [self._whole(feeder, stream, frequency) for stream in streams]
         file_dips = cut_dips(wholes, self.path, self.pre, self.post, triggers)
-        waves = [each for _, several in streams if len(several) > 1 for each in several]
+        waves = list(itertools.chain(*(s for _, s in streams if len(s) > 1)))
         file_dips = [replace(dip, result=_with_waves(dip, waves, frequency)) for dip in file_dips]
         if not file_dips:
             # raises, and says what there is instead

@@ -241,11 +241,9 @@ class _Report:
         t = self.course.t[first:] - self.course.t[self.closed.stop]
         # phasors follow a frequency so far
         seen = (LEAST_LEFT * V[0] < V) & (f > SLOWEST * self.nominal)
-        left = len(V) if seen.all() else int(np.argmin(seen))
+        left = int(np.argmin([*seen, False]))
         V, f, t = V[:left], f[:left], t[:left]
-        if len(V) < self.least:
-            return []
-        if V[-1] > LEAST_DECAY * V[0] or f[-1] >= f[0]:
+        if len(V) < self.least or V[-1] > LEAST_DECAY * V[0] or f[-1] >= f[0]:
             return []
         drawn = float(np.median(np.real(self.course.S[running]))) / power
         before = float(np.median(self.course.f[running]))

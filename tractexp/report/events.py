@@ -34,6 +34,14 @@ class CalculatedCurve(NamedTuple):
     hidden: bool = False  # until its name is clicked
 
 
+def _shade_places(chart: Chart, places: Sequence[Any], above: int) -> None:
+    """Shade where more than chance is left, in a panel and the one below it."""
+    said = "more than chance leaves"
+    for place in places:
+        for panel in (above, above + 1):
+            chart.shade(place.start, place.end, EXCESS, panel, said, opacity=0.25)
+
+
 def event_chart(
     event: Event,
     curves: Sequence[CalculatedCurve],
@@ -59,17 +67,7 @@ def event_chart(
         if deviation is not None and around is not None:
             for panel, middle in ((above, around[c]), (above + 1, np.zeros(len(t)))):
                 _noise_band(chart, t, middle, BAND_DEVIATIONS * deviation[c], panel)
-        for place in places:
-            if place.channel == channel:
-                for panel in (above, above + 1):
-                    chart.shade(
-                        place.start,
-                        place.end,
-                        EXCESS,
-                        panel,
-                        "more than chance leaves",
-                        opacity=0.25,
-                    )
+        _shade_places(chart, [place for place in places if place.channel == channel], above)
         chart.line("measured", t, measured, style.MEASURED, above, width=3)
         for name, power, color, dash, hidden in curves:
             some = slice(None, None, -(-len(t) // MOST_HIDDEN_POINTS) if hidden else 1)

@@ -27,7 +27,9 @@ def answer_clicks(findings: Findings) -> list[list[Answer]]:
     """By fitted event, of each window and channel what is left there, in times the noise."""
     context, noise = findings.context, findings.train.noise
     drive, problem = context.drive, context.problem
-    rows = [findings.evidence.base, *_choose_rows(findings)]
+    if not (chosen := _choose_rows(findings)):
+        return [[] for _ in problem.events]
+    rows = [findings.evidence.base, *chosen]
     names = [join_words(row.fit.names) for row in rows]
     deviation, fits = noise.deviation(drive), [row.reported_fit for row in rows]
     left = [context.residuals(fit.unit[None], fit.names)[0] / deviation for fit in fits]
@@ -43,7 +45,7 @@ def answer_clicks(findings: Findings) -> list[list[Answer]]:
         )
         if np.isfinite(loudness).all():
             answers[window.event].append(Answer(window.start, window.end, sentence))
-    return answers if len(rows) > 1 else [[] for _ in problem.events]
+    return answers
 
 
 def _choose_rows(findings: Findings) -> list[SetEvidence]:

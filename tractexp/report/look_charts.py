@@ -3,7 +3,7 @@ channels of no load.
 """
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -76,29 +76,29 @@ def add_unassigned_channels(page: Report, view: View) -> None:
         quantity = unit_of(channel.unit)[0]
         unit = {"voltage": "u [kV]", "current": "i [kA]"}.get(quantity, channel.unit or "value")
         panels.setdefault(unit, []).append(channel)
-    if not panels:
-        return
-    count = sum(map(len, panels.values()))
+    if panels:
+        count = sum(map(len, panels.values()))
+        with page.fold_blocks(f"The {count_noun(count, 'channel')} of no load"):
+            chart = _draw_unassigned(recording, panels, count)
+            page.chart(chart, "Primary values, where the unit is known.")
+
+
+def _draw_unassigned(
+    recording: Recording, panels: Mapping[str, Sequence[Channel]], count: int
+) -> Chart:
+    """Channels over time, those of a unit in one panel, thinned to what a page holds of `count`."""
     chart = Chart("t [s]", [*panels], pixels=150 + 200 * len(panels))
     every = -(-count * recording.samples // MOST_OTHERS)
+    segments = [segment for segment in recording.segments if segment.stop > segment.first + 1]
     for panel, group in enumerate(panels.values()):
         for k, channel in enumerate(group):
-            for segment in (s for s in recording.segments if s.stop > s.first + 1):
-                y = _thin_wave(
-                    functools.partial(_read, channel, segment), segment.stop - segment.first, every
-                )
-                chart.samples(
-                    channel.name,
-                    segment.start,
-                    every / segment.rate,
-                    y,
-                    PALETTE[k % len(PALETTE)],
-                    panel,
-                )
-    with page.fold_blocks(f"The {count_noun(count, 'channel')} of no load"):
-        page.chart(
-            chart.cursor(recording.segments[0].start), "Primary values, where the unit is known."
-        )
+            color = PALETTE[k % len(PALETTE)]
+            for segment in segments:
+                read = functools.partial(_read, channel, segment)
+                y = _thin_wave(read, segment.stop - segment.first, every)
+                step = every / segment.rate
+                chart.samples(channel.name, segment.start, step, y, color, panel)
+    return chart.cursor(recording.segments[0].start)
 
 
 def _mark_events(chart: Chart, shown: Sight) -> Chart:
@@ -145,10 +145,8 @@ def _of_record(shown: Sight) -> Chart:
         for name in panels_of[label]:
             values = record.channels[name] * sizes.get(name, 1.0)
             chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
-    first = float(record.t[0])
-    return _mark_events(chart, shown).cursor(
-        next((event.what.start for event in shown.events), first)
-    )
+    starts = [event.what.start for event in shown.events] or [float(record.t[0])]
+    return _mark_events(chart, shown).cursor(starts[0])
 
 
 def _every(view: View) -> tuple[int, int]:

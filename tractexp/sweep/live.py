@@ -88,6 +88,11 @@ class LivePage:
         self.ends |= ended
         return bool(ended)
 
+    def _list_curves(self, standings: Sequence[Standing]) -> list[tuple[str, Curve]]:
+        """The fitness of the best search of each variant, by its name, where it is known."""
+        curves = ((standing.name, self._curve(standing.best)) for standing in standings)
+        return [(name, curve) for name, curve in curves if curve]
+
     def _list_failures(self) -> list[str]:
         """The jobs that failed, each with why, one sentence each."""
         return [
@@ -113,8 +118,7 @@ class LivePage:
         if (self.folder / LEADS_TO).is_file():
             page.add(Markup(f'<p><a href="{LEADS_TO}">{quoting.html(LEADS_TO)}</a></p>'))
         _add_standings(page, standings := self._rank_variants(common))
-        curves = [(s.name, curve) for s in standings if (curve := self._curve(s.best))]
-        if curves:
+        if curves := self._list_curves(standings):
             page.chart(_draw_curves(curves), "The best search of each variant so far.")
         if failures:
             page.heading("Failures").items(_shorten(failures, MOST_NAMED_FAILURES))

@@ -86,17 +86,8 @@ def _chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
     }
 
 
-def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
-    """The view of runs with these tags: one closed group for each variant, the fitness curves
-    first.
-
-    What spans decades has a logarithmic axis. Bars have none and are labelled with two decimals:
-    the rest is points.
-    """
-    if any(LOAD in tags for tags in runs):
-        return STATE | _of_loads()
-    keys = GROUPS[:1] if all("variant" in tags for tags in runs) else GROUPS
-    groups = {".".join(f"{key}.{tags.get(key, '')}" for key in keys) for tags in runs}
+def _list_charts() -> list[dict[str, Any]]:
+    """The curves of fitness, the ends of searches as points, and what they cost."""
     curves = [
         _chart(
             "LINE",
@@ -116,11 +107,25 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
         )
         for metric in ("search_objective", "objective", "epsilon_p", "epsilon_q")
     ]
-    bars = [
+    ends = _plot_comparison("search_simulations", "search_objective")
+    costs = [
         _chart("BAR", metric, dataAccessKey=metric)
         for metric in ("search_simulations", "search_seconds")
     ]
-    bars.insert(0, _plot_comparison("search_simulations", "search_objective"))
+    return [*curves, *points, ends, *costs]
+
+
+def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
+    """The view of runs with these tags: one closed group for each variant, the fitness curves
+    first.
+
+    What spans decades has a logarithmic axis. Bars have none and are labelled with two decimals:
+    the rest is points.
+    """
+    if any(LOAD in tags for tags in runs):
+        return STATE | _of_loads()
+    keys = GROUPS[:1] if all("variant" in tags for tags in runs) else GROUPS
+    groups = {".".join(f"{key}.{tags.get(key, '')}" for key in keys) for tags in runs}
     section = {
         "uuid": SECTION,
         "name": "Comparison",
@@ -135,7 +140,7 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
         },
         "selectedColumns": COLUMNS,
         "groupsExpanded": {f"tag.{group}": False for group in groups},
-        "compareRunCharts": [*curves, *points, *bars],
+        "compareRunCharts": _list_charts(),
         "compareRunSections": [section | {"isReordered": False}],
     }
 

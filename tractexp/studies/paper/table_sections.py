@@ -1,6 +1,6 @@
 """The paper's tables beside our measurements, a section each."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -118,19 +118,17 @@ def _rows_of_parameters(study: Study, columns: Sequence[tuple[str, str]]) -> lis
             row.append(f"{printed.TABLE_3[name][k]:g}" if what == "paper" else _one(values, what))
         rows.append(row)
     for error, table in (("epsilon_p", printed.EPSILON_P), ("epsilon_q", printed.EPSILON_Q)):
-        errors = [
-            _one([getattr(fits[0], error) for fits in study.fits(n)], w, table, n)
-            for n, w in columns
-        ]
-        rows.append([error, "", *errors])
-    rows.append(
-        [
-            "Obj.E [pu²]",
-            "",
-            *(_one(study.objectives(n), w, printed.OBJECTIVE, n) for n, w in columns),
-        ]
-    )
-    return rows
+        rows.append([error, "", *_list_errors(study, columns, error, table)])
+    ends = [_one(study.objectives(n), w, printed.OBJECTIVE, n) for n, w in columns]
+    return [*rows, ["Obj.E [pu²]", "", *ends]]
+
+
+def _list_errors(
+    study: Study, columns: Sequence[tuple[str, str]], error: str, table: Mapping[str, Any]
+) -> list[str]:
+    """A row's cells of one error of the first dip."""
+    found = {name: [getattr(fits[0], error) for fits in study.fits(name)] for name, _ in columns}
+    return [_one(found[name], what, table, name) for name, what in columns]
 
 
 def _one(values: Any, what: str, table: Any = None, name: str = "") -> str:
