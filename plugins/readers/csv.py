@@ -236,6 +236,7 @@ class CSV(Tabular, Reader):
         sources = []
         lacks_voltage = voltage is None and absolute_U
         lacks_power = power is None and absolute_P
+        U = S = 0.0
         if lacks_voltage or lacks_power:
             U, S = _measure_level(record, bool(absolute_U), bool(absolute_P))
         if lacks_voltage:

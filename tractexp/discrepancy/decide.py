@@ -172,4 +172,4 @@ def find_predicting(evidence: Evidence, criteria: Criteria) -> list[SetEvidence]
     if not leading or (evidence.term is not None and beats(evidence.term, leading[0], criteria)):
         return []
     kept = [row for row in leading if not criteria.rejects(row.behind)]
-    return kept if all(row.gap is None or row.gap.is_shown for row in kept) else []
+    return kept if all(row.gap is None or row.gap.outcome == SHOWN for row in kept) else []

@@ -27,7 +27,7 @@ def sum_with_decay(values: ArrayLike, factor: complex) -> NDArray[np.complex128]
     [1.0, 0.5, 0.25]
     """
     # as fast as scipy.signal's filter, which takes a second to import
-    from scipy.linalg.blas import ztbsv
+    from scipy.linalg.blas import ztbsv  # pyright: ignore[reportAttributeAccessIssue]
 
     x = np.asarray(values, dtype=np.complex128)
     bands = np.repeat(np.array([[1.0], [-factor]]), len(x), axis=1)
