@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 LIMITS = {
-    "nodes a line of code": 6.11,
+    "nodes a line of code": 6.12,
     "lines over 100 columns": 2,  # two of regular expressions and formats
     "lines that the formatter skips": 2,
     "functions called by a participle or a preposition": 2,
@@ -21,7 +21,7 @@ LIMITS = {
     "numbers' names with several homes": 0,
     "functions of complexity over 10, in percent": 2.5,
 }
-LEAST_DOCSTRINGS = 21.0  # percent of all lines
+LEAST_DOCSTRINGS = 22.3  # percent of all lines
 
 PARTICIPLE = re.compile(r"[a-z]+(ed|ing)")
 PREPOSITIONS = re.compile(

@@ -707,6 +707,14 @@ def _mark_unloaded(
     return replace(feeder, why=(*feeder.why, why), loaded=False) if why else feeder
 
 
+def _find_step(recording: Recording, numbers: Sequence[int]) -> float:
+    """The largest step of the samples of channels [kV or kA]; 0 of a channel that has none."""
+    channels = [recording.channels[i] for i in numbers]
+    if not {c.raw.dtype.kind for c in channels} <= {"i", "u"}:
+        return 0.0
+    return max(abs(c.gain * c.ratio * c.factor) for c in channels)
+
+
 def _explain_no_load(
     recording: Recording, phasors: Snapshots, feeder: Feeder, level: float, strange: str
 ) -> str:
@@ -722,10 +730,7 @@ def _explain_no_load(
     if not any(map(phasors.pure, feeder.currents)):
         return "no load here: the currents are no more than noise or harmonics"
     size = phasors.size(feeder.currents)
-    currents = [recording.channels[i] for i in feeder.currents]
-    step = max(abs(c.gain * c.ratio * c.factor) for c in currents)
-    integral = {c.raw.dtype.kind for c in currents} <= {"i", "u"}
-    if size > UNLOADED * level and not (integral and size < STEPS_LOADED * step):
+    if size > max(UNLOADED * level, STEPS_LOADED * _find_step(recording, feeder.currents)):
         return ""
     return (
         f"unloaded: {1000 * size:.3g} A where the greatest current of the file is"
