@@ -422,8 +422,14 @@ def test_waves_that_stop_at_a_limit_are_said(tmp_path, clipped):
     assert any(note.startswith(said) for note in tractexp.read(path)[0].record.notes)
 
 
-def test_whole_waves_are_not_called_clipped(tmp_path):
-    path = write(tmp_path, *station(*three()))
+@pytest.mark.parametrize("parts", [[(0, 3200)], [(0, 40), (40, 3160), (3160, 3200)]])
+def test_whole_waves_are_not_called_clipped(tmp_path, parts):
+    """Also where a part of a cycle stands by itself, as in a record of several rates."""
+    rates = [RATE if last - first > 100 else 0.7 * RATE for first, last in parts]
+    segments = [
+        Segment(*part, rate, part[0] / 800) for part, rate in zip(parts, rates, strict=True)
+    ]
+    path = write(tmp_path, *station(*three()), segments=segments)
     assert "clipped" not in loads_of(path)[2]
     assert not any("clipped" in note for note in tractexp.read(path)[0].record.notes)
 
