@@ -24,6 +24,7 @@ from tractexp.discrepancy.precision import estimates, standard_errors
 from tractexp.discrepancy.prediction import SHARING, search_third
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.ranking import beats, find_nearest
+from tractexp.identification.verdict import UNIDENTIFIED
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.effort import Effort
@@ -590,3 +591,14 @@ def test_a_third_effect_is_sought_beside_two_that_leave_more_than_anyone_cares_a
     assert [fit.names for fit in found] == [third] * asked
     assert all(fit.deviance < best.fit.deviance for fit in found)
     assert search_third(ground, refits, [replace(row, fit=refits[third[:1]])]) == []
+
+
+def test_a_size_that_is_known_no_better_than_its_bounds_is_told(inexact):
+    """The share of the trip is known; taken for unknown it is no name."""
+    assert inexact.open_sizes == ()
+    blind = replace(inexact)
+    vars(blind)["final_estimates"] = [
+        replace(e, verdict=UNIDENTIFIED) if e.parameter.name == "tripped_share" else e
+        for e in inexact.final_estimates
+    ]
+    assert blind.open_sizes == ("of tripped_share the events know no more than the bounds",)

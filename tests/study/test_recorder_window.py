@@ -108,6 +108,7 @@ def test_a_window_of_phasors_is_no_missing_effect():
     assert content(found)["phasor_window"] == pytest.approx(0.06)
     assert any("60 ms" in line for line in told)
     assert "60 ms" in found.reason
+    assert "though no record says so: ask whether it does" in found.reason
 
 
 def test_no_window_is_found_where_there_is_none():
