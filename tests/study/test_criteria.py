@@ -14,7 +14,7 @@ from tractexp.discrepancy import criteria, disagreement, judgement
 from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
 from tractexp.discrepancy.decide import decide, holds, needs_all_events
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, SetEvidence
+from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.families import worth
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.investigate import Findings, investigate
@@ -95,10 +95,10 @@ def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
     )
 
 
-def deviance(left):
-    """What a set leaves of held-out events."""
-    curves = SimpleNamespace(deviance=1000.0 + left, error=SimpleNamespace(value=0.1))
-    prediction = PredictedDeviance(left, curves, False, 10.8)
+def missing(error):
+    """What a set leaves of held-out events, in ten blocks."""
+    blocks = np.ones(10)
+    prediction = PredictedError(error**2 * blocks, 0 * blocks, blocks, np.zeros(0))
     return SetEvidence(refitted(0.0, 1), ("one",), ("one",), prediction=prediction)
 
 
@@ -216,7 +216,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "rejected": (0.06, lambda c: c.rejects(5.9), False),
     "shown": (9.0, lambda c: word_of(c, judged_by(c, gain=10.0, expected=11.0)), "candidate"),
     "divides": (2.0, lambda c: needs_all_events([judged_by(c, closed=0.78)], c), True),
-    "ahead": (1.4, lambda c: beats(deviance(100.0), deviance(200.0), c), False),
+    "ahead": (1.4, lambda c: beats(missing(0.1), missing(0.145), c), False),
 }
 FURTHER = [  # decisions by a criterion that has one above, too
     ("adequate_p", 0.0006, lambda c: holds(judged_by(c, p_left=0.0008), c), False),

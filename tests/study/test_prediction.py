@@ -4,7 +4,6 @@ exact.
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from tractexp.blocks import Report
 from tractexp.configuration.plugin import get
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import decide, find_predicting
-from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, PredictedError, SetEvidence
+from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.explain import explain, find_nearest_sets
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
@@ -190,49 +189,6 @@ def test_a_term_of_the_library_that_is_ahead_takes_a_name(error, stays):
 def test_contributions_begin_with_the_member_that_helps_most():
     sets = [off(error=1.0), off("a", error=0.5), off("b", error=0.3), off("a", "b", error=0.1)]
     assert [row.names for row in table(*sets).contributions(("a", "b"))] == [(), ("b",), ("a", "b")]
-
-
-def by_deviance(*names, left, rejected=False):
-    """A set that leaves so much of the deviance on held-out events, beyond chance."""
-    curves = SimpleNamespace(deviance=900.0 + left, error=SimpleNamespace(value=0.1))
-    prediction = PredictedDeviance(left, curves, rejected, Criteria().shown)
-    return SetEvidence(Refit(names, np.zeros(0), 0.0, 1), names, names, prediction=prediction)
-
-
-def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not():
-    one, other = (
-        by_deviance("a", left=50.0, rejected=rejected).prediction for rejected in (False, True)
-    )
-    assert one.compute_lead(other) > 0
-    assert other.compute_lead(one) <= 0
-
-
-@pytest.mark.parametrize(
-    ("bare", "left", "names"),
-    [
-        (20.0, 8.0, [("a",)]),  # chance may leave as much
-        (20.0, 10.0, []),  # and as much as its lead
-        (10.0, -5.0, []),  # chance may leave what the base model does
-        (40.0, 12.0, []),  # it leaves something, and divides that by no more than 1.8
-        (61.0, 12.0, [("a",)]),
-    ],
-)
-def test_what_leaves_no_more_than_chance_need_not_divide_what_the_base_model_leaves(
-    bare, left, names
-):
-    assert named(by_deviance(left=bare), by_deviance("a", left=left)) == names
-
-
-def test_by_deviance_what_chance_leaves_is_no_lead():
-    """Of two that leave no more than chance, neither is told from the other, though one is far
-    below the other.
-    """
-    sets = (
-        by_deviance(left=100.0, rejected=True),
-        by_deviance("a", left=-20.0),
-        by_deviance("b", left=10.0),
-    )
-    assert named(*sets) == [("a",), ("b",)]
 
 
 # a motor whose law nobody has

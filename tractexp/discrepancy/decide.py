@@ -169,7 +169,6 @@ def chose_by_all(row: SetEvidence, evidence: Evidence) -> bool:
 def find_predicting(evidence: Evidence, criteria: Criteria) -> list[SetEvidence]:
     """The sets kept by rule 2."""
     leading = find_leading(evidence, criteria, criteria.divides)
-    if not leading or (evidence.term is not None and beats(evidence.term, leading[0], criteria)):
+    if leading and evidence.term is not None and beats(evidence.term, leading[0], criteria):
         return []
-    kept = [row for row in leading if not criteria.rejects(row.behind)]
-    return kept if all(row.gap is None or row.gap.outcome == SHOWN for row in kept) else []
+    return leading

@@ -4,7 +4,7 @@ fill.
 `rival_sets` fills `fit`, `lowered`, `behind`, `p_left`: the fit to the fitted events, what it
 gains, how far behind the best set it is, and how often chance leaves as much. `held_out` fills
 `final`, `gap`, `without`, `p_of_all` and `behind_of_all`: the fit that is told, what it and each of
-its members gain on the held-out events, and the same as before of a fit to all events. `incomplete`
+its members gain on the held-out events, and the same as before of a fit to all events. `prediction`
 fills `prediction`: what it leaves of the held-out events, where every set leaves more than noise.
 
 `decide` reads the numbers of this table and nothing else.
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.gap import MILD, Curves, GapTest
+from tractexp.discrepancy.gap import MILD, GapTest
 from tractexp.inference.blocks import reach
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit
@@ -61,11 +61,10 @@ class PredictedError:
         """The model's error, of the response."""
         return float(np.sqrt(self.excess / max(self.response.sum(), 1e-30)))
 
-    def compute_lead(self, other: "Prediction") -> float:
+    def compute_lead(self, other: "PredictedError") -> float:
         """By how much it leaves less, beyond chance: of the ratio's logarithm, by a jackknife over
         the blocks. Not above 0 where that may be chance.
         """
-        assert isinstance(other, PredictedError)
         own_sum, other_sum = self.squares.sum(), other.squares.sum()
         if not np.isfinite(own_sum):
             return -np.inf
@@ -75,60 +74,6 @@ class PredictedError:
         without = np.log(np.maximum(other_rest, 1e-300) / np.maximum(own_rest, 1e-300))
         lead = float(np.log(other_sum / own_sum))
         return lead - reach(without, lead)
-
-
-@dataclass(frozen=True, eq=False)
-class PredictedDeviance:
-    """What a fit leaves of the deviance on the held-out events, where the base model leaves no more
-    than the noise.
-
-    Attributes
-    ----------
-    beyond_chance : float
-        What perturbations of the balances would still gain.
-    curves : Curves
-        What it calculates there.
-    is_rejected : bool
-        Whether the fitted events reject the set.
-    least : float
-        What may be chance, up to which nothing is left.
-    """
-
-    beyond_chance: float
-    curves: Curves
-    is_rejected: bool
-    least: float
-
-    @property
-    def stalls(self) -> tuple[str, ...]:
-        """The held-out events on which the motor stalls."""
-        return self.curves.error.stalls
-
-    @property
-    def excess(self) -> float:
-        """What is left of the held-out events beyond chance; 0 where that is no more than `least`,
-        inf where the model stalls.
-        """
-        if not np.isfinite(self.curves.error.value):
-            return np.inf
-        return self.beyond_chance if self.beyond_chance > self.least else 0.0
-
-    @property
-    def error(self) -> float:
-        """The model's error, of the response."""
-        return self.curves.error.value
-
-    def compute_lead(self, other: "Prediction") -> float:
-        """By how much it leaves less, beyond `least`; all there is where the fitted events reject
-        the other alone. Not above 0 where that may be chance.
-        """
-        assert isinstance(other, PredictedDeviance)
-        if other.is_rejected and not self.is_rejected:
-            return np.inf
-        return other.curves.deviance - self.curves.deviance - self.least
-
-
-Prediction = PredictedError | PredictedDeviance
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +97,7 @@ class SetEvidence:
     p_of_all: float = 1.0  # how often chance leaves as much as a fit to all events does
     behind_of_all: float = 0.0  # the best fit to all events, of Akaike's criterion
     is_fitted_to_all: bool = False  # whether `final` is the fit to all events
-    prediction: Prediction | None = None
+    prediction: PredictedError | None = None
     grade: str = ""  # of the model with it, where one set alone is kept
     # of its sizes: on a bound, or not known within their bounds, in words
     open_sizes: tuple[str, ...] = ()
@@ -170,7 +115,7 @@ class SetEvidence:
         return () if self.gap is None else (self.gap, *self.without.values())
 
     @property
-    def held_out_prediction(self) -> Prediction:
+    def held_out_prediction(self) -> PredictedError:
         """What it leaves of the held-out events, where that was asked."""
         assert self.prediction is not None
         return self.prediction

@@ -39,7 +39,7 @@ from tractexp.inference.model_error import describe_stall, in_percent
 from tractexp.inference.recorder_window import RecorderWindow
 from tractexp.noise import Noise
 from tractexp.record import Event
-from tractexp.text.wording import alternatives, join_words, list_figures, percent
+from tractexp.text.wording import alternatives, join_words, list_figures
 
 CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
 CONFIRMED_IN_TURN = "each event, left out in turn, confirms it"
@@ -188,8 +188,6 @@ def _explain_word(
         return describe_prediction(verdict, evidence, context)
     if evidence.there is not None:
         return explain_distance(evidence, context)
-    if evidence.is_predicted:
-        return describe_deviance(verdict, evidence, context)
     if verdict.word in (NAMED, CANDIDATE):
         return _describe_name(sets[0], evidence, context)
     if verdict.word == TIED:
@@ -285,24 +283,6 @@ def _describe_tie(sets: Sequence[Sequence[str]]) -> str:
         f"{alternatives(sets)}: {each} explains the disagreement, and these events cannot tell them"
         " apart"
     )
-
-
-def describe_deviance(verdict: Verdict, evidence: Evidence, context: Context) -> str:
-    """What the sets explain on the held-out events, and what became of the others."""
-    shares = list_figures(
-        [row.gap.explained_share for row in verdict.kept if row.gap is not None], percent
-    )
-    labels = alternatives([label_effects(names, context) for names in verdict.sets])
-    others = sum(bool(context.criteria.rejects(row.behind)) for row in evidence.rows)
-    verb = "explains" if len(verdict.kept) == 1 and len(verdict.names) == 1 else "explain"
-    sentence = f"{labels} {verb} {shares} of what exceeds the noise on the held-out events"
-    if len(verdict.kept) > 1:
-        sentence += ", and these events cannot tell them apart"
-    elif others == 1:
-        sentence += ", and the other set of its size is rejected"
-    elif others:
-        sentence += f", and the {others} other sets of its size are rejected"
-    return f"{sentence}; {CHOSEN_BY}"
 
 
 def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) -> str:

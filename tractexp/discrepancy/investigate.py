@@ -20,7 +20,7 @@ from tractexp.discrepancy.decide import (
     shows_more,
 )
 from tractexp.discrepancy.disagreement import Disagreement, disagreement
-from tractexp.discrepancy.evidence import Evidence, PredictedError
+from tractexp.discrepancy.evidence import Evidence
 from tractexp.discrepancy.explain import (
     Nearest,
     choose_next_event,
@@ -32,7 +32,6 @@ from tractexp.discrepancy.explanations import Explanations, explanations
 from tractexp.discrepancy.gap import GapTest, gap, measure_closed_share, share_gone
 from tractexp.discrepancy.grades import Grader
 from tractexp.discrepancy.held_out import judge_held_out
-from tractexp.discrepancy.incomplete import predict_held_out
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import (
     Overlay,
@@ -44,6 +43,7 @@ from tractexp.discrepancy.overlay import (
 )
 from tractexp.discrepancy.places import DisagreementInterval, places
 from tractexp.discrepancy.precision import estimates
+from tractexp.discrepancy.prediction import predict_held_out
 from tractexp.discrepancy.proposal.propose import ProposalResult, propose
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.replication import replicate
@@ -183,8 +183,7 @@ class Findings:
         there = self.evidence.there
         if chosen is None or there is None:
             return chosen and chosen.gap
-        predictions = [row.prediction for row in (self.evidence.base, chosen)]
-        units = [one.unit for one in predictions if isinstance(one, PredictedError)]
+        units = [row.held_out_prediction.unit for row in (self.evidence.base, chosen)]
         left = there.residuals(units[1][None], chosen.fit.names)[0]
         noise = QuietNoise.from_context(there, units[1]).estimate_noise(units[1], left)
         return gap(there, units[0], units[1], chosen.fit.names, noise, there.coordinates.before)
@@ -512,8 +511,9 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grade
     evidence = compare_rivals(explained, seed)
     evidence = by_likelihood = judge_held_out(evidence, explained, validate, seed)
     verdict = decide(evidence, criteria)
-    if verdict.word == UNEXPLAINED and not evidence.is_mild:
-        evidence = predict_held_out(evidence, explained, validate, seed)
+    is_open = evidence.is_mild or shows_more(evidence, criteria)
+    if verdict.word == UNEXPLAINED and validate and not is_open:
+        evidence = predict_held_out(explained, validate, seed)
         verdict = decide(evidence, criteria)
     tests = evidence.base.tests
     assert tests is not None

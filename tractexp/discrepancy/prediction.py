@@ -1,4 +1,5 @@
-"""What each set of effects predicts of held-out events, every set fitted by least squares.
+"""What each set of effects predicts of held-out events, where none leaves noise alone of those
+fitted: every set fitted by least squares, and judged by the squared error in S.
 
 A formula is not the physics. What the right one leaves is often no noise, and then a test of
 significance rejects it as it rejects a wrong one. What can be asked still is how much each set
@@ -24,9 +25,9 @@ from tractexp.discrepancy.explanations import (
     wide_starts,
 )
 from tractexp.discrepancy.families import member_fits
-from tractexp.discrepancy.least_squares import residual_noise
+from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.proposal.best_term import best_terms
-from tractexp.discrepancy.ranking import rank_sets
+from tractexp.discrepancy.ranking import find_nearest, rank_sets
 from tractexp.inference.base_fit import minima_of
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
@@ -41,6 +42,29 @@ MOST_TRIED_FAMILIES = 2  # single effects whose families are tried, and to which
 CARRIED = 12  # sets of the search by likelihood that are fitted again
 # blocks that share the response: where two or three hold all of it, nothing is clear of chance
 SHARING = 10.0
+
+
+def predict_held_out(explained: Explanations, events: Sequence[Event], seed: int) -> Evidence:
+    """The table of all sets by what they predict: those kept first, or else the nearest, with their
+    tests, then the others.
+    """
+    explained.base.context.effort.say("judging what leaves something on the held-out events")
+    table = predict_errors(explained, events)
+    criteria, quiet, noise = explained.last.criteria, explained.base.quiet, table.noise
+    assert noise is not None
+    leading = find_predicting(table, criteria) or [find_nearest(table, criteria)]
+
+    def test(row: SetEvidence) -> SetEvidence:
+        tests = least_squares_tests(quiet, row.fit, noise, seed)
+        return replace(row, tests=tests, p_left=tests.p_left)
+
+    base = test(table.base)
+    tested = [test(row) for row in leading]
+    rest = [row for row in rank_sets(table, criteria) if row not in leading]
+    others = [row for row in table.rows if row not in (*leading, *rest)]
+    first = tested[0] if leading[0].fit.names else base
+    rows = (*(row for row in tested if row.fit.names), *rest)
+    return replace(table, base=base, rows=rows, others=tuple(others), last=first.tests)
 
 
 def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence:
