@@ -40,6 +40,8 @@ class UnrecordedInput:
         By how much that moves each parameter, in its unit.
     beyond : names
         Parameters that it moves beyond their intervals.
+    course : FrequencyCourse or None
+        The course that explains most of what the fit leaves.
     """
 
     channel: str

@@ -184,8 +184,6 @@ def estimate_noise(
         What a fit leaves; it tells more of how the load wanders.
     columns : (k, C, N) [pu] or None
         What could explain that.
-    seen : float
-        Gain of twice the log-likelihood from which a load is said to wander.
 
     Returns
     -------

@@ -120,6 +120,8 @@ class WaveformDrive:
         Speed of the frame relative to nominal, and the nominal speed.
     weights : (3,)
         Of a squared error of each current.
+    window : (odd,) or None
+        Weights of a recorder's window.
     """
 
     step: float

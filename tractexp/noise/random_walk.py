@@ -238,8 +238,6 @@ def find(
         The power of the events.
     rests : sequence of Rest
         What a fit leaves of each event.
-    seen : float
-        Gain of twice the log-likelihood from which a load is said to wander.
 
     Returns
     -------
@@ -293,8 +291,6 @@ def walk_of_load(
         Which samples count.
     mix : (C, C)
         What makes the channels independent.
-    seen : float
-        Gain of twice the log-likelihood from which a load is said to wander.
 
     Returns
     -------

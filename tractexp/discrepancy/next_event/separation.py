@@ -46,6 +46,8 @@ class Side:
         Whitened residuals and derivatives, faults of the measurement with their priors.
     own, s : (k, m), (m,)
         Priors of the explanation's own.
+    box : (k,)
+        Precision of each parameter by its range alone.
     """
 
     fit: Refit
