@@ -17,7 +17,7 @@ from tractexp.identification.result import load
 from tractexp.outcome import Outcome
 from tractexp.record.identity import describe_identities
 from tractexp.storage import files
-from tractexp.text.progress import console, say, text_width
+from tractexp.text.progress import console, text_width
 
 if TYPE_CHECKING:
     from tractexp.exchange.format import Identified
@@ -229,11 +229,10 @@ class Export(Task, call=export, given=("fit",)):
         fit = Identification(load(Path(self.parameters)))
         exported = self.perform(job, fit=fit)
         path = exported.write(job.folder / f"load{exported.suffix}")
-        told = Report().text(f"model: {exported.title}, from {self.parameters}")
+        told = Report().text(f"file: {path}", f"model: {exported.title}, from {self.parameters}")
         if fit.grade and not fit.adequate:
             told.items([f"mind: {fit.headline}"])
         told.text(*(f"note: {note}" for note in exported.notes))
         if not fit.adequate:
             told.text(*(f"next: {sentence}" for sentence in fit.advice[:1]))
         show(told, console(), text_width())
-        say(f"  {path}")
