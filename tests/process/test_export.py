@@ -328,6 +328,7 @@ def test_the_command_writes_one_file_or_nothing(tmp_path):
         )
         assert done.returncode == 0, done.stderr
         assert {p.name for p in (tmp_path / name).iterdir()} == {".hydra", f"load.{suffix}"}
+        assert done.stdout.splitlines()[0] == f"file: {tmp_path / name / f'load.{suffix}'}"
     identified("mechanical").result.write(tmp_path / "result.json")
     refused = {
         "task.format=andes": "cannot represent the motor 'mechanical'",
