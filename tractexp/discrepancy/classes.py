@@ -87,7 +87,7 @@ def compare_predictions(
     ]
     apart = np.array([measure_parting(power, drive, e) for e in range(len(dips))])
     is_parted = apart > max(error, LEAST_PARTING)
-    classes = group_alike(is_parted.any(axis=0))
+    classes = group_alike(np.logical_or.reduce(is_parted, axis=0))
     if len(classes) == 1:
         known = apart[np.isfinite(apart)]
         return (EffectClass(tuple(sets), None, float(known.max()) if known.size else np.nan),)
