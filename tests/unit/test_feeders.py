@@ -9,9 +9,9 @@ from field_waves import KA, dip, load, noise, phases, recording, wave
 import tractexp
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.recording.feeder import propose
 from tractexp.recording.label import groups, order
 from tractexp.recording.measure import phasors_of
+from tractexp.recording.proposal import propose
 from tractexp.recording.recording import Channel
 
 T = np.arange(3200) / 3200

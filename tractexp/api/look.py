@@ -21,11 +21,11 @@ from tractexp.outcome import Tabulated, Written
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, describe_smearing
 from tractexp.recording.event_views import join_event, propose_joining
-from tractexp.recording.feeder import can_be_named, explain_unrecognized
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
 from tractexp.recording.quality import describe_clipped
 from tractexp.recording.railway import DIRECT, describe_direct_beside, direct_voltage
 from tractexp.recording.recording import unit_of
+from tractexp.recording.unrecognized import can_be_named, explain_unrecognized
 from tractexp.storage import files
 from tractexp.text.progress import Progress, tell_stages
 from tractexp.text.wording import count_noun

@@ -9,8 +9,8 @@ from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.record import endings, reader_of
 from tractexp.recording.event_files import MOST_FILES, PART, name_one_event, say_several
-from tractexp.recording.feeder import propose
 from tractexp.recording.overview import View, view_of
+from tractexp.recording.proposal import propose
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.record_files import find_packed
 from tractexp.storage import files

@@ -3,14 +3,11 @@ other way.
 """
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tractexp.recording.feeder import Feeder
 from tractexp.recording.snapshot import UNLOADED, Snapshots
-
-if TYPE_CHECKING:
-    from tractexp.recording.feeder import Feeder
 
 CLOSED_SUM = "add up to"  # in the note of a sum that closes
 # the same where one is left out or turned round, of which some are near zero by accident
@@ -26,14 +23,14 @@ BY_SIGN = {
 }  # of a feeder in a sum that closes, what is said of it
 
 
-def _find_loaded(phasors: Snapshots, feeders: "list[Feeder]") -> list[int]:
+def _find_loaded(phasors: Snapshots, feeders: list[Feeder]) -> list[int]:
     """The numbers of the feeders of three currents that are not small beside the greatest."""
     sizes = {k: phasors.size(f.currents) for k, f in enumerate(feeders) if len(f.currents) == 3}
     level = max(sizes.values(), default=0.0)
     return [k for k, size in sizes.items() if size > UNLOADED * level]
 
 
-def closed_sums(phasors: Snapshots, feeders: "list[Feeder]") -> "list[Feeder]":
+def closed_sums(phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
     """The feeders, with a note where the sum of their currents is zero, as they are or with one
     reversed.
 
@@ -50,7 +47,7 @@ def closed_sums(phasors: Snapshots, feeders: "list[Feeder]") -> "list[Feeder]":
 
 
 def _find_closed_sum(
-    phasors: Snapshots, feeders: "list[Feeder]", loaded: list[int]
+    phasors: Snapshots, feeders: list[Feeder], loaded: list[int]
 ) -> tuple[np.ndarray, float] | None:
     """(signs, residual) of the simplest sum of three or more currents that closes; None where none
     does.
@@ -97,7 +94,7 @@ def _closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
 
 
 def _ties_buses(
-    phasors: Snapshots, feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, tie: int
+    phasors: Snapshots, feeders: list[Feeder], loaded: list[int], signs: np.ndarray, tie: int
 ) -> bool:
     """Whether feeder `tie`, without which the others of a station add up to nothing, is no load:
     they are of its own bus, or its current is the sum of those of another one.
@@ -122,11 +119,11 @@ def _ties_buses(
 
 def _describe_closure(
     phasors: Snapshots,
-    feeders: "list[Feeder]",
+    feeders: list[Feeder],
     loaded: list[int],
     signs: np.ndarray,
     closes: float,
-) -> "list[Feeder]":
+) -> list[Feeder]:
     """The feeders, each told that the currents of all close, and which of them are counted
     backward.
     """

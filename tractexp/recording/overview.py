@@ -14,7 +14,7 @@ from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.dips import FileDip, check_load
 from tractexp.record.phasor import Phasors, join_phasors
 from tractexp.recording.arrangement import arrange_feeder
-from tractexp.recording.feeder import Feeder, buses_alone, propose
+from tractexp.recording.feeder import Feeder
 from tractexp.recording.happening import (
     FEWEST_HALF_CYCLES,
     OF_LOADS,
@@ -25,6 +25,7 @@ from tractexp.recording.happening import (
 )
 from tractexp.recording.infeed import describe_directions
 from tractexp.recording.measure import FeederWaves, phasors_of
+from tractexp.recording.proposal import buses_alone, propose
 from tractexp.recording.quality import Quality, measure_stamp_jitter, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment

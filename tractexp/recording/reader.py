@@ -27,13 +27,15 @@ from tractexp.recording.bridge import bridge_recording
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
 from tractexp.recording.event_files import check_joined, event_paths
-from tractexp.recording.feeder import Feeder, can_be_named, explain_unrecognized, propose
+from tractexp.recording.feeder import Feeder
 from tractexp.recording.joined import join_recordings
 from tractexp.recording.label import order, shared_name
 from tractexp.recording.measure import FeederWaves, phasors_of
+from tractexp.recording.proposal import propose
 from tractexp.recording.quality import describe_clipped, measure_clipped_shares
 from tractexp.recording.recording import Recording
 from tractexp.recording.unit import check_doubt, check_units, in_units
+from tractexp.recording.unrecognized import can_be_named, explain_unrecognized
 from tractexp.text import quoting
 from tractexp.text.wording import count_noun
 

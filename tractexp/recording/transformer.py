@@ -5,18 +5,16 @@ which one is a load's.
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from tractexp.record.phasor import sequences
+from tractexp.recording.feeder import Feeder
 from tractexp.recording.kirchhoff import CLOSED_SUM
 from tractexp.recording.nominal_voltage import off_nominal
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots
-
-if TYPE_CHECKING:
-    from tractexp.recording.feeder import Feeder
 
 LEAST_RATIO = 1.5  # of the two currents: what is nearer has the same voltage
 SAME_CURRENT = "no load here: the same current"
@@ -44,8 +42,8 @@ KILOVOLTS = re.compile(r"(\d+(?:[.,]\d+)?) ?[kк][vв]")
 
 
 def mark_other_sides(
-    recording: Recording, phasors: Snapshots, feeders: "Sequence[Feeder]"
-) -> "list[Feeder]":
+    recording: Recording, phasors: Snapshots, feeders: Sequence[Feeder]
+) -> list[Feeder]:
     """The feeders; of two that are one current at two voltages the one without its voltage is no
     load, and both say so.
     """
@@ -77,7 +75,7 @@ def mark_other_sides(
     return marked
 
 
-def _size(phasors: Snapshots, feeder: "Feeder") -> float:
+def _size(phasors: Snapshots, feeder: Feeder) -> float:
     """How large the currents of a feeder are."""
     return phasors.size(feeder.currents)
 
@@ -93,7 +91,7 @@ class _Likeness(NamedTuple):
 
 
 def _judge_sides(
-    recording: Recording, phasors: Snapshots, sides: "tuple[Feeder, Feeder]", likeness: _Likeness
+    recording: Recording, phasors: Snapshots, sides: tuple[Feeder, Feeder], likeness: _Likeness
 ) -> bool | None:
     """Whether feeders (high, low) are surely sides of one transformer; None where they are not."""
     small, large = (_size(phasors, side) for side in sides)
@@ -111,7 +109,7 @@ def _judge_sides(
     return False if likeness.only and not called else None
 
 
-def _list_buses(feeders: "Sequence[Feeder]") -> list[np.ndarray]:
+def _list_buses(feeders: Sequence[Feeder]) -> list[np.ndarray]:
     """Of each bus the numbers of its loaded feeders of three phases whose currents do not close,
     where there are several.
     """
@@ -124,7 +122,7 @@ def _list_buses(feeders: "Sequence[Feeder]") -> list[np.ndarray]:
 
 
 def _find_same_currents(
-    recording: Recording, phasors: Snapshots, feeders: "Sequence[Feeder]"
+    recording: Recording, phasors: Snapshots, feeders: Sequence[Feeder]
 ) -> list[tuple[int, int, bool]]:
     """Pairs (high, low side) of feeders at the same voltages whose currents are one at all times,
     but for a ratio and the turn of a vector group, and whether that is sure.
@@ -145,7 +143,7 @@ def _find_same_currents(
 
 
 def _compare_currents(
-    phasors: Snapshots, feeders: "Sequence[Feeder]"
+    phasors: Snapshots, feeders: Sequence[Feeder]
 ) -> tuple[np.ndarray, np.ndarray]:
     """(share of the current of feeder b that is no multiple of that of a, angle of the multiple
     [degrees]), (F, F) each; of a feeder and itself all of it.
@@ -160,7 +158,7 @@ def _compare_currents(
     return rest, np.degrees(np.angle(products))
 
 
-def _find_sides(recording: Recording, high: "Feeder", low: "Feeder") -> tuple[float, float] | None:
+def _find_sides(recording: Recording, high: Feeder, low: Feeder) -> tuple[float, float] | None:
     """What the names say of the sides: kV where they do, else 1 of a high side and 0 of a low one;
     None for nothing.
     """
@@ -179,9 +177,7 @@ def _read_side(recording: Recording, numbers: Sequence[int]) -> float | None:
     return None if side is None else float(bool(side[1] or side[3]))
 
 
-def _has_high_voltage(
-    recording: Recording, phasors: Snapshots, high: "Feeder", low: "Feeder"
-) -> bool:
+def _has_high_voltage(recording: Recording, phasors: Snapshots, high: Feeder, low: Feeder) -> bool:
     """Whether the voltages are those of the high side: by names, else by which voltage the other
     side has then.
     """
@@ -197,7 +193,7 @@ def _has_high_voltage(
     return U > LARGEST_DISTRIBUTION
 
 
-def _measure_voltage(phasors: Snapshots, feeder: "Feeder") -> float:
+def _measure_voltage(phasors: Snapshots, feeder: Feeder) -> float:
     """Line voltage [kV] of three voltages, to ground unless they are between phases."""
     V1, V2 = (np.abs(np.nan_to_num(v)) for v in sequences(phasors.select_channels(feeder.voltages)))
     size = float(np.median(np.maximum(V1, V2)))
