@@ -122,7 +122,7 @@ class _CourseFit:
         ended = least_squares(
             lambda x: self._rows(x[:free], x[free:].reshape(sizes.shape)),
             start,
-            lambda x: self._jacobian(x[:free], x[free:].reshape(sizes.shape)),
+            lambda x: self._jacobian(x[:free], x[free:].reshape(sizes.shape)),  # pyright: ignore
             bounds=(low, np.ones(len(start))),
             ftol=1e-3,
             xtol=1e-4,
