@@ -10,8 +10,8 @@ from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.inference.goodness_of_fit import (
     LOUDEST,
     ResidualWindow,
-    energies,
     extremes,
+    measure_energies,
     residual_windows,
 )
 
@@ -34,7 +34,7 @@ def places(at: Disagreement) -> list[DisagreementInterval]:
     context = at.context
     windows = residual_windows(context.problem)
     (mean, spread), highest = extremes(at.chance.left[LOUDEST])
-    excess = energies(at.projection.channels(context.problem), context.problem)[0] - mean
+    excess = measure_energies(at.projection.channels(context.problem), context.problem)[0] - mean
     loud = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
     total = np.maximum(excess, 0.0).sum()
     standing_out = [

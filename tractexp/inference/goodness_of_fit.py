@@ -8,6 +8,7 @@ tails, so has the largest: that of a generalised extreme value distribution.
 """
 
 import itertools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -166,12 +167,12 @@ def statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
     """
     after = align_residuals(channels, problem)
     return {
-        LOUDEST: energies(channels, problem),
+        LOUDEST: measure_energies(channels, problem),
         "a step or a pulse": np.concatenate(
-            [steps(channels, problem), pulses(after, problem)], axis=1
+            [measure_steps(channels, problem), measure_pulses(after, problem)], axis=1
         ),
         "an oscillation": np.concatenate(
-            [tones(channels, problem), bursts(after, problem)], axis=1
+            [measure_tones(channels, problem), measure_bursts(after, problem)], axis=1
         ),
     }
 
@@ -281,19 +282,23 @@ def residual_windows(problem: Problem) -> list[ResidualWindow]:
     return cells
 
 
-def energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
-    """The energy of each residual in each window, over that of a sample in quiet.
+def measure_energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
+    """How loud residuals are in each window: the sum of their squares there, in units of the mean
+    square of the same channel before the dips.
+
+    Noise alone leaves about the number of samples of the window.
 
     Parameters
     ----------
     channels : (b, C, N)
-        Whitened, projected residuals.
+        Whitened, projected residuals: b of them, C channels, N samples of all events.
     problem : Problem
-        Whose windows and quiet stretches count.
+        Whose `residual_windows` and quiet stretches before the dips count.
 
     Returns
     -------
-    (b, cells) array
+    (b, k) array
+        A column for each of the k windows of `residual_windows`, in their order.
     """
     square = channels**2
     quiet = np.mean(
@@ -333,7 +338,7 @@ def align_residuals(channels: np.ndarray, problem: Problem) -> np.ndarray:
     return sum(p[:, :, :common] for p in after) / np.sqrt(len(after))
 
 
-def steps(channels: np.ndarray, problem: Problem) -> np.ndarray:
+def measure_steps(channels: np.ndarray, problem: Problem) -> np.ndarray:
     """The evidence of a step at each instant, up to the end of the event.
 
     Parameters
@@ -355,35 +360,37 @@ def steps(channels: np.ndarray, problem: Problem) -> np.ndarray:
     return np.concatenate(columns, axis=2).reshape(len(channels), -1)
 
 
-def pulses(after: np.ndarray, problem: Problem) -> np.ndarray:
-    """The evidence of a short pulse after the dips.
+def measure_pulses(after: np.ndarray, problem: Problem) -> np.ndarray:
+    """How much a short rectangular pulse after the dips would explain of residuals, wherever it
+    begins.
+
+    A pulse of n samples that fits them best lowers the sum of their squares by (sum r)²/n, which is
+    1 on average in white noise of unit variance. The stretches of a length begin a quarter of it
+    apart.
 
     Parameters
     ----------
     after : (b, C, n)
-        Residuals as `align_residuals` sums them.
+        Whitened residuals from the end of the dip on, as `align_residuals` adds up events.
     problem : Problem
         Whose sampling it is.
 
     Returns
     -------
     (b, columns) array
-        Squares of the sums over stretches of `PULSES` [s], over their numbers of samples.
+        (sum r)²/n of each length of `PULSES`, each channel and each beginning.
     """
     sums = np.cumsum(np.pad(after, ((0, 0), (0, 0), (1, 0))), axis=2)
     columns = [np.empty((len(after), 0))]
     for length in PULSES:
         n = max(round(length / problem.events[0].record.step), 1)
         if n < sums.shape[2]:
-            columns.append(
-                ((sums[:, :, n:] - sums[:, :, :-n])[:, :, :: -(-n // 4)] ** 2 / n).reshape(
-                    len(after), -1
-                )
-            )
+            stretches = (sums[:, :, n:] - sums[:, :, :-n])[:, :, :: math.ceil(n / 4)]
+            columns.append((stretches**2 / n).reshape(len(after), -1))
     return np.concatenate(columns, axis=1)
 
 
-def tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
+def measure_tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
     """The evidence of an oscillation that lasts.
 
     Parameters
@@ -410,7 +417,7 @@ def tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
     return power.reshape(len(channels), -1)
 
 
-def bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
+def measure_bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
     """The evidence of an oscillation that comes and goes after the dips.
 
     Parameters
