@@ -57,9 +57,8 @@ def ramp(x, width, least=0):
 
 
 def gate(x, width):
-    """A logistic step: 0 well below x = 0, 1 well above.
-
-    1/(1 + exp(-x/width))
+    """A smooth switch, the logistic function 1/(1 + exp(-x/width)): 0 well below x = 0, 1/2 there,
+    1 well above, within 2 % of either from 4 widths on.
     """
     import sympy
 

@@ -43,8 +43,8 @@ class NegativeSequenceBraking(Effect):
         from sympy import im, re
 
         Z = eq[sites.stator_impedance]
-        rotor = eq[sites.coupling] * im(Z) / (eq.omega_n * eq[sites.time_constant])
-        R, X = re(Z) + rotor / 2, im(Z)
-        drawn = negative_sequence * (eq.U2**2 - eq.U20**2) / (R**2 + X**2)
-        eq.edit(sites.electrical_torque, lambda T: T - drawn * rotor / 2)
-        eq.consume(drawn * R, drawn * X)
+        R_2 = eq[sites.coupling] * im(Z) / (eq.omega_n * eq[sites.time_constant])
+        R, X = re(Z) + R_2 / 2, im(Z)  # Z_2, in which R_2/s at slip 2
+        current_squared = negative_sequence * (eq.U2**2 - eq.U20**2) / (R**2 + X**2)
+        eq.edit(sites.electrical_torque, lambda T: T - current_squared * R_2 / 2)
+        eq.consume(current_squared * R, current_squared * X)

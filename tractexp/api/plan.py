@@ -342,7 +342,9 @@ def _scans(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
 
 
 def _describe_shape(shape: DipShape) -> str:
-    """The planned dip in words."""
+    """The sentence that tells what was planned: depth, duration and rate of the dip, the noise of
+    its channels and within which time that is forgotten, and the error of the model.
+    """
     memory = f"forgotten within {1000 * shape.memory:.0f} ms" if shape.memory > 0 else "white"
     first, second = (
         f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q)

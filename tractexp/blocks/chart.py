@@ -48,7 +48,9 @@ GREATEST_CODE = 32767  # the greatest of 16 bits; the least stands for a gap
 
 @functools.cache
 def script() -> str:
-    """What a page with charts needs once: the library, and what draws the charts."""
+    """The JavaScript that a page with charts holds once: a license line, and Plotly.js and our
+    `chart.js`, compressed, with what unpacks and runs them.
+    """
     drawing = files.read_packaged_text("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
     drawing = drawing.replace("PAPER", str(PAPER)).replace("SHOWN", str(MOST_DRAWN_POINTS))
     program = store.TEXTS.get(

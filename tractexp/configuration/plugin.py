@@ -323,13 +323,13 @@ def _import_error(what: str) -> Iterator[None]:
             raise  # it names the class and the file by itself
         why = error.msg if isinstance(error, SyntaxError) else error
         raise UserError(
-            f"{what} cannot be imported: {_place(error)}{type(error).__name__}: {why}"
+            f"{what} cannot be imported: {_locate_error(error)}{type(error).__name__}: {why}"
         ) from error
 
 
-def _place(error: Exception) -> str:
-    """File and line of an error in what was imported, not in a library it called; "" where nothing
-    was imported.
+def _locate_error(error: Exception) -> str:
+    """Where in the plugin's own files an import failed, as "FILE, line N: ", not in a library that
+    the plugin called; "" where none of its files had begun to run.
     """
     if isinstance(error, SyntaxError):
         return f"{error.filename}, line {error.lineno}: "

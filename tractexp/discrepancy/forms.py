@@ -102,7 +102,7 @@ def _curve(findings: Findings, effect: Effect) -> FittedLaw | None:
     return FittedLaw(
         curve,
         np.stack([curve.y - half, curve.y + half]),
-        _textbook(findings, effect, values, curve),
+        _draw_textbook_law(findings, effect, values, curve),
     )
 
 
@@ -115,11 +115,15 @@ def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float)
     return (up.y - down.y) / (2 * h)
 
 
-def _textbook(
+def _draw_textbook_law(
     findings: Findings, effect: Effect, values: Mapping[str, float], curve: Curve
 ) -> np.ndarray:
-    """The textbook's law (n,) as it fitted these events, beside the curve found; the shapes at
-    their defaults.
+    """The catalogue's law of the same effect, y (n,) at the x of `curve`: the law found is drawn
+    beside it.
+
+    Its parameters are those of the catalogue's effect where that was fitted to these events, else
+    `values` of the law found; parameters of shape (`Effect.likely`) stand at their defaults, where
+    a law is the catalogue's.
     """
     default = {p.name: p.default for p in effect.parameters}
     at, fit = (

@@ -121,6 +121,9 @@ def _open_parquet(data: bytes) -> tuple[tuple[int, int], Callable[[str], list[tu
         raise ValueError from error
 
     def read_columns(_: str) -> list[tuple[str, Any]]:
+        """All columns, for this kind of file has no sheets to name. Raises ValueError where Arrow
+        cannot read them.
+        """
         try:
             table = file.read(use_threads=False)
             return [

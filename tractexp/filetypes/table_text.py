@@ -157,8 +157,8 @@ class TextTable(TableFile):
         cell.
         """
         clocks = [n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)]
-        columns = None if clocks or self.group else self._at_once(list(wanted))
-        return self._cell_by_cell(wanted, clocks) if columns is None else columns
+        columns = None if clocks or self.group else self._read_at_once(list(wanted))
+        return self._read_cell_by_cell(wanted, clocks) if columns is None else columns
 
     def _is_clock(self, number: int) -> bool:
         """Whether a column holds times of the day."""
@@ -169,7 +169,7 @@ class TextTable(TableFile):
         """The rows of values."""
         return self.data.split(b"\n", self.line - 1)[-1]
 
-    def _at_once(self, wanted: Sequence[int]) -> dict[int, TableColumn] | None:
+    def _read_at_once(self, wanted: Sequence[int]) -> dict[int, TableColumn] | None:
         """The columns, by NumPy's reader; None where it refuses, or rows differ in length."""
         if max(wanted) >= self.width:
             return None
@@ -190,11 +190,12 @@ class TextTable(TableFile):
             matrix = matrix[:, list(wanted)]
         return {number: TableColumn(matrix[:, k].copy()) for k, number in enumerate(wanted)}
 
-    def _cell_by_cell(
+    def _read_cell_by_cell(
         self, wanted: Mapping[int, str], clocks: Sequence[int]
     ) -> dict[int, TableColumn]:
-        """The columns, each cell looked at, those of `clocks` as a whole; raises `UserError` naming
-        line, column and cell.
+        """The columns `wanted` {number: kind}, read in blocks of rows so that no file stands in
+        memory as texts; those of `clocks`, which are times of the day, as a whole, for a time is
+        read by what came before. Raises `UserError` naming line, column and cell.
         """
         texts: dict[int, list[str]] = {n: [] for n in clocks}
         kinds = {n: wanted[n] for n in wanted.keys() - texts.keys()}

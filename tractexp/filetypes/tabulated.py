@@ -167,7 +167,7 @@ def powers(
     if mapping.kind == "phasors":
         result = _of_phasors(table, mapping, nominal)
     elif mapping.kind == "powers":
-        result = _of_powers(table, mapping, kilovolts)
+        result = _read_powers(table, mapping, kilovolts)
     else:
         raise UserError(
             f"{table.source} holds waveforms"
@@ -211,9 +211,12 @@ def _tune_nominal_frequency(result: Powers, declared: float, source: MappedColum
     return replace(result, columns=columns, notes=(*result.notes, note), frequency=nominal)
 
 
-def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
-    """U, P and Q of a table that has them, phases added up, with time, f and U2 where they are
-    there.
+def _read_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
+    """The powers of a table with columns of U, P and Q: U the mean of its phases, P and Q their
+    sums, with the time and, where the table has them, f, U2 and the voltage's angle.
+
+    `kilovolts` says that a voltage without a unit is in kV. Raises `UserError` for cells that are
+    no numbers, and for ambiguous units.
     """
     _check_power_units(table, mapping)
     values, start, said = _read(table, mapping)

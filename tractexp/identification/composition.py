@@ -194,24 +194,29 @@ def estimate_composition(
 def find_terms(
     values: np.ndarray, errors: np.ndarray, times: Sequence[datetime.datetime | None]
 ) -> list[str]:
-    """The names of the terms that values show: each makes them more likely by more than chance
-    does.
+    """Which of the terms hour, weekday, season and year the values depend on beyond chance.
+
+    A likelihood-ratio test of each: twice the logarithm of the likelihood that is lost without the
+    term, all others kept, is above `LEAST_TERM` (1 % of chance).
 
     Parameters
     ----------
-    values, errors, times
-        As of `estimate_composition`.
+    values, errors : (n,)
+        The quantity at each dip, such as the share of its motors, and its standard errors.
+    times : n times
+        When the dips were; None: not known.
 
     Returns
     -------
     list of str
+        Names out of `TERMS`.
     """
     seen = _Seen.from_values(values, errors, times)
-    whole = seen.find_most_likely(seen.terms)[0]
+    with_all = seen.find_most_likely(seen.terms)[0]
     without = {
         term: seen.find_most_likely([t for t in seen.terms if t != term])[0] for term in seen.terms
     }
-    return [term for term, likely in without.items() if 2 * (whole - likely) > LEAST_TERM]
+    return [term for term, likely in without.items() if 2 * (with_all - likely) > LEAST_TERM]
 
 
 def shrink(

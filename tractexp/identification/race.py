@@ -163,8 +163,10 @@ def _mark_compared(problem: Problem) -> np.ndarray:
     return counted
 
 
-def _deviations(problem: Problem) -> np.ndarray:
-    """How far what is compared (C, N) is from its mean before each dip."""
+def _subtract_means(problem: Problem) -> np.ndarray:
+    """The measured channels (C, N), each less its mean before the dip in every event: the load's
+    response.
+    """
     measured = np.array(problem.drive.measurements)
     for e, event in enumerate(problem.events):
         part = measured[:, problem.drive.part(e)]
@@ -174,7 +176,7 @@ def _deviations(problem: Problem) -> np.ndarray:
 
 def _response(problem: Problem, counted: np.ndarray) -> float:
     """The load's response from each dip on: the sum of its squares [pu²]."""
-    return max(float(np.sum(_deviations(problem)[counted] ** 2)), SMALLEST_DEVIATION**2)
+    return max(float(np.sum(_subtract_means(problem)[counted] ** 2)), SMALLEST_DEVIATION**2)
 
 
 def _folds(problem: Problem, counted: np.ndarray) -> Iterator[np.ndarray]:
@@ -187,7 +189,7 @@ def _folds(problem: Problem, counted: np.ndarray) -> Iterator[np.ndarray]:
             part = drive.part(e)
             yield ((samples >= part.start) & (samples < part.stop))[None]
         return
-    answer = np.cumsum(np.sum(np.where(counted, _deviations(problem), 0.0) ** 2, axis=0))
+    answer = np.cumsum(np.sum(np.where(counted, _subtract_means(problem), 0.0) ** 2, axis=0))
     ends = np.searchsorted(answer, answer[-1] * np.arange(1, STRETCHES) / STRETCHES)
     first = int(np.argmax(counted.any(axis=0)))
     edges = [first, *ends.tolist(), len(samples)]

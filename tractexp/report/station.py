@@ -252,7 +252,9 @@ def _tabulate_events(load: Mapping[str, Any]) -> Table:
 
 
 def _draw_years(load: Mapping[str, Any]) -> Chart:
-    """Errors of prediction and shares over the years, or by number where times are not known."""
+    """The errors with which each dip was predicted by those before it, and the motors' shares of P,
+    over the years; by the dip's number where times are not known, or span less than a year.
+    """
     events = load["events"]
     years = np.array([_year(each["when"]) if each["when"] else np.nan for each in events])
     dated = bool(np.ptp(years) > LEAST_DATED_SPAN)  # nan is not

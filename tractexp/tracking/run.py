@@ -213,8 +213,10 @@ def attach(run_id: str, uri: str, paths: Sequence[Path]) -> bool:
 
 
 def start_parent(run: TrackedRun, uri: str) -> str:
-    """Open the run of a sweep and return its id, for `TrackedRun.parent` of the jobs. Close it in a
-    `finally`.
+    """Create the MLflow run of a sweep as a whole, which those of its jobs stand under, and return
+    its id, for `TrackedRun.parent` of each job.
+
+    It stays open: `finish_parent` closes it, called in a `finally`.
     """
     run.check()
     client = open_store(uri)

@@ -87,7 +87,9 @@ def _chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
 
 
 def _list_charts() -> list[dict[str, Any]]:
-    """The curves of fitness, the ends of searches as points, and what they cost."""
+    """The charts of the page of runs, as MLflow wants them: the best objective so far by
+    simulations and by iterations, where searches ended, and what they cost.
+    """
     curves = [
         _chart(
             "LINE",

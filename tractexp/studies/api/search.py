@@ -209,7 +209,11 @@ def _run_searches(
 
 
 def _describe_run(setup: Setup, choice: Choice, seed: int, end: Any) -> "SearchRun":
-    """A search as a comparison knows it; a failure where nothing tried could be simulated."""
+    """The record of one search, for a comparison of several: settings, history and final values.
+
+    `end` is what the search returned, or a `FailedSearch`. A search in which no point could be
+    simulated is a record with its reason as `failure`, not an error.
+    """
     from tractexp.identification.result import describe_search, refuse_failed
     from tractexp.studies.comparison.load import parameters_of
     from tractexp.studies.comparison.runs import SearchRun

@@ -45,7 +45,7 @@ def report(several: Several, source: str) -> Report:
         with page.fold_blocks(label):
             one.quality(page, comparison)
             if comparison.ablation:
-                one.switches(page, comparison.ablation)
+                one.add_ablation(page, comparison.ablation)
     return _reading(page)
 
 
@@ -153,7 +153,7 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
     with page.fold_blocks("interactions of pairs of ingredients"):
         for changes, caption in (
             (ablation.interactions, one.INTERACTIONS),
-            (ablation.company, one.COMPANY),
+            (ablation.company, one.WITH_MOST_ON),
         ):
             page.table(columns, [_describe_interaction(effect) for effect in changes], caption)
 

@@ -18,7 +18,9 @@ from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL, size_of
 from tractexp.studies.comparison.summary import Spread
 
 AT_END = "at the end of the search"
-COMPANY = "With most other switches on against with fewest: the factor by which the effect changes."
+WITH_MOST_ON = (
+    "With most other switches on against with fewest: the factor by which the effect changes."
+)
 INTERACTIONS = "Interactions: the factor by which one switch's effect changes when the other is on."
 MOST_OPEN_SENTENCES = 12  # more sentences than these about pairs are folded away
 
@@ -41,7 +43,7 @@ def report(comparison: Comparison, source: str) -> Report:
     _speed(page, comparison)
     _differences(page, comparison)
     if comparison.ablation:
-        switches(page, comparison.ablation)
+        add_ablation(page, comparison.ablation)
     _not_judged(page, comparison)
     _reading(page, comparison)
     return page
@@ -156,7 +158,7 @@ def _speed(page: Report, comparison: Comparison) -> None:
         lines = "the median and the quartiles" if few else "the median"
         caption = f"Best objective by {by}: {lines}."
         costs = " An iteration may cost several populations." if by == "iterations" else ""
-        _curves(
+        _draw_variants(
             page,
             comparison,
             charts.fitness(comparison.variants, by, comparison.floor),
@@ -165,7 +167,7 @@ def _speed(page: Report, comparison: Comparison) -> None:
     caption = (
         f"Runtimes: the share of {charts.targets_in_words()} reached by all runs, by simulations."
     )
-    _curves(page, comparison, charts.ecdf(comparison.variants, comparison.floor), caption)
+    _draw_variants(page, comparison, charts.ecdf(comparison.variants, comparison.floor), caption)
     page.table(
         columns,
         rows,
@@ -175,17 +177,19 @@ def _speed(page: Report, comparison: Comparison) -> None:
     )
 
 
-def _curves(
+def _draw_variants(
     page: Report, comparison: Comparison, drawn: tuple[Chart, list[Chart]], caption: str
 ) -> None:
-    """A chart of all variants; where there are many, one of each folded away."""
+    """Add a chart of all variants, the first of `drawn`, and folded away one for each, the others;
+    there are some only where variants are more than colors.
+    """
     whole, each = drawn
-    many = (
+    about_colors = (
         f" In color the first {charts.TOGETHER}; gray ones are named when pointed at."
         if each
         else ""
     )
-    page.chart(whole, caption + many)
+    page.chart(whole, caption + about_colors)
     if each:
         with page.fold_blocks("each variant in a chart of its own"):
             page.charts(each, f"In gray: {comparison.summaries[0].name}.")
@@ -254,8 +258,10 @@ def _pairs(page: Report, pairs: list[VariantPair]) -> None:
     )
 
 
-def switches(page: Report, ablation: Ablation) -> None:
-    """Add what each ingredient does."""
+def add_ablation(page: Report, ablation: Ablation) -> None:
+    """Add the tables of an ablation: by which factor the objective changes where a switch of an
+    optimizer is on, how that depends on how many others are, and on each other one.
+    """
     page.heading("What each ingredient does")
     page.items([claims.of_effect(effect) for effect in ablation.effects])
     columns = ["switched on", "factor", "from", "to", "seeds", "shown", "contrasts"]
@@ -264,7 +270,7 @@ def switches(page: Report, ablation: Ablation) -> None:
             ablation.effects,
             "Main effects: the factor by which the objective is multiplied; below 1 it is lowered.",
         ),
-        (ablation.company, COMPANY),
+        (ablation.company, WITH_MOST_ON),
         (ablation.interactions, INTERACTIONS),
     )
     for effects, caption in groups:
