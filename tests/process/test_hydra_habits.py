@@ -68,6 +68,7 @@ def test_callbacks_and_loggers_of_the_users_are_at_work_in_each_job(tmp_path, mo
 def test_a_sweep_of_one_job_ends_with_its_page(tmp_path):
     done = run_command("-m", *QUICK, ONE, HERE, "seed=3", "hydra/launcher=joblib", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"sweep: 1 job in {tmp_path / 'sweep'}\n")
     page = tmp_path / "sweep" / "0" / "report.html"
     assert page.is_file()
     assert str(page) in done.stdout
@@ -103,6 +104,9 @@ def test_folders_of_jobs_are_named_as_asked_and_found_again(tmp_path):
     ]
     again = run_command(*named, "seed=3,4,5", cwd=tmp_path)
     assert "2 of them are finished and kept" in again.stdout
+    page = tmp_path / "sweep" / "sweep.html"
+    assert again.stdout.splitlines()[-1] == f"  {page}", "one variant: its own page, no comparison"
+    assert "http-equiv" not in page.read_text(encoding="utf-8"), "it has ended, and loads no more"
     one = run_command("-m", *QUICK, ONE, HERE, "hydra.sweep.subdir=all", "seed=6,7", cwd=tmp_path)
     assert (one.returncode, one.stderr.count("\n")) == (2, 1)
     assert "hydra.sweep.subdir=all is the folder of two jobs" in one.stderr

@@ -1,11 +1,15 @@
 """What a shape that is left may be physically: a known shape has its known reading."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import tractexp
 from tractexp.discrepancy.readings import LOOK, RULES, WAVES, read_shapes
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.record import Record, detect
+from tractexp.record.waves import Waves
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +53,19 @@ def test_a_ring_that_two_events_share_is_no_function_of_the_voltage(event):
     apart = [shape("ringing", frequency=f, event=e) for f, e in ((12.0, "dip1"), (17.0, "dip2"))]
     assert all("in common" in reading.means for reading in read_shapes(both, event))
     assert not any("in common" in reading.means for reading in read_shapes(apart, event))
+
+
+def test_what_would_decide_is_a_command_that_can_be_carried_out(event):
+    """A record of phasors holds no samples to fit: its file is looked at; arrays have no file."""
+    fast, slow = shape("decay", time_constant=0.02), shape("decay", time_constant=0.5)
+    (shipped,) = tractexp.read("tibet_50pct")
+    look = "tractexp look pkg://tractexp.data/tibet_50pct.csv --all"
+    assert [r.command for r in read_shapes([fast, slow], shipped)] == [look, look]
+    assert {r.command for r in read_shapes([fast, slow], event)} == {"tractexp.plan(dips)"}
+    samples = Waves(np.zeros((6, 5000)), 0.0, 5000.0, "dft", None)
+    sampled = replace(event, record=replace(event.record, waves=samples))
+    (reading,) = read_shapes([fast], sampled)
+    assert reading.command == "tractexp.investigate(dips, domain='waves')"
 
 
 def test_each_row_of_the_table_has_a_source_and_a_command_that_exists():

@@ -5,7 +5,7 @@ like comes from, which channel, event or setting of the recorder tells it apart,
 command one gets there.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -13,6 +13,7 @@ from tractexp.configuration.run_command import suggest_run
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.record import Event
 from tractexp.record.identity import Identity
+from tractexp.record.wave_event import WaveEvent, has_fine_samples
 from tractexp.storage import files
 from tractexp.text import quoting
 
@@ -158,16 +159,16 @@ def read_shapes(shapes: Sequence[Remainder], event: Event) -> list[Reading]:
     """A reading of each shape, the loudest first; `event` is the first that was fitted, whose file
     is looked at.
     """
-    supply = event.record.base.frequency
-    file = Identity.from_record(event.record).recording.source.get("file", "")
-    path = file if files.exists(file) else ""
+    supply, commands = event.record.base.frequency, _list_commands(event)
     return [
-        reading for shape in shapes for reading in _read_shape(shape, list(shapes), supply, path)
+        reading
+        for shape in shapes
+        for reading in _read_shape(shape, list(shapes), supply, commands)
     ]
 
 
 def _read_shape(
-    shape: Remainder, shapes: Sequence[Remainder], supply: float, path: str
+    shape: Remainder, shapes: Sequence[Remainder], supply: float, commands: Mapping[str, str]
 ) -> Iterator[Reading]:
     rule = next((rule for rule in RULES if rule.holds(shape, supply)), None)
     if rule is None:
@@ -175,8 +176,7 @@ def _read_shape(
     means = rule.means
     if any(_rings_alike(shape, other) for other in shapes):
         means = f"{IN_COMMON}; else {means}"
-    command = _command(rule.command, path)
-    yield Reading(_name(shape), means, rule.source, rule.decides, command)
+    yield Reading(_name(shape), means, rule.source, rule.decides, commands[rule.command])
 
 
 def _rings_alike(one: Remainder, other: Remainder) -> bool:
@@ -193,8 +193,20 @@ def _name(shape: Remainder) -> str:
     return f"the {shape.kind} of {shape.channel}{at}{lasts}"
 
 
-def _command(which: str, path: str) -> str:
-    """The command by which one gets to what decides; waveforms where nobody knows the file."""
-    if which == LOOK and path:
-        return quoting.shell("tractexp", "look", path, "--all")
-    return suggest_run("task=discrepancy", "domain=waves", of=("data", "task"))
+def _list_commands(event: Event) -> dict[str, str]:
+    """The commands by which one gets to what decides, of which each can be carried out.
+
+    A record without samples is looked at, and of arrays that came from no file the next event is
+    planned.
+    """
+    record = event.record
+    file = Identity.from_record(record).recording.source["file"]
+    if record.is_shipped or files.exists(file):
+        seen = quoting.shell("tractexp", "look", file, "--all")
+    else:
+        waves = ["domain=waves"] if isinstance(event, WaveEvent) else []
+        seen = suggest_run("task=plan", *waves, of=("data",))
+    if not has_fine_samples(record):
+        return {LOOK: seen, WAVES: seen}
+    in_waves = suggest_run("task=discrepancy", "domain=waves", of=("data", "task"))
+    return {LOOK: seen, WAVES: in_waves}

@@ -16,7 +16,7 @@ from tractexp.noise.quiet import estimate
 from tractexp.noise.random_walk import RandomWalk
 from tractexp.noise.voltage import SmoothedEvent, smooth_voltage
 from tractexp.record import Base, Event, Record
-from tractexp.record.wave_event import COARSEST, describe_smearing
+from tractexp.record.wave_event import describe_smearing, has_fine_samples
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import DipShape
@@ -106,8 +106,8 @@ class PhasorDomain(Domain):
 
     def better(self, event: Event) -> str:
         """Of records that hold no samples, or too few in a cycle, nothing is said."""
-        waves, record = event.record.waves, event.record
-        if waves is None or waves.rate < COARSEST * record.base.frequency:
+        record = event.record
+        if not has_fine_samples(record):
             return ""
         U2 = (
             0.0 if record.U2 is None else float(record.U2[event.start : event.end].max() / event.U0)

@@ -300,6 +300,12 @@ def describe_smearing(duration: float, U2: float, frequency: float) -> str:
     return ""
 
 
+def has_fine_samples(record: Record) -> bool:
+    """Whether a record has samples, and enough in a cycle for `domain=waves`."""
+    waves = record.waves
+    return waves is not None and waves.rate >= COARSEST * record.base.frequency
+
+
 def _waves(event: Event) -> Waves:
     """The waveforms of an event, from as early and to as late as its record may use them."""
     record, waves = event.record, event.record.waves

@@ -1,12 +1,13 @@
 """The part of an investigation's page that tells a proposed term, or why there is none."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
-from tractexp.discrepancy.discrepancy_json import PLUGIN
+from tractexp.discrepancy.discrepancy_json import PLUGIN, adopt_term
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.proposal.judge import TermAssessment
@@ -48,11 +49,11 @@ def add_proposal_section(page: Report, findings: Findings) -> None:
     _add_explanation(page, proposal)
     _plot_term(page, proposal)
     _rivals(page, proposal)
-    page.text(f"The file {PLUGIN} beside this page is the term as an effect:")
-    command = (
-        f"python -m tractexp {findings.context.domain.setting}'model.effects=[proposed_effect]' ..."
+    page.text(
+        f"The file {PLUGIN} beside this page is the term as an effect. In that folder, this makes a"
+        " package of it, and says how it is tested, installed and chosen:"
     )
-    page.code(f"cp {PLUGIN} <your package>/effects/ && {command}")
+    page.code(adopt_term(Path(PLUGIN)))
     with page.fold_blocks("The plugin file"):
         page.code(proposal.source)
     _add_tried_terms(page, findings.proposed.tried)

@@ -29,12 +29,13 @@ from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.launcher import Cores
-from tractexp.sweep.live import LivePage, keep_live
+from tractexp.sweep.live import PAGE, LivePage, keep_live
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.placing import await_end, is_finished, place, placement, settle
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, INTERRUPTED
 from tractexp.text.progress import say
+from tractexp.text.wording import count_noun
 from tractexp.tracking.sweepfile import MULTIRUN, PAGES
 
 REPEAT = "repeat the command to go on with the jobs that are left"
@@ -95,7 +96,7 @@ class Grid(Sweeper):
     def _perform(self, jobs: list[SweepJob], folder: Path, arguments: list[str]) -> None:
         """Run what remains of the jobs, and say what is kept."""
         remaining = [job for job in jobs if self.redo or not is_finished(job)]
-        say(f"sweep: {len(jobs)} jobs in {folder}")
+        say(f"sweep: {count_noun(len(jobs), 'job')} in {folder}")
         if done := len(jobs) - len(remaining):
             say(f"  {done} of them are finished and kept; hydra.sweeper.redo=true runs them again")
         if remaining:
@@ -136,7 +137,9 @@ class Grid(Sweeper):
         """Compare the variants, where there is something to compare, and say which jobs failed."""
         if comparison is None or not comparable(jobs):
             summary(jobs)
-            for page in sorted(jobs[0].folder.glob("*.html")) if jobs[0].alone else ():
+            first = jobs[0]
+            pages = sorted(first.folder.glob("*.html")) if first.alone else [first.sweep / PAGE]
+            for page in filter(Path.is_file, pages):
                 say(f"  {page}")
                 self._open_page(page)
         else:
