@@ -114,7 +114,7 @@ def test_a_result_may_be_named_by_the_folder_of_its_run(folder):
     )
 
 
-def test_a_folder_alone_is_a_survey_or_tells_the_page_of_its_run(folder, tmp_path):
+def test_a_folder_alone_is_a_survey_or_tells_the_page_of_its_run(tmp_path):
     (tmp_path / "records").mkdir()
     for name in ("tibet_30pct", "tibet_50pct"):
         shutil.copy(Path(tractexp.data.__file__).with_name(f"{name}.csv"), tmp_path / "records")
@@ -124,7 +124,16 @@ def test_a_folder_alone_is_a_survey_or_tells_the_page_of_its_run(folder, tmp_pat
     assert len((tmp_path / "table" / "survey.csv").read_text(encoding="utf-8").splitlines()) == 3
     done = run_command("table", cwd=tmp_path)
     assert done.stdout == f"page: {tmp_path / 'table' / 'survey.html'}\n"
-    done = run_command("empty", cwd=folder)
+    (tmp_path / "0" / ".hydra").mkdir(parents=True)
+    (tmp_path / "0" / "result.json").write_text("{}")
+    done = run_command("0", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "tractexp: 0 holds a run that drew no page, as the jobs of a sweep do; tractexp again 0"
+        " repeats it and draws one\n"
+    )
+    (tmp_path / "empty").mkdir()
+    done = run_command("empty", cwd=tmp_path)
     assert (done.returncode, "holds no file that can be read" in done.stderr) == (2, True)
 
 

@@ -47,7 +47,7 @@ def test_the_answer_of_an_identification_is_one_screen(printed):
     assert (short.returncode, every.returncode) == (0, 0)
     rows = count_rows(short.stdout, WIDTH)
     assert len(rows) <= LINES - 1, "\n".join(rows)  # one more is the line of the log
-    assert rows[0].startswith("load: ")
+    assert rows[0].startswith("load: U 0.9998 pu, P 0.9995 pu, Q 0.7005 pu, ")
     assert "tibet_50pct" in rows[0]
     assert any(row.startswith("doubtful: the model describes this load within") for row in rows)
     assert next(row.split()[0] for row in rows if row.split()[-1:] == ["yes"]) == "T_prime"

@@ -224,6 +224,7 @@ def test_the_page_and_the_table_tell_it(stepped, tmp_path):
     assert ">Proposal<" in text
     assert "not a function of the voltage" in text
     assert "proposed_effect.py" in paths
+    assert "tractexp new effect proposed_effect --from proposed_effect.py" in text
     assert any(
         line.startswith("proposed: a step")
         for line in map(str.strip, str(found.summary()).splitlines())
