@@ -54,6 +54,8 @@ def test_it_is_said_in_megawatts_where_the_base_is_in_them():
     assert pytest.approx(29.7) == point.P
     assert pytest.approx(29.7 * OperatingPoint.from_result(fitted()).P_motor) == point.P_motor
     assert f"motor {point.P_motor:.4g} MW and {point.Q_motor:.4g} Mvar" in str(point)
+    alone = OperatingPoint.from_result(fitted())
+    assert f"motor P {alone.P_motor:.4g} pu and Q {alone.Q_motor:.4g} pu" in str(alone)
 
 
 @pytest.mark.parametrize(

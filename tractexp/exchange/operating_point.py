@@ -11,6 +11,7 @@ from tractexp.exchange.format import Identified
 from tractexp.identification.division import doubt_division
 from tractexp.identification.result import Result
 from tractexp.identification.verdict import rests_on_bound
+from tractexp.text.wording import write_quantity
 
 
 @dataclass(frozen=True)
@@ -89,14 +90,15 @@ class OperatingPoint:
 
     def __str__(self) -> str:
         """Powers, slip, inertia and starting current in a line."""
-        p, q = self.units
         share = f", {self.share:.0%} of P" if self.P > 0 else ""
-        return (
-            f"before the dip: motor {self.P_motor:.4g} {p} and {self.Q_motor:.4g} {q}{share};"
-            " static load "
-            f"{self.P - self.P_motor:.4g} {p} and {self.Q - self.Q_motor:.4g} {q};"
-            f" {', '.join(self._figures)}"
-        )
+        motor = self._write_power(self.P_motor, self.Q_motor) + share
+        static = self._write_power(self.P - self.P_motor, self.Q - self.Q_motor)
+        figures = ", ".join(self._figures)
+        return f"before the dip: motor {motor}; static load {static}; {figures}"
+
+    def _write_power(self, P: float, Q: float) -> str:
+        """Active and reactive power in words."""
+        return " and ".join(map(write_quantity, "PQ", (P, Q), self.units))
 
     @property
     def doubt(self) -> str:

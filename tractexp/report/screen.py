@@ -17,7 +17,13 @@ from tractexp.identification.verdict import (
 )
 from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import UNKNOWN, Identity, label
-from tractexp.text.wording import count_noun, list_first, shorten, with_error
+from tractexp.text.wording import (
+    count_noun,
+    list_first,
+    shorten,
+    with_error,
+    write_quantity,
+)
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification
@@ -64,24 +70,16 @@ def describe_load(result: Result, names: Sequence[str]) -> str:
     own, before = result.base, result.before
     scale, units = choose_units(result)
     powers = [
-        _state_level(key, scale * before[key], unit)
+        write_quantity(key[0], scale * before[key], unit)
         for key, unit in zip(("P0", "Q0"), units, strict=True)
     ]
     identities: list[Identity] = result.identities
     voltage = identities[0].voltage if identities else None
-    level = _state_level("U0", before["U0"] * (voltage or 1.0), "kV" if voltage else "pu")
+    level = write_quantity("U", before["U0"] * (voltage or 1.0), "kV" if voltage else "pu")
     dips = list_first(names, MOST_EVENTS)
     parts = [label(identities), level, *powers, f"fitted: {dips}"]
     unknown = f" ({UNKNOWN})" if not (own.in_mva or voltage) else ""
     return f"load: {', '.join(filter(None, parts))}{unknown}"
-
-
-def _state_level(key: str, value: float, unit: str) -> str:
-    """A voltage or power before the dip; one in per unit with its symbol, for pu does not tell of
-    what it is.
-    """
-    text = f"{value:.4g} {unit}"
-    return f"{key[0]} {text}" if unit == "pu" else text
 
 
 def choose_units(result: Result) -> tuple[float, tuple[str, str]]:

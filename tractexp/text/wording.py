@@ -197,6 +197,19 @@ def change(before: float | None, after: float | None) -> str:
     return f"{figure(before) or '?'} to {figure(after) or '?'}"
 
 
+def write_quantity(symbol: str, value: float, unit: str) -> str:
+    """A voltage or power with its unit; one in per unit with its symbol, for pu does not tell of
+    what it is.
+
+    Examples
+    --------
+    >>> write_quantity("P", 12.0, "MW"), write_quantity("P", 0.8, "pu")
+    ('12 MW', 'P 0.8 pu')
+    """
+    text = f"{value:.4g} {unit}"
+    return f"{symbol} {text}" if unit == "pu" else text
+
+
 def count_noun(number: int, noun: str) -> str:
     """A number with its noun.
 
