@@ -170,5 +170,5 @@ def test_what_collapses_behind_an_impedance_asks_for_no_shorter_steps():
 
 def test_a_base_model_that_no_number_of_steps_calculates_is_refused():
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    with pytest.raises(UserError, match="Runge-Kutta steps per sample of 2 ms leave"):
+    with pytest.raises(UserError, match=r"Runge-Kutta steps per sample of 2 ms leave.*in a memory"):
         Problem(model, contactors(), bounds={"T_prime": (1e-7, 1e-6)})

@@ -564,6 +564,7 @@ class Problem:
                 " pu somewhere in"
                 " the bounds; raise the lower bound of the model's time constants"
                 f" ({MODEL.bounds}),"
-                f" or set {MODEL.substeps}"
+                f" or set {MODEL.substeps}; what jumps within a sample in an equation of yours"
+                " belongs in a memory"
             )
         return Step(chosen, error)
