@@ -14,7 +14,7 @@ SOURCE = "author year, equation"  # of the bounds and the default
 class Example(Effect):
     r"""The active power of the static load has a part that follows the square of the voltage.
 
-        P_s -> P_s (1 - k + k u^2),   u = U/U_0
+        P_s -> P_s (1 + k (u^2 - 1)),   u = U/U_0
 
     At k = 0 the base model.
 
@@ -31,4 +31,4 @@ class Example(Effect):
 
     def edit(self, eq: "Equations", example_share: "Symbol") -> None:
         u = eq[sites.static_voltage]
-        eq.edit(sites.P_static, lambda power: power * (1 - example_share + example_share * u**2))
+        eq.edit(sites.P_static, lambda P: P * (1 + example_share * (u**2 - 1)))
