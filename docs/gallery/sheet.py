@@ -1,6 +1,6 @@
 """A sheet to hand in
 
-Two pages of A4: the load, its parameters on both bases beside typical machines, measured and
+Three pages of A4: the load, its parameters on both bases beside typical machines, measured and
 calculated power, and what the model may be used for. Each run writes it as sheet.html.
 """
 

@@ -1,9 +1,12 @@
 """Pages as documents for a word processor, and charts as pictures."""
 
+import re
+import subprocess
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from browser import BROWSER
 
 import tractexp
 from tractexp.blocks import Report
@@ -123,3 +126,14 @@ def test_a_notebook_shows_the_answer_and_one_figure_beside_it(fit):
     alone = replace(fit, behind=None)._repr_html_()
     assert "<svg" not in alone
     assert "T_prime" in alone
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+def test_a_sheet_is_printed_on_three_pages(fit, tmp_path):
+    """Its short equations stand side by side: one below the other they take a page of their own."""
+    page, printed = fit.sheet().save(tmp_path / "sheet.html"), tmp_path / "sheet.pdf"
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"]
+    command += [f"--user-data-dir={tmp_path / 'browser'}", "--virtual-time-budget=5000"]
+    command += ["--host-resolver-rules=MAP * ~NOTFOUND", f"--print-to-pdf={printed}"]
+    subprocess.run([*command, page.as_uri()], capture_output=True, timeout=120, check=True)
+    assert len(re.findall(rb"/Type /Page\b", printed.read_bytes())) == 3
