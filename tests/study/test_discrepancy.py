@@ -155,8 +155,8 @@ def test_what_explains_as_well_is_told_as_a_tie_with_the_dip_that_decides():
     found = investigate(base(), events("stator_resistance", noise=LOUD), (), {}, {}, only=alike)
     assert found.verdict.word == "tied"
     assert {*found.verdict.sets} == {(name,) for name in alike}
-    told = "either explains the disagreement, and these events cannot tell them apart; they predict"
-    assert told in found.reason
+    told = "either explains the disagreement, and these events cannot tell them apart; 2 classes:"
+    assert f"{told} they predict alike in milder dips" in found.reason
     assert found.next_event.probability > 0.9
     made = content(found)
     assert (made["verdict"], made["effects"]) == ("tied", [*found.names])
