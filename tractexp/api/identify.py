@@ -736,17 +736,11 @@ def _conclude_identification(
     structures = [rival.to_dict() for rival in uncertainty.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
     unrecorded = uncertainty.unrecorded
-    by_course = unrecorded is not None and unrecorded.course is not None
+    odd = together.odd if together else ()
     advice = [
-        *(_with_frequency(uncertainty) if by_course else []),
-        *advise(
-            uncertainty,
-            adequacy,
-            together.odd if together else (),
-            data=data,
-        ),
+        *advise(uncertainty, adequacy, odd, data=data),
         *_hold_to_machines(setup, result),
-        *([] if by_course else _with_frequency(uncertainty)),
+        *_with_frequency(uncertainty),
     ]
     beside = yardstick(fits, result.model_error)
     result = replace(
