@@ -218,7 +218,8 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site(tmp_
     text = PAGE.read_text(encoding="utf-8")
     told = set(re.findall(r"`eq\.(\w+)", text))
     framework = {
-        "apart",  # as version 0.2 called it
+        "apart",  # as version 0.2 called it, and the next
+        "before",
         "parameters",
         "definitions",
         "steps",
