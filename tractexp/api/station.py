@@ -3,7 +3,7 @@ to dip, and how well each dip was predicted by those before it.
 """
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from tractexp.api.identify import UNUSABLE, Identification
 from tractexp.api.look import Listed
 from tractexp.api.station_load import LoadJob, fit_load, read_files
 from tractexp.api.survey import build_fit_command, survey
-from tractexp.api.surveying import FEWEST_DIPS, keys, name_load
+from tractexp.api.surveying import FEWEST_DIPS, complete_entries, keys, name_load
 from tractexp.api.task import Job, Task, call
 from tractexp.blocks import Report, Table
 from tractexp.cache.store import Store, environment, key
@@ -246,16 +246,11 @@ def _read_dips(
     for row in rows:
         wanted[row["file"]].append(row["event"])
     own = keys(folder, [folder / file for file in wanted])
-    store = Store(DIPS, folder=keep or Path())
-    entries = {file: store.read_json(own[file]) for file in wanted} if keep else {}
-    by_file = {file: entry for file, entry in entries.items() if entry is not None}
-    fresh = {file: names for file, names in wanted.items() if file not in by_file}
-    with count_parts("files with dips", len(fresh), progress) as count:
-        for file, read in read_files(folder, fresh, workers):
-            by_file[file] = read
-            if keep:
-                store.write_json(own[file], files.plain(read))
-            count()
+
+    def read(fresh: Sequence[str]) -> Iterator[tuple[str, Any]]:
+        return read_files(folder, {file: wanted[file] for file in fresh}, workers)
+
+    by_file, _ = complete_entries(DIPS, keep, own, read, "files with dips", progress)
     return {
         name: {**one, "key": own[file]}
         for file, names in wanted.items()

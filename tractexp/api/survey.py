@@ -2,6 +2,7 @@
 fitting.
 """
 
+import functools
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,10 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.look import Listed
-from tractexp.api.surveying import FEWEST_DIPS, keys, look_at_files, name_load
+from tractexp.api.surveying import (
+    FEWEST_DIPS,
+    complete_entries,
+    keys,
+    look_at_files,
+    name_load,
+)
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.cache.store import Store
 from tractexp.configuration.overrides import build_typed_command, format_assignment
 from tractexp.configuration.plugin import discover, get, plugin
 from tractexp.errors import DATA, UserError, check_range
@@ -25,7 +31,7 @@ from tractexp.report import survey as shown
 from tractexp.report.survey import UNREAD
 from tractexp.storage import files
 from tractexp.text import quoting
-from tractexp.text.progress import Progress, count_parts, tell_stages
+from tractexp.text.progress import Progress, tell_stages
 
 if TYPE_CHECKING:
     import pandas
@@ -151,29 +157,6 @@ def _cell(value: Any) -> Any:
     return quoting.cell(value) if isinstance(value, str) else value
 
 
-def _look_at_all(
-    place: Path,
-    paths: Sequence[Path],
-    keep: str | Path | None,
-    cores: int | None,
-    progress: Progress,
-) -> tuple[dict[str, list[dict[str, Any]]], int]:
-    """{file: rows} in the order of the files, and how many files were looked at: those of which
-    `keep` has no rows.
-    """
-    store, names = Store(ROWS, folder=Path(keep or "")), keys(place, paths)
-    kept = names if keep else {}
-    entries = {name: store.read_json(key) for name, key in kept.items()}
-    rows = {name: entry for name, entry in entries.items() if entry is not None}
-    fresh = [name for name in names if name not in rows]
-    with count_parts("files", len(fresh), progress) as count:
-        for name, fresh_rows in look_at_files(place, fresh, cores or -1):
-            rows[name] = files.plain(fresh_rows)
-            store.write_json(names[name] if keep else "", rows[name])
-            count()
-    return {name: rows[name] for name in names}, len(fresh)
-
-
 @public
 def survey(
     folder: str | Path,
@@ -227,7 +210,9 @@ def survey(
     paths = list(find_records(place))
     if not paths:
         raise UserError(f"{DATA.path}={folder} holds no file that can be read")
-    rows, looked_at = _look_at_all(place, paths, keep, cores, progress)
+    look_at = functools.partial(look_at_files, place, cores=cores or -1)
+    own, where = keys(place, paths), Path(keep) if keep else None
+    rows, looked_at = complete_entries(ROWS, where, own, look_at, "files", progress)
     content = {
         "folder": str(folder),
         "files": len(rows),

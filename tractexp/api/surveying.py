@@ -3,14 +3,14 @@
 import contextlib
 import functools
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tractexp.api.look import command, event_row, hide_secondary, series
-from tractexp.cache.store import key
+from tractexp.cache.store import Store, key
 from tractexp.errors import UserError
 from tractexp.process.workers import Workers
 from tractexp.recording import archive
@@ -19,6 +19,7 @@ from tractexp.recording.overview import LoadEvent, Sight, View
 from tractexp.report.look import describe_dead_phases
 from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
 from tractexp.storage import files
+from tractexp.text.progress import Progress, count_parts
 
 Rows = list[dict[str, Any]]
 
@@ -208,6 +209,48 @@ def look_at_files(folder: Path, names: Sequence[str], cores: int) -> Iterator[tu
                     | {"file": name, "kind": UNREAD, "worth": False, "why": KILLED}
                 ],
             )
+
+
+def complete_entries(
+    kind: str,
+    keep: Path | None,
+    own: Mapping[str, str],
+    compute: Callable[[list[str]], Iterable[tuple[str, Any]]],
+    what: str,
+    progress: Progress,
+) -> tuple[dict[str, Any], int]:
+    """What is kept of each file, and of the others what is computed, stored as it comes.
+
+    Parameters
+    ----------
+    kind : str
+        Of the entries.
+    keep : Path
+        The folder where they are kept; None keeps nothing.
+    own : {file: key}
+        The files that are wanted, and the keys of their entries.
+    compute : callable
+        Of a list of files (file, entry) as they are done.
+    what : str
+        Is counted while they are.
+    progress : None, False or callable
+        None shows how many are done, False does not.
+
+    Returns
+    -------
+    ({file: entry} in the order of `own`, how many were computed)
+    """
+    store = Store(kind, folder=keep or Path())
+    names = own if keep else dict.fromkeys(own, "")
+    entries = {file: store.read_json(name) for file, name in names.items()}
+    found = {file: entry for file, entry in entries.items() if entry is not None}
+    fresh = [file for file in own if file not in found]
+    with count_parts(what, len(fresh), progress) as count:
+        for file, entry in compute(fresh):
+            found[file] = files.plain(entry)
+            store.write_json(names[file], found[file])
+            count()
+    return {file: found[file] for file in own}, len(fresh)
 
 
 def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:

@@ -17,7 +17,6 @@ from tractexp.filetypes.table import TableFile
 from tractexp.recording.railway import (
     ALTERNATING,
     FROM_NOMINAL_DIRECT,
-    NOMINAL_DIRECT,
     DirectVoltage,
     is_near_direct_nominal,
 )
@@ -119,8 +118,8 @@ def _is_direct_alone(mean: float) -> bool:
     that it may be the RMS of.
     """
     most = FROM_NOMINAL_DIRECT / 4
-    near = any(abs(mean / nominal - 1) <= most for nominal in NOMINAL_DIRECT)
-    return near and not any(abs(mean / other - 1) <= most for other in ALTERNATING_NEAR)
+    alternating = any(abs(mean / other - 1) <= most for other in ALTERNATING_NEAR)
+    return is_near_direct_nominal(mean, most) and not alternating
 
 
 def check_alternating(

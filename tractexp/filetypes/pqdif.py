@@ -56,6 +56,9 @@ FUNDAMENTAL = (
     tag("1cdda475-1ebb-42d8-8087-d01b0b5cfa97"),
     tag("672d0310-7810-11d4-a4b3-444553540000"),
 )
+ENDINGS = {kind: "" for kind in (*PLAIN, *SEQUENCES)} | {
+    kind: " fundamental" for kind in FUNDAMENTAL
+}
 FEWEST_WAVE_SAMPLES = 4  # samples of a waveform
 LARGEST_TIME_DIFFERENCE = 1e-6  # s: times that are the same to the resolution of a moment
 LOG_GAP_STEPS = 1.5  # usual steps: after a longer one a log is another one
@@ -325,8 +328,7 @@ def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value:
     if not letter or definition.value not in values:
         return ""
     name = letter + mark if letter in "UI" or mark in "ABC" else letter
-    endings = dict.fromkeys((*PLAIN, *SEQUENCES), "") | dict.fromkeys(FUNDAMENTAL, " fundamental")
-    ending = endings.get(definition.characteristic)
+    ending = ENDINGS.get(definition.characteristic)
     return "" if ending is None else f"{name}{ending}"
 
 

@@ -146,15 +146,14 @@ class _CourseFit:
         J = np.zeros((samples + sizes.size, free + sizes.size))
         J[:samples, :free] = sensitivities.shared_columns
         J[samples:, free:] = self.weight * np.eye(sizes.size)
+        at = np.arange(drive.channels * drive.samples).reshape(drive.channels, drive.samples)
+        places = [at[:, drive.part(e)].ravel() for e in range(drive.events)]
         for k in range(sizes.shape[1]):
             moved = sizes.copy()
             moved[:, k] += COURSE_DIFFERENCE
             change = (self._driven(moved).rows(unit[None])[0] - rows) / COURSE_DIFFERENCE
-            for e in range(drive.events):
-                own = np.zeros((drive.channels, drive.samples), dtype=bool)
-                own[:, drive.part(e)] = True
-                at = np.flatnonzero(own.ravel())
-                J[at, free + e * sizes.shape[1] + k] = change[at]
+            for e, own in enumerate(places):
+                J[own, free + e * sizes.shape[1] + k] = change[own]
         return np.nan_to_num(J)
 
     def _driven(self, sizes: np.ndarray) -> Likelihood:

@@ -269,6 +269,6 @@ def _volts(kilovolts: float) -> str:
     return f"{kilovolts:.4g} kV" if large else f"{1000 * kilovolts:.4g} V"
 
 
-def is_near_direct_nominal(mean: float) -> bool:
+def is_near_direct_nominal(mean: float, within: float = FROM_NOMINAL_DIRECT) -> bool:
     """Whether a mean [kV] is near a nominal direct voltage of railways."""
-    return any(abs(mean / nominal - 1) <= FROM_NOMINAL_DIRECT for nominal in NOMINAL_DIRECT)
+    return any(abs(mean / nominal - 1) <= within for nominal in NOMINAL_DIRECT)
