@@ -82,8 +82,7 @@ class Parameter:
         if not isinstance(self.power_exponent, int):
             raise UserError(
                 f"{where}: power_exponent={self.power_exponent!r} must be a whole number: 1 of a"
-                " power or an"
-                " admittance, -1 of an impedance, 0 of what no base of power changes"
+                " power or an admittance, -1 of an impedance, 0 of what no base of power changes"
             )
         self._check_numbers(where)
 

@@ -192,8 +192,7 @@ def _solve_voltage(eq, R, J, rest, source):
     eq.require(
         eq.real(eq.evaluate_before(a * e - b * c)),
         "no current settles between an impedance and a load of which one has a negative resistance"
-        " ({value:.3g}); raise"
-        " X_f, or lower T_m so that the static load draws power",
+        " ({value:.3g}); raise X_f, or lower T_m so that the static load draws power",
     )
     return (e * d - b * q) / whole + sympy.I * (a * q - c * d) / whole
 

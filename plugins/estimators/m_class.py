@@ -53,8 +53,7 @@ class MClass(Estimator):
             rates = f": {', '.join(map(str, table))}" if table else ""
             raise UserError(
                 f"{DATA.estimator}=m_class: the standard has no M-class filter for {rate} phasors a"
-                " second at "
-                f"{nominal:g} Hz{rates}; choose another estimator, e.g. one_cycle"
+                f" second at {nominal:g} Hz{rates}; choose another estimator, e.g. one_cycle"
             )
         reference, order = table[rate]
         return reference, order / (16 * nominal)

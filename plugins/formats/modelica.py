@@ -30,8 +30,8 @@ class Modelica(Format):
         if eq.memories or load.model.measurements:
             which = next(m.name for m in (*eq.memories, *load.model.measurements))
             raise UserError(
-                f"format 'modelica' cannot represent '{which}', which acts on samples;"
-                " export the model without the effect it belongs to"
+                f"format 'modelica' cannot represent '{which}', which acts on samples; export the"
+                " model without the effect it belongs to"
             )
         rows = _equations(eq)
         base = f"per unit of {load.power:.6g} MVA and {load.voltage:.6g} kV"

@@ -63,12 +63,9 @@ class PowerFactory(Format):
             c, t = load.circuit, self._machine_type(load)
             lines += [
                 "check the machine's type after the import, for no open reader names rrtrA, xrtrA"
-                " and J:"
-                f" {t['pgn']:.6g} kW and {t['ugn']:.6g} kV, Rs {c.R_s:.5g}, Xs {c.X_s:.5g}, Xm"
-                f" {c.X_m:.5g}, RrA"
-                f" {c.R_1:.5g}, XrA {c.X_1:.5g} pu, J {t['J']:.6g} kg m² (H {load.inertia:.5g} s);"
-                " its load torque is"
-                " constant (exponent 0)",
+                f" and J: {t['pgn']:.6g} kW and {t['ugn']:.6g} kV, Rs {c.R_s:.5g}, Xs {c.X_s:.5g},"
+                f" Xm {c.X_m:.5g}, RrA {c.R_1:.5g}, XrA {c.X_1:.5g} pu, J {t['J']:.6g} kg m² (H"
+                f" {load.inertia:.5g} s); its load torque is constant (exponent 0)",
             ]
         if "P_static" in load.steady_state:
             lines.append("take the load's type as static in RMS simulations: 0 % dynamic")

@@ -115,8 +115,7 @@ def require(eq, positive, X_prime, C, T_m):
     eq.require(
         1 - abs(sine),
         "no steady state exists before the event: Eq. (3) needs |2 T_m X'/(C U0²)| at most 1 and it"
-        " is {value:.3g};"
-        " lower T_m or X', or raise C",
+        " is {value:.3g}; lower T_m or X', or raise C",
         abs(sine),
     )
     require_physical(eq, positive, C)

@@ -100,8 +100,7 @@ class LineSideConverter(Motor):
     within_a_cycle = True
     waves_only = (
         "phasors show a converter's power and none of its control; take model/static=constant_power"
-        " with"
-        " model.effects=[voltage_dependent_power_limit,dc_link_lag]"
+        " with model.effects=[voltage_dependent_power_limit,dc_link_lag]"
     )
 
     def declare(

@@ -46,8 +46,7 @@ class Mechanical(Motor):
 
     phasors_only = (
         "its fluxes are in equilibrium with the voltage, which may hold over cycles and never"
-        " within one; take"
-        " model/motor=stator_flux or electromechanical, whose fluxes move"
+        " within one; take model/motor=stator_flux or electromechanical, whose fluxes move"
     )
 
     def declare(self, eq, T_prime, X_prime, C, M, T_m):

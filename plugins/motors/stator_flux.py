@@ -97,8 +97,7 @@ class StatorFlux(Motor):
         eq.require(
             1 - loading,
             "no steady state exists before the event: the load torque T_m is {value:.3g} times the"
-            " breakdown torque;"
-            " lower T_m, R_s or X', or raise C",
+            " breakdown torque; lower T_m, R_s or X', or raise C",
             loading,
         )
         return E_0 / speed, I_0, y

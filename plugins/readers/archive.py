@@ -37,8 +37,7 @@ class Archive(Reader):
         if not self.train:
             raise UserError(
                 f"{DATA.train} is empty: name events of {self.path} as FILE#LOAD.DIP; a survey"
-                " lists them:"
-                f" {survey_of(self.path)}"
+                f" lists them: {survey_of(self.path)}"
             )
         check_distinct(f"{DATA.train} and {DATA.validate}", [*self.train, *self.validate])
         folder = Path(self.path)

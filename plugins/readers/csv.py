@@ -123,8 +123,8 @@ class CSV(Tabular, Reader):
             if not isinstance(each, int) or isinstance(each, bool):
                 raise UserError(
                     f"{DATA.path}={self.path} is given, so {DATA.train} and {DATA.validate} are"
-                    " numbers of its dips, "
-                    f"and '{each}' is none; leave {DATA.path} out to read whole files"
+                    f" numbers of its dips, and '{each}' is none; leave {DATA.path} out to read"
+                    " whole files"
                 )
         check_numbers(self.train or None, self.validate)
 
@@ -227,9 +227,8 @@ class CSV(Tabular, Reader):
         if voltage is None and power is None and absolute_U and absolute_P is None:
             raise UserError(
                 f"{record.where}: U is in kV, and the unit of P and Q is not told; say"
-                f" {DATA.units}={{P: MW, Q: Mvar}} "
-                f"or {DATA.units}={{P: pu, Q: pu}}, or the base, {DATA.base_voltage} and"
-                f" {DATA.base_power}"
+                f" {DATA.units}={{P: MW, Q: Mvar}} or {DATA.units}={{P: pu, Q: pu}}, or the base,"
+                f" {DATA.base_voltage} and {DATA.base_power}"
             )
         chosen_by = None if self.base_power else earlier
         origin = chosen_by.origin if chosen_by else DECLARATION

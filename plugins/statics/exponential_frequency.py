@@ -31,8 +31,7 @@ class ExponentialFrequency(Static):
     reads = ("f",)
     phasors_only = (
         "its frequency is a recorded channel, and a waveform has none; take model/static=branch,"
-        " whose reactance"
-        " follows the frequency by itself"
+        " whose reactance follows the frequency by itself"
     )
 
     def law(self, u, f, p_v, q_v, p_f, q_f):

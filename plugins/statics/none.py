@@ -28,7 +28,6 @@ class NoStatic(Static):
         for power, name in ((P0, "active"), (Q0, "reactive")):
             sentence = (
                 f"a motor alone consumes {name} power, and before the event {power.name} is"
-                f" {{value:.3g}} pu;"
-                " choose a static load, such as model/static=exponential"
+                f" {{value:.3g}} pu; choose a static load, such as model/static=exponential"
             )
             yield power, sentence

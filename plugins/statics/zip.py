@@ -46,7 +46,7 @@ class Zip(Static):
                 yield share, f"{share.name} is a share and must not be negative: it is {{value:g}}"
             sentence = (
                 f"the shares of the {power} power must add up to 1: {impedance.name} +"
-                f" {current.name} is {{value:g}},"
-                " which leaves a negative share of constant power; lower one of them"
+                f" {current.name} is {{value:g}}, which leaves a negative share of constant power;"
+                " lower one of them"
             )
             yield 1 - impedance - current, sentence, impedance + current

@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 LIMITS = {
-    "nodes a line of code": 6.12,
+    "nodes a line of code": 6.26,
     "lines over 100 columns": 2,  # two of regular expressions and formats
     "lines that the formatter skips": 2,
     "functions called by a participle or a preposition": 2,
@@ -93,6 +93,15 @@ def count_nodes(node: ast.AST) -> int:
     return 1 + sum(map(count_nodes, children))
 
 
+def continuing_lines(node: ast.AST) -> range:
+    """The lines of a text behind its first: one node, however short its lines are cut."""
+    if isinstance(node, ast.JoinedStr) or (
+        isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ):
+        return range(node.lineno + 1, (node.end_lineno or node.lineno) + 1)
+    return range(0)
+
+
 def docstring(node: ast.AST) -> ast.stmt | None:
     if isinstance(node, ast.Module | ast.ClassDef | Function) and ast.get_docstring(node):
         return node.body[0]
@@ -128,11 +137,14 @@ def figures() -> dict[str, float]:
             if isinstance(node, ast.Import | ast.ImportFrom)
             for k in range(node.lineno, node.end_lineno + 1)
         }
+        texts = {k for node in nodes for k in continuing_lines(node)}
         functions = [node for node in nodes if isinstance(node, Function)]
         counts["lines"] += len(lines)
         counts["docstrings"] += len(told)
         counts["code"] += sum(
-            bool(line.strip()) and not line.strip().startswith("#") and k not in told | imports
+            bool(line.strip())
+            and not line.strip().startswith("#")
+            and k not in told | imports | texts
             for k, line in enumerate(lines, 1)
         )
         counts["nodes"] += count_nodes(tree)

@@ -276,8 +276,8 @@ class Investigation(Written):
         if not self.names:
             raise UserError(
                 f"there is no extended model: the verdict is '{self.verdict}', and nothing was"
-                " added; go on with the"
-                " base model (.question.model), or give records that show more"
+                " added; go on with the base model (.question.model), or give records that show"
+                " more"
             )
         # the latter of earlier versions
         window = self.content.get("recorder_window", self.content["phasor_window"])

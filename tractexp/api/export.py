@@ -223,8 +223,7 @@ class Export(Task, call=export, given=("fit",)):
         if self.parameters is None:
             raise UserError(
                 f"{TASK.parameters} is not given; it is the path of a result.json, or the folder of"
-                " the run that"
-                " wrote it"
+                " the run that wrote it"
             )
         fit = Identification(load(Path(self.parameters)))
         exported = self.perform(job, fit=fit)

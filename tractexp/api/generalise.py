@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 
 CAPTION = (
     "residuals: mean absolute value of Eq. (21), pu; medians over the seeds. estimate: the most"
-    " likely parameters;"
-    " beside it where each optimizer's search ended"
+    " likely parameters; beside it where each optimizer's search ended"
 )
 ARRAYS = ("t", "U", "P", "Q", "P_calculated", "Q_calculated")
 SEEDS_COMPARED = 10  # of the sweep that is advised
@@ -179,8 +178,7 @@ def generalise(
     if not setup.validate:
         raise UserError(
             f"{setting('task=generalise')} needs dips that are not fitted: name them in"
-            f" {DATA.validate}, a milder one "
-            "to interpolate and a deeper one to extrapolate"
+            f" {DATA.validate}, a milder one to interpolate and a deeper one to extrapolate"
         )
     chosen = Choice.several("optimizer", optimizers)
     tell(progress, setup.lines())

@@ -200,8 +200,7 @@ class Identification(Written):
         if self.setup is None:
             raise UserError(
                 "a result.json holds no records, so that this can predict but not be judged again;"
-                " call"
-                " tractexp.identify and save() its result"
+                " call tractexp.identify and save() its result"
             )
         return self.setup
 

@@ -170,8 +170,7 @@ def _fit_networks(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
     if len(boxes) <= of.order:
         raise UserError(
             f"{TASK.poles}={of.order}: the samples from the dips on are enough for"
-            f" {len(boxes) - 1}; ask for fewer "
-            "poles, or take a record that goes on longer"
+            f" {len(boxes) - 1}; ask for fewer poles, or take a record that goes on longer"
         )
     return boxes[-1], boxes
 

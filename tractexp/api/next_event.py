@@ -82,8 +82,7 @@ def sets_of(rivals: Any) -> list[list[str]]:
     if not files.there(path):
         raise UserError(
             f"{TASK.rivals}={rivals}: there is no such file; give names of effects, [a,b] or"
-            " [a,b+c], or the"
-            " discrepancy.json of an investigation that ended tied"
+            " [a,b+c], or the discrepancy.json of an investigation that ended tied"
         )
     investigation = files.read_json(path)
     if not isinstance(investigation, dict) or "verdict" not in investigation:
@@ -93,10 +92,8 @@ def sets_of(rivals: Any) -> list[list[str]]:
     if investigation.get("verdict") != "tied":
         raise UserError(
             f"{TASK.rivals}={rivals}: that investigation ended {investigation.get('verdict')}, not"
-            " tied, so that "
-            "there is nothing to tell apart; of a proposal the terms that are like it, and what to"
-            " record for them, "
-            "are in that file itself, as next_event"
+            " tied, so that there is nothing to tell apart; of a proposal the terms that are like"
+            " it, and what to record for them, are in that file itself, as next_event"
         )
     return investigation["name_sets"]
 

@@ -90,8 +90,7 @@ class Sampled(Written):
         c, s = self.content, self.settings
         effort = (
             f"{s['steps']} steps of {s['walkers']} walkers in {c['seconds']:.1f} s, acceptance"
-            f" {c['acceptance']:.2f},"
-            f" autocorrelation time {c['autocorrelation']:.0f} steps"
+            f" {c['acceptance']:.2f}, autocorrelation time {c['autocorrelation']:.0f} steps"
         )
         short = "note: the chain is shorter than 50 autocorrelation times; raise steps"
         return [effort] if c["converged"] else [effort, short]

@@ -270,8 +270,7 @@ def chosen(
     if missing := [name for name in names if name not in values]:
         raise UserError(
             f"no value for {', '.join(missing)}: give {TASK.parameters}=result.json of an"
-            " identification,"
-            f" or {TASK.values}={{{', '.join(f'{name}: ...' for name in missing)}}}"
+            f" identification, or {TASK.values}={{{', '.join(f'{name}: ...' for name in missing)}}}"
         )
     return np.array([values[name] for name in names], dtype=float)
 

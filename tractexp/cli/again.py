@@ -52,8 +52,7 @@ def build_repeat_command(arguments: list[str]) -> list[str]:
     if searched and chosen.config_dir is None:
         raise UserError(
             f"{folder} used configurations in {searched[0]}, which only you can name: where they"
-            " are yours, give"
-            f" {SEARCHED} {quoting.shell(searched[0])} too"
+            f" are yours, give {SEARCHED} {quoting.shell(searched[0])} too"
         )
     given = [SEARCHED, str(Path(chosen.config_dir).absolute())] if chosen.config_dir else []
     _enter(cwd, folder)
@@ -95,8 +94,8 @@ def _check_taken_over(text: str, folder: Path) -> None:
     if why := refusal(text):
         key = text.partition("=")[0]
         raise UserError(
-            f"{folder}: {key:.80} is not taken over from the folder of a run ({why}); where it"
-            " is meant, say so:"
+            f"{folder}: {key:.80} is not taken over from the folder of a run ({why}); where it is"
+            " meant, say so:"
             f" {quoting.shell('tractexp', 'again', str(folder), f'{_key(text):.80}=VALUE')}"
         )
 

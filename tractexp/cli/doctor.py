@@ -255,8 +255,8 @@ def runs(uri: str) -> Iterator[Finding]:
         yield (
             WRONG,
             f"run '{run.info.run_name}' ({run.info.run_id}) says it is running on {where}, which"
-            " cannot be told"
-            " from here; where it is not, run tractexp doctor there, or delete the run in MLflow",
+            " cannot be told from here; where it is not, run tractexp doctor there, or delete the"
+            " run in MLflow",
         )
     if not unknown:
         yield (

@@ -75,8 +75,8 @@ def so_far(stop: KeyboardInterrupt, place: RunFolder) -> str:
     )
     return (
         f"the best of {state.result.simulations} simulations so far, objective"
-        f" {state.result.objective:.4g} pu², is in"
-        f" {path}; it is neither polished nor judged, and not logged"
+        f" {state.result.objective:.4g} pu², is in {path}; it is neither polished nor judged, and"
+        " not logged"
     )
 
 

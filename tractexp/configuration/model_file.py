@@ -65,8 +65,7 @@ def _check_defaults(path: Path | str, defaults: Any) -> list[Any]:
         if not _is_choice_name(name) or (is_part and group not in PARTS):
             raise UserError(
                 f"{path}: its defaults have {item!s:.80}; they may name a choice of a model,"
-                f" {SELF},"
-                " or a part: motor: NAME, static: NAME"
+                f" {SELF}, or a part: motor: NAME, static: NAME"
             )
     return items
 

@@ -109,8 +109,7 @@ def _refuse_word(word: str) -> None:
 
     raise UserError(
         f"{' '.join(word.split()):.200} is no setting (KEY=VALUE), no command, and no file or"
-        " folder that is"
-        f" there{elsewhere('', word)}; tractexp --help shows what there is"
+        f" folder that is there{elsewhere('', word)}; tractexp --help shows what there is"
     )
 
 

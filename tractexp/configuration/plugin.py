@@ -137,8 +137,8 @@ def _check_source(cls: type[Any], where: str) -> None:
         return
     if sys.flags.optimize > 1:
         raise UserError(
-            "python -OO takes away the docstrings in which plugins name their sources; run"
-            " without -OO"
+            "python -OO takes away the docstrings in which plugins name their sources; run without"
+            " -OO"
         )
     raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
 
@@ -167,8 +167,7 @@ def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
                 if parameter.name != name:
                     raise UserError(
                         f"{where}: '{name}' is the parameter '{parameter.name}' again, and a"
-                        " parameter has one name;"
-                        " write it out a second time"
+                        " parameter has one name; write it out a second time"
                     )
                 parameter.check(f"{where}: {name}")
                 parameters[name] = parameter
@@ -292,8 +291,7 @@ def _check_decorated(module: ModuleType) -> None:
             raise UserError(
                 f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class"
                 f" {cls.__name__}({base.__name__}) is not decorated with @plugin, so nothing can"
-                " choose it; write"
-                " @plugin above it, or let its name start with an underscore"
+                " choose it; write @plugin above it, or let its name start with an underscore"
             )
 
 

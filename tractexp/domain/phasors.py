@@ -133,10 +133,8 @@ class PhasorDomain(Domain):
         """
         return (
             "It is estimated where nothing happens, from what the fit leaves there, and so contains"
-            " what smoothing"
-            " leaves of the voltage's noise. Time skew, measurement window and load drift are free"
-            " in every fit, each"
-            " held by what is physically likely."
+            " what smoothing leaves of the voltage's noise. Time skew, measurement window and load"
+            " drift are free in every fit, each held by what is physically likely."
         )
 
     def plan_event(

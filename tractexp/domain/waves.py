@@ -152,12 +152,10 @@ class WaveDomain(Domain):
         """Where noise is estimated, and which faults of the measurement are free, in sentences."""
         origin = (
             "It is estimated before the dip and at the end of the record, from what the fit leaves"
-            " there: harmonics"
-            " that no equation explains count as noise; noise of the voltage is passed on as the"
-            " model does. Beside it"
-            " each channel may keep a small offset, and how steep the voltage is at the samples of"
-            " an edge is known no"
-            " better than two curves through them agree."
+            " there: harmonics that no equation explains count as noise; noise of the voltage is"
+            " passed on as the model does. Beside it each channel may keep a small offset, and how"
+            " steep the voltage is at the samples of an edge is known no better than two curves"
+            " through them agree."
         )
         how = (
             "each held by what is likely"

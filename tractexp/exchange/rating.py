@@ -18,8 +18,8 @@ from tractexp.exchange.format import Identified
 from tractexp.identification.result import Result
 
 SOURCE = (
-    "IEEE Task Force on Load Representation 1995, IEEE Trans. Power Systems 10(3) 1302, seven"
-    " types of induction motor, from small industrial to air conditioners"
+    "IEEE Task Force on Load Representation 1995, IEEE Trans. Power Systems 10(3) 1302, seven types"
+    " of induction motor, from small industrial to air conditioners"
 )
 NOMINAL_SPEED = 2 * pi * 60  # rad/s, of the types
 # R_s, X_s, X_m, R_1, X_1 [pu of the rating], H [s]. The article itself was not at hand: R_s, X_s

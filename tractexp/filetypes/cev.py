@@ -89,8 +89,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     if opened.per_cycle < FEWEST_WAVE_RATE:
         remarks.add(
             f"{opened.per_cycle:g} samples a cycle: a filtered report; get the raw one of the relay"
-            " with the command "
-            "CEV R, or its COMTRADE file; its phasors are read by data=csv"
+            " with the command CEV R, or its COMTRADE file; its phasors are read by data=csv"
         )
     runs = timeline.from_stamps(t, 1e-9, str(path))
     moment = 0.0 if opened.marked is None else float(t[opened.marked])
@@ -159,13 +158,12 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     ):
         raise UserError(
             f"{path}: {len(opened.t)} samples, {opened.per_cycle:g} a cycle: phasors are read from"
-            " filtered reports of "
-            f"4 or 8; waveforms by data=sel data.path={path}"
+            f" filtered reports of 4 or 8; waveforms by data=sel data.path={path}"
         )
     remarks.add(
         f"a filtered report, {opened.per_cycle:g} samples a cycle: phasors from samples a quarter"
-        " of a cycle apart; "
-        "what changes within a cycle, the window of the relay's filter, does not show"
+        " of a cycle apart; what changes within a cycle, the window of the relay's filter, does not"
+        " show"
     )
     t = opened.t[quarter:]
     back = np.exp(-2j * np.pi * opened.nominal * t)
@@ -314,8 +312,7 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
     if not report.rows:
         raise UserError(
             f"{path}: no compressed event report: there is no row of column names with TRIG and"
-            " samples below it; get "
-            "it from the relay with the command CEV, or its COMTRADE file"
+            " samples below it; get it from the relay with the command CEV, or its COMTRADE file"
         )
     return report
 
@@ -382,8 +379,7 @@ def _samples(
                 break
             raise UserError(
                 f"{path}: line {line}: {len(cells)} cells, but {wanted} columns are named; correct"
-                " the line, or get "
-                "the file from the relay again"
+                " the line, or get the file from the relay again"
             )
         values.append(
             [
@@ -419,14 +415,14 @@ def _rate(path: Path, report: EventReport) -> tuple[float, float]:
     if per_cycle is None or not 1 <= per_cycle <= 10_000:
         raise UserError(
             f"{path}: SAM/CYC_A, the samples in a cycle, is"
-            f" {quote_field(report.about.get('SAM/CYC_A', ''))}, not a number "
-            "from 1 to 10000; correct it in the summary row"
+            f" {quote_field(report.about.get('SAM/CYC_A', ''))}, not a number from 1 to 10000;"
+            " correct it in the summary row"
         )
     if frequency is None or not LEAST <= frequency <= MOST:
         raise UserError(
             f"{path}: FREQ, the frequency of the summary row, is"
-            f" {quote_field(report.about.get('FREQ', ''))}, not a number "
-            "from 10 to 100 Hz; correct it there"
+            f" {quote_field(report.about.get('FREQ', ''))}, not a number from 10 to 100 Hz; correct"
+            " it there"
         )
     return per_cycle, frequency
 

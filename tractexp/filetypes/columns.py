@@ -92,25 +92,24 @@ def _by_word(words: Mapping[str, str]) -> dict[str, str]:
 WORDS: Mapping[str, str] = _by_word(
     {
         "t": (
-            "t time timestamp datetime zeit zeitpunkt uhrzeit zeitstempel clock temps tiempo "
-            "tempo tnow utc unixtime epoch время 时间 时刻"
+            "t time timestamp datetime zeit zeitpunkt uhrzeit zeitstempel clock temps tiempo tempo"
+            " tnow utc unixtime epoch время 时间 时刻"
         ),
         "soc": "soc century",
         "day": "date datum 日期 дата",
         "U": (
-            "u v vm um voltage volt volts vmag umag urms vrms u1l ul ull uln vll vln ulg vlg "
-            "uac vac umean vmean uavg vavg spannung leiterspannung vline uline vph uph "
-            "vphase uphase vpn upn 電圧 전압 напряжение напряж 电压 tension tensión voltaje "
-            "tensione"
+            "u v vm um voltage volt volts vmag umag urms vrms u1l ul ull uln vll vln ulg vlg uac"
+            " vac umean vmean uavg vavg spannung leiterspannung vline uline vph uph vphase uphase"
+            " vpn upn 電圧 전압 напряжение напряж 电压 tension tensión voltaje tensione"
         ),
         "I": "i im current curr irms strom ток 电流 courant corriente corrente",
         "P": (
-            "p ptot psum ptotal totw pload pl pelec plod powr ppq active real wirkleistung "
-            "активная 有功 有功功率"
+            "p ptot psum ptotal totw pload pl pelec plod powr ppq active real wirkleistung активная"
+            " 有功 有功功率"
         ),
         "Q": (
-            "q qtot qsum qtotal totvar qload ql qelec qlod vars qpq reactive blindleistung "
-            "реактивная 无功 无功功率"
+            "q qtot qsum qtotal totvar qload ql qelec qlod vars qpq reactive blindleistung"
+            " реактивная 无功 无功功率"
         ),
         "f": "f fe freq frequency fehz fq frequenz frq частота 频率",
         "dfdt": "dfdt df rocof dfreq",

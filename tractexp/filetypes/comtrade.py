@@ -110,8 +110,7 @@ def _read_combined(path: Path, encoding: str | None) -> Recording:
         lack = "CFG" if "CFG" not in parts else "DAT"
         raise UserError(
             f"{path}: no section {lack}: a .cff has headings like '--- file type: {lack} ---'; if"
-            " this is only the "
-            "configuration, name it .cfg and put its .dat beside it"
+            " this is only the configuration, name it .cfg and put its .dat beside it"
         )
     remarks = Remarks(str(path))
     text, encoding = decode(_configuration(parts["CFG"]), str(path), encoding)
@@ -264,8 +263,7 @@ def _stretches_by_stamps(
         rates = ", ".join(f"{s.segment.rate:g}" for s in result[:3])
         remarks.add(
             f"sampled at {rates} Hz, by the time stamps and the time multiplier"
-            f" {header.timemult:g}; if that is wrong, "
-            "correct the multiplier"
+            f" {header.timemult:g}; if that is wrong, correct the multiplier"
         )
     if len(result) > 1:
         gaps = ", ".join(f"{s.segment.start:.6g}" for s in result[1:6])

@@ -186,8 +186,7 @@ def _counts(rows: _Lines) -> tuple[int, int]:
         raise rows.refuse(
             line,
             f"announces {analogs + digitals} channels, but only {len(rows.rest)} lines follow;"
-            " correct the "
-            "numbers, or the file is cut short",
+            " correct the numbers, or the file is cut short",
         )
     if analogs == 0:
         raise rows.refuse(
@@ -210,8 +209,7 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
         raise rows.refuse(
             line,
             f"{channel} has {count_noun(len(fields), 'field')}, but an analog channel has 13, or 10"
-            " by the standard "
-            "of 1991; correct the line, or the numbers of channels in line 2",
+            " by the standard of 1991; correct the line, or the numbers of channels in line 2",
         )
     fields += [""] * (13 - len(fields))
     side = _read_side(rows, line, fields)
@@ -267,8 +265,8 @@ def _read_value(
     if parsed is None or abs(parsed) > GREATEST:
         raise rows.refuse(
             line,
-            f"{channel}: {what} {quote_field(field)} is not a number between -1e12 and"
-            " 1e12; correct it",
+            f"{channel}: {what} {quote_field(field)} is not a number between -1e12 and 1e12;"
+            " correct it",
         )
     return parsed
 
@@ -282,8 +280,7 @@ def _checked_ratio(rows: _Lines, line: int, channel: str, analog: Analog) -> Ana
         raise rows.refuse(
             line,
             f"{channel} is in secondary values, but {words}; write the ratio of its transformer"
-            " there, or P for "
-            "primary values",
+            " there, or P for primary values",
         )
     rows.remarks.add(f"secondary values, but {words}; 1/1 taken", line)
     return Analog(**{**vars(analog), "primary": 1.0, "secondary": 1.0})
@@ -300,9 +297,8 @@ def _digital(rows: _Lines, k: int, count: int) -> Digital:
         raise rows.refuse(
             line,
             f"status channel {k + 1} of {count} {name} has {count_noun(len(fields), 'field')}, but"
-            " a status channel "
-            "has 5, or 3 by the standard of 1991; correct the line, or the numbers of channels in"
-            " line 2",
+            " a status channel has 5, or 3 by the standard of 1991; correct the line, or the"
+            " numbers of channels in line 2",
         )
     if len(fields) == 5:
         name, phase, circuit = fields[1:4]
@@ -329,8 +325,7 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
         raise rows.refuse(
             line,
             f"{quote_field(text)} where the nominal frequency should be; more lines of channels may"
-            " be there than line 2 "
-            "announces, or the frequency is missing",
+            " be there than line 2 announces, or the frequency is missing",
         )
     if parsed == 0 or not text.strip(", "):
         rows.remarks.add(
@@ -344,8 +339,7 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
         raise rows.refuse(
             line,
             f"nominal frequency {quote_field(text)} is not a number between {low:g} and {high:g}"
-            " Hz; write that of "
-            "the network there, 50 or 60",
+            " Hz; write that of the network there, 50 or 60",
         )
     header.frequency = parsed
     return _rate_count(rows)
@@ -380,8 +374,8 @@ def _rates(rows: _Lines, header: Header, count: int | None) -> None:
         if end < last or end < 1:
             raise rows.refuse(
                 line,
-                f"last sample {end:g} must be above zero, and above {last},"
-                " that of the line before",
+                f"last sample {end:g} must be above zero, and above {last}, that of the line"
+                " before",
             )
         header.rates.append((rate, int(end)))
     if count is not None and read != max(count, 1):
@@ -397,8 +391,8 @@ def _check_rates(rows: _Lines, header: Header) -> None:
         listed = ", ".join(f"{rate:g}" for rate, _ in header.rates)
         raise rows.refuse(
             header.lines["rates"],
-            f"sampling rates {listed} Hz: a rate of 0 means that time stamps are valid, and "
-            "must be the only one",
+            f"sampling rates {listed} Hz: a rate of 0 means that time stamps are valid, and must be"
+            " the only one",
         )
 
 

@@ -98,8 +98,7 @@ def read(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
         if b"\0" in place.content(4096).rstrip(b"\0\x1a"):
             raise UserError(
                 f"{place.path}: not text, but line {header.lines['kind']} of the configuration says"
-                " ASCII; write "
-                "BINARY, BINARY32 or FLOAT32 there"
+                " ASCII; write BINARY, BINARY32 or FLOAT32 there"
             )
         return _text(place, header, remarks)
     return _binary(place, header, remarks)
@@ -146,10 +145,9 @@ def _enough(
     if present < 1 or announced - present > max(1, LACKING * announced):
         raise UserError(
             f"{place.path}: cut short: {announced} samples of {len(header.analogs)} analog and"
-            f" {len(header.digitals)} "
-            f"status channels take {wanted} {unit}, and the file has {there}; get the whole file,"
-            " or correct the last "
-            f"sample in line {header.lines['rates']} of the configuration"
+            f" {len(header.digitals)} status channels take {wanted} {unit}, and the file has"
+            f" {there}; get the whole file, or correct the last sample in line"
+            f" {header.lines['rates']} of the configuration"
         )
     remarks.add(
         f"{place.path.name} holds {present} of the {announced} samples announced; those are read"
@@ -170,12 +168,10 @@ def _check_sample_numbers(place: ByteRange, header: Header, numbers: np.ndarray)
         i = int(wild[0]) if len(wild) else 0
         raise UserError(
             f"{place.path}: sample {i + 2}: its number is {numbers[i + 1]} after {numbers[i]}: the"
-            " rows are not "
-            f"{header.kind} of {len(header.analogs)} analog and {len(header.digitals)} status"
-            " channels, or bytes were "
-            "lost or added before it; correct the channels or the type of the data file in the"
-            " configuration, or get "
-            "the file again"
+            f" rows are not {header.kind} of {len(header.analogs)} analog and"
+            f" {len(header.digitals)} status channels, or bytes were lost or added before it;"
+            " correct the channels or the type of the data file in the configuration, or get the"
+            " file again"
         )
 
 
@@ -276,9 +272,8 @@ def _check_width(
             break
         raise UserError(
             f"{place.path}: line {n}: {text.count(b',') + 1} cells, but {width} are announced:"
-            " number, time, and "
-            "one for each channel; correct the line, or the numbers of channels in the"
-            " configuration"
+            " number, time, and one for each channel; correct the line, or the numbers of channels"
+            " in the configuration"
         )
     return rows
 
@@ -304,8 +299,7 @@ def _cell(place: ByteRange, line: int, k: int, cell: bytes) -> float:
         what = ("sample number", "time stamp")[k] if k < 2 else f"channel {k - 1}"
         raise UserError(
             f"{place.path}: line {line}: {what} {quote_field(text)} is not a number, up to 1e38;"
-            " correct it, or leave "
-            "the cell empty for a missing value"
+            " correct it, or leave the cell empty for a missing value"
         )
     return value
 
@@ -318,8 +312,7 @@ def _steps(place: ByteRange, numbers: np.ndarray, remarks: Remarks) -> None:
         i = int(odd[0])
         remarks.add(
             f"{place.path.name}: sample number {numbers[i + 1]:g} follows {numbers[i]:g}: a sample"
-            " may be missing or "
-            "double there, and times after it off by a step"
+            " may be missing or double there, and times after it off by a step"
         )
 
 

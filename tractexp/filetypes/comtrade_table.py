@@ -87,8 +87,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     if len(recording.segments) > 1:
         notes.append(
             f"{len(recording.segments)} stretches of samples: the longest is read, {segment.rate:g}"
-            " Hz from "
-            f"{segment.start:.3f} s"
+            f" Hz from {segment.start:.3f} s"
         )
     rows = Rows.from_columns(
         path, [(name, unit, np.asarray(v, float)) for name, unit, v in columns], 1, tuple(notes)

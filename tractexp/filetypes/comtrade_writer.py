@@ -147,8 +147,7 @@ def _times(recording: Recording) -> tuple[list[tuple[float, int]], np.ndarray, f
         if len(stamps) != count:
             raise UserError(
                 f"{recording.source}: its segments leave samples out, and it has no time stamps: it"
-                " cannot be written "
-                "as COMTRADE; write it as a table"
+                " cannot be written as COMTRADE; write it as a table"
             )
         return [(0.0, count)], stamps, timemult
     if len(stamps) != count:

@@ -57,8 +57,8 @@ def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
     if not told or not is_near_direct_nominal(direct.mean):
         return ""
     return (
-        f"{said}; that it is no RMS value is told by {1000 * direct.mean:.4g} V, near a nominal"
-        " one of direct current, without Q or angles: if it is one, add Q"
+        f"{said}; that it is no RMS value is told by {1000 * direct.mean:.4g} V, near a nominal one"
+        " of direct current, without Q or angles: if it is one, add Q"
     )
 
 

@@ -65,9 +65,8 @@ def _find_first_values(rows: Sequence[Sequence[Any]], source: str, header: int |
         raise UserError(f"{source}: there are no rows below the header line")
     above = "" if header is None else f" below the header line {header + 1}"
     raise UserError(
-        f"{source}: there are no rows of numbers{above}; a table has a line that names its"
-        " columns, "
-        "such as t,U,P,Q, and rows of numbers below it"
+        f"{source}: there are no rows of numbers{above}; a table has a line that names its columns,"
+        " such as t,U,P,Q, and rows of numbers below it"
     )
 
 

@@ -194,8 +194,7 @@ def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
         if not is_unit(amount(str(unit))[1]):
             raise UserError(
                 f"{DATA.units}: {quantity}={unit} is not a unit; one is e.g. kV, V, kA, A, MW, kW,"
-                " Mvar, Hz, s, ms, "
-                "deg, rad, pu"
+                " Mvar, Hz, s, ms, deg, rad, pu"
             )
         if not fits(quantity, str(unit), exact=True):
             raise UserError(
@@ -442,9 +441,9 @@ def _kind(
         if kind == "waves" and not _oscillates(table, options, keys):
             named = ", ".join(options[key][0].label for key in keys)
             raise UserError(
-                f"{table.source}: the columns {named} hold magnitudes without angles, and "
-                "there are none of P and Q: the load's power does not follow from them; add P"
-                " and Q, or the angles"
+                f"{table.source}: the columns {named} hold magnitudes without angles, and there are"
+                " none of P and Q: the load's power does not follow from them; add P and Q, or the"
+                " angles"
             )
         return kind, [*times, *keys]
     raise UserError(_describe_missing_columns(table, options, kinds))
@@ -583,16 +582,14 @@ def _describe_missing_columns(
     if not names:
         return (
             f"{table.source}: no line names the columns; add one, such as t,U,P,Q, or name them by"
-            " number, from 0: "
-            f"{DATA.columns}={{t: 0, U: 1, P: 2, Q: 3}}"
+            f" number, from 0: {DATA.columns}={{t: 0, U: 1, P: 2, Q: 3}}"
         )
     listed = f"the header line names {', '.join(names)}"
     if groups and "t" in options:
         return (
             f"{table.source}: what {DATA.columns} names makes no table of powers, phasors or"
-            " waveforms with the "
-            f"others; {listed}; name all that are needed: {DATA.columns}={{t: ..., U: ..., P: ...,"
-            f" Q: ...}}"
+            f" waveforms with the others; {listed}; name all that are needed: {DATA.columns}={{t:"
+            f" ..., U: ..., P: ..., Q: ...}}"
         )
     missing = [] if "t" in options else ["t"]
     if not groups:
@@ -651,9 +648,8 @@ def _check_unit(table: TableFile, one: MappedColumn) -> None:
     if one.role.unit and is_unit(one.role.unit) and not fits(quantity, one.role.unit):
         raise UserError(
             f"{table.source}: column {one.label} is read as {one.role.key}, of which"
-            f" {one.role.unit} is no unit; say "
-            f"another column, {DATA.columns}={{{one.role.key}: ...}}, or the unit, "
-            f"{DATA.units}={{{quantity}: {OF.get(quantity, ('',))[0]}}}"
+            f" {one.role.unit} is no unit; say another column, {DATA.columns}={{{one.role.key}:"
+            f" ...}}, or the unit, {DATA.units}={{{quantity}: {OF.get(quantity, ('',))[0]}}}"
         )
 
 

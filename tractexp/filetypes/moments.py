@@ -147,10 +147,9 @@ def _of_days(table: TableFile, values: np.ndarray, since: str) -> TableTimes:
     if (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1
         raise UserError(
-            f"{table.source}: {table.place(i)}: times are days since {since}, of too few "
-            f"digits: {values[i]:.12g} follows {values[i - 1]:.12g}; ten decimals give 10"
-            " microseconds: show them in "
-            "the sheet, or the time as hh:mm:ss.000, and save again"
+            f"{table.source}: {table.place(i)}: times are days since {since}, of too few digits:"
+            f" {values[i]:.12g} follows {values[i - 1]:.12g}; ten decimals give 10 microseconds:"
+            " show them in the sheet, or the time as hh:mm:ss.000, and save again"
         )
     start = ZERO_DAY + dt.timedelta(days=float(values[0]))
     return TableTimes(
@@ -178,8 +177,8 @@ def _with_fractions(
     if not by > 0 or fractions.min(initial=0.0) < 0 or fractions.max(initial=0.0) * by >= 1 + 1e-9:
         raise UserError(
             f"{table.source}: {label} holds no fractions of the seconds beside it: up to"
-            f" {fractions.max():g}; leave "
-            f"it out, {DATA.columns}={{frac: null}}, or say its unit in its heading: ms, us or ns"
+            f" {fractions.max():g}; leave it out, {DATA.columns}={{frac: null}}, or say its unit in"
+            " its heading: ms, us or ns"
         )
     t = whole.t + fractions * by
     start = whole.start and whole.start + dt.timedelta(seconds=float(t[0] - whole.t[0]))

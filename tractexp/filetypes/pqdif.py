@@ -112,8 +112,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     if not stretches:
         raise UserError(
             f"{path}: there are no waveforms in this PQDIF file; logs of voltage, P and Q are read"
-            " as a table: "
-            f"data=csv data.path={path}"
+            f" as a table: data=csv data.path={path}"
         )
     segments, evened = _segments(str(path), stretches)
     start = content.observations[0].start
@@ -282,8 +281,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     if not stretches:
         raise UserError(
             f"{path}: there are no logs of RMS values or powers in this PQDIF file; its waveforms"
-            " are read by "
-            f"data=pqdif data.path={path}"
+            f" are read by data=pqdif data.path={path}"
         )
     fullest = _fullest(stretches, remarks)
     t, columns = _longest(fullest, remarks)

@@ -348,8 +348,8 @@ class Observed:
         if self.room < 0:
             raise UserError(
                 f"{one.own.body.where}: the file's series stand for more than"
-                f" {MOST_UNPACKED_VALUES:,} values; give a part of it, or "
-                "the event that is meant, exported by the recorder's software"
+                f" {MOST_UNPACKED_VALUES:,} values; give a part of it, or the event that is meant,"
+                " exported by the recorder's software"
             )
 
 

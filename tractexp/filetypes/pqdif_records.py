@@ -295,8 +295,7 @@ def _tell_unreached(data: bytes, reached: Mapping[int, int], remarks: Remarks) -
             what = count_noun(found, "record") if found else f"{len(between)} bytes"
             remarks.add(
                 f"no link leads to {what} from byte {end} on: they are not read; where the recorder"
-                " did not delete "
-                "them, a link is damaged: get the file again"
+                " did not delete them, a link is damaged: get the file again"
             )
         end = max(end, stop)
 
@@ -310,9 +309,8 @@ def _compression(container: Collection, where: str) -> bool:
     if (style, algorithm) != (PER_RECORD, ZLIB):
         raise UserError(
             f"{where}: compression style {style:g}, algorithm {algorithm:g}; read are {PER_RECORD}"
-            " (each record) with "
-            f"{ZLIB} (zlib), and no compression: save the file as PQDIF 1.5 with the recorder's"
-            " software"
+            f" (each record) with {ZLIB} (zlib), and no compression: save the file as PQDIF 1.5"
+            " with the recorder's software"
         )
     return True
 

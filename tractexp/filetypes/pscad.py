@@ -39,8 +39,7 @@ class Results(TableFile):
         if len(names) != len(channels):
             raise UserError(
                 f"{source}: its .inf file names {len(names)} channels, and the .out files have"
-                f" {len(channels)}; "
-                "keep those of one run in a folder"
+                f" {len(channels)}; keep those of one run in a folder"
             )
         self.heading = TableHeading(
             ("t", *(name for name, _ in names)), ("s", *(unit for _, unit in names)), 0, 0
@@ -92,8 +91,7 @@ def table(path: Path, form: TableForm) -> Results:
     if names is None:
         raise UserError(
             f"{path} is a simulator's output without names: PSCAD writes them to {case}.inf beside"
-            " it, which is not "
-            "there; export that of another simulator as .csv"
+            " it, which is not there; export that of another simulator as .csv"
         )
     parts = [_columns(each, form) for each in beside if each == path or _is_part(each, number)]
     return Results(str(path), parts, _names(names, form.encoding))

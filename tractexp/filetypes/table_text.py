@@ -264,8 +264,7 @@ class TextTable(TableFile):
             )
         return UserError(
             f"{self.source}: line {line} has {count_noun(cells, 'cell')} where the others have"
-            f" {self.width}; a "
-            "gap in P or Q is written nan"
+            f" {self.width}; a gap in P or Q is written nan"
         )
 
 

@@ -171,8 +171,8 @@ def powers(
     else:
         raise UserError(
             f"{table.source} holds waveforms"
-            f" ({', '.join(c.label for c in mapping.columns.values())}), not powers; "
-            f"read it as such: data=waveforms data.path={table.source}"
+            f" ({', '.join(c.label for c in mapping.columns.values())}), not powers; read it as"
+            f" such: data=waveforms data.path={table.source}"
         )
     if reverse:
         result.columns["P"], result.columns["Q"] = -result.columns["P"], -result.columns["Q"]
@@ -295,8 +295,7 @@ def _check_power_units(table: TableFile, mapping: Mapped) -> None:
         units = ", ".join(f"{letter}: {unit}" for letter, unit in (("P", "MW"), ("Q", "Mvar")))
         raise UserError(
             f"{table.source}: {bare[0].label} has no unit, and other columns of P and Q have one;"
-            " say them, e.g. "
-            f"{DATA.units}={{{units}}}"
+            f" say them, e.g. {DATA.units}={{{units}}}"
         )
 
 
@@ -531,8 +530,7 @@ def _radians(
         return 1.0, ["angles taken as rad, for the phases are 2 pi/3 apart"]
     raise UserError(
         f"{table.source}: {next(iter(angles.values())).label} has no unit, and its values suit"
-        " degrees and rad: "
-        f"say {DATA.units}={{angle: deg}} or {DATA.units}={{angle: rad}}"
+        f" degrees and rad: say {DATA.units}={{angle: deg}} or {DATA.units}={{angle: rad}}"
     )
 
 

@@ -69,8 +69,8 @@ def _refuse_wild(table: TableFile, cells: Mapping[int, TableColumn]) -> None:
             raise table.refuse(
                 i,
                 k,
-                f"{column.values[i]:g} is not a value up to {HUGE:g}; leave the row out, or"
-                " correct it",
+                f"{column.values[i]:g} is not a value up to {HUGE:g}; leave the row out, or correct"
+                " it",
             )
 
 
@@ -94,10 +94,9 @@ def _refuse_other_rates(table: TableFile, numbers: Sequence[int]) -> None:
         if any(there):
             raise UserError(
                 f"{table.source}: column {table.label(number)} has a number in {sum(there)} of its"
-                f" first {len(there)}"
-                " rows only; voltage and current of one record are sampled at the same times: keep"
-                " the rows that have"
-                " all of them, or interpolate what was sampled more slowly"
+                f" first {len(there)} rows only; voltage and current of one record are sampled at"
+                " the same times: keep the rows that have all of them, or interpolate what was"
+                " sampled more slowly"
             )
 
 
@@ -136,8 +135,7 @@ def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]
             i = first + int(off.argmax())
             raise UserError(
                 f"{table.source}: {table.place(i)}: sampling is not uniform: t = {t[i]:.9g} s is"
-                f" {off.max():.2g} steps "
-                "off the uniform grid; waveforms must be sampled evenly"
+                f" {off.max():.2g} steps off the uniform grid; waveforms must be sampled evenly"
             )
         widest = max(widest, float(off.max()))
         segments.append(Segment(first, stop, 1 / step, float(t[first] - t[0])))
@@ -166,6 +164,5 @@ def _check_times(table: TableFile, t: np.ndarray) -> None:
         i = int(np.argmax(still)) + 1
         raise UserError(
             f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after"
-            f" {t[i - 1]:.9g} s; give "
-            f"the unit of time ({DATA.units}={{t: ms}}), or more digits"
+            f" {t[i - 1]:.9g} s; give the unit of time ({DATA.units}={{t: ms}}), or more digits"
         )

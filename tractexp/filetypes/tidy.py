@@ -90,9 +90,8 @@ def restore_recording(path: str, content: Mapping[str, Any]) -> Recording:
         if len(table.heading.names) != 1 + len(channels) + len(status):
             raise UserError(
                 f"{path}: has {len(table.heading.names)} columns where its sidecar names t,"
-                f" {len(channels)} "
-                f"channels and {len(status)} status channels; convert the recording again, or"
-                " remove the sidecar"
+                f" {len(channels)} channels and {len(status)} status channels; convert the"
+                " recording again, or remove the sidecar"
             )
         cells = table.read({k: "gaps" for k in range(1, len(table.heading.names))})
         segments = [Segment(**one) for one in content["segments"]]
@@ -131,8 +130,7 @@ def _check_segments(path: str, segments: Sequence[Segment], rows: int) -> None:
         ):
             raise UserError(
                 f"{path}: has {rows} rows, and its sidecar of samples {one.first} to {one.stop} at"
-                f" {one.rate} Hz; "
-                "convert the recording again, or remove the sidecar"
+                f" {one.rate} Hz; convert the recording again, or remove the sidecar"
             )
         edges.append(one.stop)
     if len(edges) == 1:

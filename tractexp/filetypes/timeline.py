@@ -87,9 +87,8 @@ def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
         i = int(np.argmax(~(steps > 0)))
         raise UserError(
             f"{where}: sample {i + 2}: its time stamp {t[i + 1]:g} s is not after {t[i]:g} s of the"
-            " sample before, and "
-            "the sampling rate is declared as 0, so that the time stamps must be valid; write the"
-            " rate into the .cfg"
+            " sample before, and the sampling rate is declared as 0, so that the time stamps must"
+            " be valid; write the rate into the .cfg"
         )
     stretches = [
         _build_stamped_stretch(t, unit, first, stop)
@@ -111,8 +110,7 @@ def _runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
         i = int(breaks[0])
         raise UserError(
             f"{where}: sample {i + 1}: time stamps without order: a step of {steps[i]:g} s follows"
-            " one of "
-            f"{steps[i - 1]:g} s, and {len(breaks) - 1} more are like it"
+            f" one of {steps[i - 1]:g} s, and {len(breaks) - 1} more are like it"
         )
     edges = [0, *breaks.tolist(), len(steps)]
     runs: list[tuple[int, int]] = []

@@ -367,8 +367,7 @@ class _Emitter:
             n.store(value, f.offset_address(x, k * self.width))
         f.do(
             f"call void %steady(ptr @rest, ptr {self.event_at}, ptr {self.copied}, ptr {x}, ptr"
-            f" {left}, ptr {work},"
-            f" i64 {states})"
+            f" {left}, ptr {work}, i64 {states})"
         )
         solution = [n.load(f.offset_address(x, k * self.width)) for k in range(states)]
         return [*solution, *starts[states:]], n.smaller(

@@ -88,8 +88,7 @@ class Expressions:
         functions = ", ".join(sorted(kind.__name__ for kind in (*OURS, *LLVMS)))
         raise UserError(
             f"the equations contain {type(e).__name__}, in {e}, which kernels cannot compute; write"
-            " it by sums,"
-            f" products, powers, Max, Min, Piecewise, sign, Heaviside or {functions}"
+            f" it by sums, products, powers, Max, Min, Piecewise, sign, Heaviside or {functions}"
         )
 
     # Sums, products, powers

@@ -110,8 +110,7 @@ class Kernel:
         if candidates.ndim != 3 or inputs.ndim != 2 or inputs.shape[0] not in rows:
             raise ValueError(
                 f"candidates {candidates.shape} and inputs {inputs.shape} must have shapes (events,"
-                f" {room.given},"
-                f" n) and ({rows[0]} or {rows[1]}, samples)"
+                f" {room.given}, n) and ({rows[0]} or {rows[1]}, samples)"
             )
         (events, _, n), samples = candidates.shape, inputs.shape[1]
         _check("candidates", candidates, (events, room.given, n))

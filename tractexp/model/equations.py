@@ -306,8 +306,7 @@ class Equations:
         if not _is_real(left):
             raise UserError(
                 f"the site {site.name} is real, and what the {self._writer} puts there is not:"
-                f" {expression}; take its"
-                " real part by sympy.re"
+                f" {expression}; take its real part by sympy.re"
             )
 
     def _plainly_real(self, expression: sympy.Expr) -> bool:

@@ -19,12 +19,10 @@ def check_name(name: str, where: str = "a model") -> None:
     if not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
         raise UserError(
             f"{where} cannot have a parameter, state or memory called '{name}': that is no name of"
-            " Python's, or begins"
-            " with an underscore; choose another one"
+            " Python's, or begins with an underscore; choose another one"
         )
     if name in GIVEN:
         raise UserError(
             f"{where} cannot have a parameter, state or memory called '{name}': the equations give"
-            " that name to"
-            " something else; choose another one"
+            " that name to something else; choose another one"
         )

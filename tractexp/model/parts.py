@@ -319,8 +319,7 @@ class Effect(Part):
         if not sizes:
             raise UserError(
                 f"{where} has no size: give the parameter that says how large the effect is a"
-                " 'null', the value at"
-                " which the equations are as if it were absent"
+                " 'null', the value at which the equations are as if it were absent"
             )
         settings = own.keys() - sizes
         _check_names(

@@ -78,8 +78,8 @@ def loss(record: Record, end: int, S: complex) -> list[str]:
         return []
     return [
         f"the load loses {100 * (1 - abs(left) / abs(S)):.0f} % of its power in the dip"
-        f" ({from_to(record, S, left)}): "
-        "it trips, which a model without the effect undervoltage_trip cannot follow"
+        f" ({from_to(record, S, left)}): it trips, which a model without the effect"
+        " undervoltage_trip cannot follow"
     ]
 
 

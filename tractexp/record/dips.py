@@ -121,15 +121,14 @@ def check_load(where: str, U: float, S: float = 0.0) -> None:
     if not low <= U <= high:
         raise UserError(
             f"{where}: the voltage before the first dip is {U:.4g} kV, and a network's is at most"
-            f" {high:g} kV; if the "
-            f"numbers are in V, say so: {DATA.units}={{U: V}}"
+            f" {high:g} kV; if the numbers are in V, say so: {DATA.units}={{U: V}}"
         )
     if np.sqrt(3) * U * GREATEST_CURRENT < S:
         raise UserError(
             f"{where}: {S:.4g} MVA at {U:.4g} kV before the first dip is a current of"
-            f" {S / np.sqrt(3) / U:.4g} kA, "
-            f"and no load draws as much; say the units of voltage and of current or power, such as "
-            f"{DATA.units}={{U: kV, I: A}} or {DATA.units}={{U: kV, P: kW, Q: kvar}}"
+            f" {S / np.sqrt(3) / U:.4g} kA, and no load draws as much; say the units of voltage and"
+            f" of current or power, such as {DATA.units}={{U: kV, I: A}} or {DATA.units}={{U: kV,"
+            f" P: kW, Q: kvar}}"
         )
 
 

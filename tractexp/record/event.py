@@ -160,8 +160,8 @@ def detect(record: Record) -> Event:
     if start < FEWEST_BEFORE:
         raise UserError(
             f"{record.where}: the dip starts at sample {start + 1} (t = {record.t[start]:g} s): the"
-            " steady state "
-            f"before it needs at least {FEWEST_BEFORE} samples; give a record that starts earlier"
+            f" steady state before it needs at least {FEWEST_BEFORE} samples; give a record that"
+            " starts earlier"
         )
     if reason := no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {reason}")
@@ -175,9 +175,8 @@ def detect(record: Record) -> Event:
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(
             f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the"
-            f" {before.stop - before.start} "
-            f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be"
-            " computed"
+            f" {before.stop - before.start} samples before the dip at t = {record.t[start]:g} s;"
+            " the steady state cannot be computed"
         )
     U0, P0, Q0 = float(U.mean()), float(np.nanmean(P)), float(np.nanmean(Q))
     swing = find_swing(record, before)
@@ -238,9 +237,9 @@ def describe(event: Event) -> str:
     """The line that a run prints about its record; a second sentence notes anything unusual."""
     record = event.record
     sentence = (
-        f"{record.name}: dip of {100 * event.depth:.0f} % lasting {1000 * event.duration:.0f} ms "
-        f"at t = {event.t_start:.3f} s, "
-        f"{event.start} samples before it, {event.rate:.0f} Hz, noise {_noise(event)}"
+        f"{record.name}: dip of {100 * event.depth:.0f} % lasting {1000 * event.duration:.0f} ms at"
+        f" t = {event.t_start:.3f} s, {event.start} samples before it, {event.rate:.0f} Hz, noise"
+        f" {_noise(event)}"
     )
     odd = []
     if event.dips > 1:

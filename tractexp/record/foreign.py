@@ -20,8 +20,7 @@ FOREIGN = {
     ".mat": "a MATLAB file: write its signals as columns with writetable (.csv) or parquetwrite"
     " (.parquet)",
     ".eve": "an SEL event report as text for people: get the compressed one with the command CEV R"
-    " (.cev), or the "
-    "relay's COMTRADE file",
+    " (.cev), or the relay's COMTRADE file",
     ".h5": "HDF5, whose layout is everybody's own: write its signals as columns of a .csv or"
     " .parquet",
     ".hdf5": "HDF5, whose layout is everybody's own: write its signals as columns of a .csv or"

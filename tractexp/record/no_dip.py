@@ -27,20 +27,19 @@ def no_such_dip(record: Record, start: int, end: int) -> str:
     if _current_stays(record, start, end):
         return (
             f"the voltage falls to {lowest:.3g} {when} while the current stays as it was: a fuse of"
-            " the voltage "
-            "transformers, or their wiring, and no dip of the network; choose another event"
+            " the voltage transformers, or their wiring, and no dip of the network; choose another"
+            " event"
         )
     if lowest < DEAD_VOLTAGE_SHARE * before:
         if end < len(U):
             return (
                 f"the voltage is gone from t = {t[start]:g} to {t[end]:g} s (U falls to"
-                f" {lowest:.3g}): an "
-                "interruption, no dip, after which loads start anew; choose another event"
+                f" {lowest:.3g}): an interruption, no dip, after which loads start anew; choose"
+                " another event"
             )
         return (
             f"the voltage is gone from t = {t[start]:g} s on (U falls to {lowest:.3g}): the line is"
-            " dead, which is no "
-            "dip; choose another event"
+            " dead, which is no dip; choose another event"
         )
     if record.U2 is not None:
         unbalanced = record.U2[start:end] > OPEN_POLE * inside
@@ -48,17 +47,15 @@ def no_such_dip(record: Record, start: int, end: int) -> str:
             share = float(np.median(record.U2[start:end][unbalanced] / inside[unbalanced]))
             return (
                 f"U2 is {100 * share:.3g} % of U for"
-                f" {np.count_nonzero(unbalanced) * record.step:.2g} s {when}, longer "
-                "than a fault lasts: one pole is open, which is no dip of all phases; choose"
-                " another event"
+                f" {np.count_nonzero(unbalanced) * record.step:.2g} s {when}, longer than a fault"
+                " lasts: one pole is open, which is no dip of all phases; choose another event"
             )
     if end == len(U):
         return _explain_unfinished_fall(record, start, before)
     if record.rate < COARSE and end - start < FEWEST_INSIDE:
         return (
             f"the dip {when} has {end - start} samples at {record.rate:.3g} Hz: too coarse to show"
-            " a response; give a "
-            f"record of at least {COARSE:g} Hz"
+            f" a response; give a record of at least {COARSE:g} Hz"
         )
     return ""
 
@@ -100,13 +97,13 @@ def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
     if fall <= LARGEST_TAP_STEP and lasts >= STEP_LASTS and level.mean() > 0.8:
         return (
             f"the voltage falls by {100 * fall:.3g} % at t = {t[start]:g} s and stays there for the"
-            f" {lasts:.2g} s that "
-            "remain: a step (a tap changer, or something switched), no dip; choose another event"
+            f" {lasts:.2g} s that remain: a step (a tap changer, or something switched), no dip;"
+            " choose another event"
         )
     return (
         f"the record is shorter than the dip: it ends at t = {t[-1]:g} s with U = {U[-1]:.3g} where"
-        " it was "
-        f"{before:.3g} before the dip of t = {t[start]:g} s; give a record that shows the recovery"
+        f" it was {before:.3g} before the dip of t = {t[start]:g} s; give a record that shows the"
+        " recovery"
     )
 
 
@@ -125,15 +122,13 @@ def no_dip(record: Record) -> str:
     if fall <= margin:
         sentence = (
             f"{start} at most {100 * fall:.3g} % below it (t = {t[low]:g} s), but a dip must exceed"
-            " "
-            f"{100 * SHALLOWEST:g} % and the noise"
+            f" {100 * SHALLOWEST:g} % and the noise"
         ) + (f", here {100 * margin:.3g} %" if margin > SHALLOWEST else "")
     else:
         sentence = f"{start} by {100 * fall:.3g} % (t = {t[low]:g} s), but slowly: a ramp, no dip"
     if rise > margin:
         sentence += (
             f"; it rises by {100 * rise:.3g} % at t = {t[high]:g} s: a swell is not fitted, and a"
-            " record that "
-            "starts inside a dip lacks the steady state before it"
+            " record that starts inside a dip lacks the steady state before it"
         )
     return sentence

@@ -108,10 +108,9 @@ def on_own_base(events: Sequence[Event]) -> list[Event]:
             which, other = (first, record) if own.in_mva else (record, first)
             raise UserError(
                 f"{other.where} does not say how many MVA one per unit is, and {which.where} is per"
-                " unit of"
-                f" {which.file_base.power:g} MVA, so that they cannot be put on one base; say it of"
-                " both"
-                f" ({DATA.base_power} in MVA, with {DATA.units}={{P: pu, Q: pu}}), or of none"
+                f" unit of {which.file_base.power:g} MVA, so that they cannot be put on one base;"
+                f" say it of both ({DATA.base_power} in MVA, with {DATA.units}={{P: pu, Q: pu}}),"
+                " or of none"
             )
     return [own.convert_event(event) for event in events]
 
@@ -140,9 +139,8 @@ def convert_base(event: Event, ratio: float, own: OwnBase) -> Event:
     arrays = by.per_unit({"P": record.P, "Q": record.Q})
     note = (
         f"put on a base of {own}, the apparent power before the first dip that is fitted: on"
-        f" {own.file} powers, torque"
-        f" and inertia are {own.ratio:.5g} times, impedances {1 / own.ratio:.5g} times the values"
-        " on this base"
+        f" {own.file} powers, torque and inertia are {own.ratio:.5g} times, impedances"
+        f" {1 / own.ratio:.5g} times the values on this base"
     )
     return detect(
         replace(

@@ -432,8 +432,7 @@ def measure(
     if n < needed:
         raise UserError(
             f"{n} samples at {rate:g} Hz are too short: phasors need {1000 * needed / rate:.0f} ms,"
-            " over two cycles of "
-            f"{nominal:g} Hz and more than their window"
+            f" over two cycles of {nominal:g} Hz and more than their window"
         )
     tracked = {} if tracked is None else tracked
     least = (

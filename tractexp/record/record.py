@@ -375,9 +375,8 @@ class Record:
             i = int(np.argmax(still)) + 1
             raise UserError(
                 f"{self.where}: {place(i)}: time does not increase: t = {self.t[i]:.9g} s after"
-                f" {self.t[i - 1]:.9g} s, "
-                f"and so at {np.count_nonzero(still)} rows: t has too few digits; write it with"
-                " more"
+                f" {self.t[i - 1]:.9g} s, and so at {np.count_nonzero(still)} rows: t has too few"
+                " digits; write it with more"
             )
         ratio = steps / usual
         long = ratio > 1.5
@@ -389,16 +388,15 @@ class Record:
         if i > 1 and still[i - 2]:
             raise UserError(
                 f"{self.where}: {place(i - 1)}: time does not increase: t = {self.t[i - 1]:.9g} s"
-                " after "
-                f"{self.t[i - 2]:.9g} s, and a step of {steps[i - 1]:g} s follows where {usual:g} s"
-                " is usual"
+                f" after {self.t[i - 2]:.9g} s, and a step of {steps[i - 1]:g} s follows where"
+                f" {usual:g} s is usual"
             )
         more = int(np.count_nonzero(long)) - 1
         places = f" here and at {more} more {'places' if more > 1 else 'place'}" if more else ""
         raise UserError(
             f"{self.where}: {place(i)}: t advances by {steps[i - 1]:g} s where {usual:g} s is"
-            " usual: rows are "
-            f"missing{places}; fill them in (P and Q may be nan, U may not) or cut the record there"
+            f" usual: rows are missing{places}; fill them in (P and Q may be nan, U may not) or cut"
+            " the record there"
         )
 
     def _uneven(self, steps: np.ndarray, usual: float) -> str:
@@ -445,8 +443,8 @@ class Record:
             i = int(np.argmax(self.U <= 0))
             raise UserError(
                 f"{self.where}: {place(i)}: U = {self.U[i]:g}, but voltage must be above zero"
-                " everywhere; without it "
-                "no load draws power: give the rows before it, or after it, as a file of their own"
+                " everywhere; without it no load draws power: give the rows before it, or after it,"
+                " as a file of their own"
             )
 
     def _check_finite(self, place: Callable[[int], str]) -> None:
@@ -470,8 +468,8 @@ class Record:
             i = int(np.argmax(off))
             raise UserError(
                 f"{self.where}: {place(i)}: sampling is not uniform: t = {self.t[i]:.9g} s is"
-                f" {100 * off[i]:.2g} % of "
-                f"a step off the uniform grid; at most {100 * LARGEST_JITTER:g} % is allowed"
+                f" {100 * off[i]:.2g} % of a step off the uniform grid; at most"
+                f" {100 * LARGEST_JITTER:g} % is allowed"
             )
         span = self.samples * self.step
         if span < 1 / self.base.frequency:
@@ -500,17 +498,15 @@ class Record:
         if not low <= U <= high:
             raise UserError(
                 f"{self.where}: U starts at {U:g}, which is not per unit ({low:g} to {high:g} is"
-                " expected); if it is "
-                f"in V or kV, say so, {DATA.units}={{U: V}}, or give the base as"
-                f" {DATA.base_voltage} (kV, line to line)"
+                f" expected); if it is in V or kV, say so, {DATA.units}={{U: V}}, or give the base"
+                f" as {DATA.base_voltage} (kV, line to line)"
             )
         S = float(np.nanmax(np.abs([self.P, self.Q])))
         if S > PLAUSIBLE_POWER:
             raise UserError(
                 f"{self.where}: P or Q reaches {S:g}, which is not per unit (up to"
-                f" {PLAUSIBLE_POWER:g} is expected); "
-                f"if it is in kW or MW, say so, {DATA.units}={{P: kW, Q: kvar}}, or give the "
-                f"base as {DATA.base_power} (MVA)"
+                f" {PLAUSIBLE_POWER:g} is expected); if it is in kW or MW, say so,"
+                f" {DATA.units}={{P: kW, Q: kvar}}, or give the base as {DATA.base_power} (MVA)"
             )
         self._check_frequency(DEAD_VOLTAGE_SHARE * U)
 
@@ -530,10 +526,8 @@ class Record:
             i = int(begins[int(np.argmax(turned))])
             raise UserError(
                 f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than"
-                f" {100 * PLAUSIBLE_FREQUENCY:.0f} % off the nominal "
-                f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz; say"
-                " its unit, "
-                f"{DATA.units}={{f: mHz}}, the nominal frequency, {DATA.frequency}=60, or leave f"
-                " out, "
-                f"{DATA.columns}={{f: null}}"
+                f" {100 * PLAUSIBLE_FREQUENCY:.0f} % off the nominal {self.base.frequency:g} Hz at"
+                f" a voltage of {self.U[i]:.3g}; f must be in Hz; say its unit, {DATA.units}={{f:"
+                f" mHz}}, the nominal frequency, {DATA.frequency}=60, or leave f out,"
+                f" {DATA.columns}={{f: null}}"
             )

@@ -50,9 +50,8 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
         if part.stop - first < least:
             raise UserError(
                 f"{record.where}: {what}, {1000 * lasts:.0f} ms before the dip at t ="
-                f" {record.t[part.stop - 1]:g} s: "
-                f"no steady state of {1000 * least * record.step:.0f} ms comes before it; choose"
-                " another event"
+                f" {record.t[part.stop - 1]:g} s: no steady state of"
+                f" {1000 * least * record.step:.0f} ms comes before it; choose another event"
             )
         notes.append(
             f"{what}: the steady state before the dip is that of the {lasts:.2g} s after it"
@@ -62,9 +61,8 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
             first, middle = begin + change.stop, begin + (change.first + change.stop) // 2
             notes.append(
                 f"the voltage changes by {100 * (change.ratio - 1):+.2g} % at t ="
-                f" {record.t[middle]:g} s, before the "
-                f"dip: the steady state is that of the {(part.stop - first) * record.step:.2g} s"
-                " after it"
+                f" {record.t[middle]:g} s, before the dip: the steady state is that of the"
+                f" {(part.stop - first) * record.step:.2g} s after it"
             )
     return _at_rest(record, slice(first, part.stop), least, notes)
 
@@ -100,9 +98,8 @@ def _at_rest(record: Record, part: slice, least: int, notes: list[str]) -> tuple
     S = max(float(np.hypot(P, Q)), 1e-300)
     said = (
         f"the load is not steady before the dip: {course}; P0 and Q0 are means over {lasts:.2g} s,"
-        " and right before "
-        f"the dip P is {100 * (P_late - P) / S:+.2g} %, Q {100 * (Q_late - Q) / S:+.2g} % of the"
-        " apparent power away"
+        f" and right before the dip P is {100 * (P_late - P) / S:+.2g} %, Q"
+        f" {100 * (Q_late - Q) / S:+.2g} % of the apparent power away"
     )
     return part, [*notes, said]
 

@@ -44,8 +44,8 @@ class Swing:
     def __str__(self) -> str:
         """ "P swings at 1.2 Hz by ± 3 % of the apparent power"."""
         return (
-            f"{self.quantity} swings at {self.frequency:.3g} Hz by"
-            f" ± {100 * self.amplitude:.2g} % of the apparent power"
+            f"{self.quantity} swings at {self.frequency:.3g} Hz by ± {100 * self.amplitude:.2g} %"
+            " of the apparent power"
         )
 
 

@@ -195,10 +195,9 @@ def in_waves(event: Event) -> WaveEvent:
         have = max(event.t_start - cycle - t[0], 0.0)
         raise UserError(
             f"{record.where}: {1000 * have:.0f} ms of waveforms before the dip at t ="
-            f" {event.t_start:.3f} s, and the"
-            f" steady state needs {FEWEST_CYCLES} cycles ({1000 * FEWEST_CYCLES * cycle:.0f} ms);"
-            " take domain=phasors,"
-            " or a record that starts earlier"
+            f" {event.t_start:.3f} s, and the steady state needs {FEWEST_CYCLES} cycles"
+            f" ({1000 * FEWEST_CYCLES * cycle:.0f} ms); take domain=phasors, or a record that"
+            " starts earlier"
         )
     x = _per_unit(waves, record)
     frequency = _frequency(t[before], x[:K, before], waves.rate, event.f0)
@@ -312,14 +311,13 @@ def _waves(event: Event) -> Waves:
     if waves is None:
         raise UserError(
             f"{record.where} has no waveforms: domain=waves needs the samples of voltages and"
-            " currents, as a COMTRADE"
-            " file or a table of waveforms has them; take domain=phasors"
+            " currents, as a COMTRADE file or a table of waveforms has them; take domain=phasors"
         )
     if waves.rate < COARSEST * record.base.frequency:
         raise UserError(
             f"{record.where}: {waves.rate:g} samples per second are"
-            f" {waves.rate / record.base.frequency:.3g} per cycle,"
-            f" and domain=waves needs {COARSEST}; take domain=phasors"
+            f" {waves.rate / record.base.frequency:.3g} per cycle, and domain=waves needs"
+            f" {COARSEST}; take domain=phasors"
         )
     cycle = 1.5 / record.base.frequency
     first = waves.start if record.t[0] - waves.start < cycle else float(record.t[0]) + cycle / 3

@@ -105,8 +105,7 @@ def tune_frequency(recording: Recording, numbers: Sequence[int]) -> Recording:
         return recording
     note = (
         f"the file declares {recording.frequency:g} Hz, but the voltage has {f:.5g} Hz while it is"
-        " alive: "
-        f"{nominal:.3g} Hz is taken for nominal"
+        f" alive: {nominal:.3g} Hz is taken for nominal"
     )
     return replace(recording, frequency=nominal, notes=(*recording.notes, note))
 
@@ -128,8 +127,8 @@ def arrange_feeder(recording: Recording, feeder: Feeder) -> Feeder:
     except UserError:
         raise UserError(
             f"{refused.why}; no other order of these channels makes sense either: they are not"
-            " those of one load, or "
-            "one is connected wrongly; 'tractexp look' shows what the file holds"
+            " those of one load, or one is connected wrongly; 'tractexp look' shows what the file"
+            " holds"
         ) from refused
     raise refused
 
@@ -170,9 +169,8 @@ def _residuals(recording: Recording, feeder: Feeder) -> None:
             where = setting(f"data.{key}")
             raise UserError(
                 f"{where}={[*numbers]}: {_name_channel(recording, odd[0])} is the residual of all"
-                " phases, and no phase; "
-                "give the phases, or with two line voltages or two current transformers those"
-                f" alone: {where}={rest}"
+                " phases, and no phase; give the phases, or with two line voltages or two current"
+                f" transformers those alone: {where}={rest}"
             )
 
 
@@ -217,8 +215,8 @@ def _lines(recording: Recording, feeder: Feeder) -> None:
         for i in feeder.voltages
     )
     raise UserError(
-        f"{DATA.voltages}={[*feeder.voltages]}: {names} are labelled as phases to ground, and "
-        f"{DATA.connection}={connection.name} takes line-to-line voltages; give three channels to"
+        f"{DATA.voltages}={[*feeder.voltages]}: {names} are labelled as phases to ground, and"
+        f" {DATA.connection}={connection.name} takes line-to-line voltages; give three channels to"
         " ground, or lines"
     )
 
@@ -344,9 +342,8 @@ def _voltages(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
         names = ", ".join(_name_channel(recording, i) for i in feeder.voltages)
         raise UserError(
             f"{DATA.voltages}={[*feeder.voltages]}: in the calm, the negative sequence is"
-            f" {100 * V2 / V1:.0f} % of the "
-            f"positive one: {names} are not the voltages of one bus; 'tractexp look' shows what the"
-            " file holds"
+            f" {100 * V2 / V1:.0f} % of the positive one: {names} are not the voltages of one bus;"
+            " 'tractexp look' shows what the file holds"
         )
     if V2 <= V1:
         return
@@ -358,8 +355,7 @@ def _voltages(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
     voltages, currents = _propose_other_order(feeder)
     raise _OtherOrder(
         f"{DATA.voltages}={[*feeder.voltages]}: the phases are not in the order a, b, c: while"
-        " alive, the negative "
-        f"sequence is {V2 / max(V1, 1e-12):.3g} times the positive one",
+        f" alive, the negative sequence is {V2 / max(V1, 1e-12):.3g} times the positive one",
         f"; give {_describe_arrangement(voltages, currents)}",
         voltages,
         currents,

@@ -12,10 +12,8 @@ from tractexp.configuration.plugin import Plugin, discover
 
 SINGLE = (
     "a single-phase load: U is its own voltage, P + jQ = V I* of the fundamental; static loads and"
-    " converters' effects "
-    "apply as they stand, but the models' motors are three-phase on balanced voltages: here they"
-    " are equivalents, "
-    "whose parameters are those of no machine"
+    " converters' effects apply as they stand, but the models' motors are three-phase on balanced"
+    " voltages: here they are equivalents, whose parameters are those of no machine"
 )
 
 

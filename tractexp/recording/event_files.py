@@ -144,9 +144,9 @@ def align(sampled: Sequence[SampledFile]) -> Alignment:
         drift = abs(other.rate / one.rate - 1)
         if drift > LARGEST_CLOCK_DIFFERENCE or drift * min(one.count, other.count) > 1:
             raise UserError(
-                f"{one.source} has {one.rate:g} samples a second and {other.source}"
-                f" {other.rate:g}: files of one event are joined at one rate; resample one of"
-                " them, or read each by itself"
+                f"{one.source} has {one.rate:g} samples a second and {other.source} {other.rate:g}:"
+                " files of one event are joined at one rate; resample one of them, or read each by"
+                " itself"
             )
     moments = [each.begun for each in sampled]
     if all(moments):

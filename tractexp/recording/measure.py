@@ -90,8 +90,7 @@ class FeederWaves:
                 )
                 raise UserError(
                     f"{DATA.skew}=true: the channels {names} are sampled at different times, and"
-                    " the connection "
-                    f"needs them at once; leave {DATA.skew} out"
+                    f" the connection needs them at once; leave {DATA.skew} out"
                 )
             delays.append(skew[used][0])
         return np.array(delays)

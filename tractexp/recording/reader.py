@@ -290,8 +290,7 @@ class WaveformReader(Reader):
             )
             raise UserError(
                 f"{recording.source} shows no load by itself:"
-                f" {explain_unrecognized(recording)}{noted}; {remedy}its channels: "
-                f"{every}"
+                f" {explain_unrecognized(recording)}{noted}; {remedy}its channels: {every}"
             )
         loads = "; ".join(
             f"{f.name}: "
@@ -308,8 +307,7 @@ class WaveformReader(Reader):
         )
         raise UserError(
             f"{DATA.voltages} and {DATA.currents} are missing, and {recording.source} shows"
-            f" {len(proposed)} loads; "
-            f"{asked}choose one: {loads}"
+            f" {len(proposed)} loads; {asked}choose one: {loads}"
         )
 
     def _streams(self, recording: Recording, feeder: Feeder) -> list[Stream]:

@@ -320,8 +320,7 @@ class Recording:
             rates = ", ".join(f"{s.rate:g} Hz" for s in self.segments)
             raise UserError(
                 f"{self.source}: sampled at {rates}: no waveform, for which {FEWEST_PER_CYCLE}"
-                " samples per cycle of "
-                f"{self.frequency:g} Hz are needed"
+                f" samples per cycle of {self.frequency:g} Hz are needed"
             )
         return fast
 

@@ -56,8 +56,8 @@ def check_units(units: Mapping[str, Any], quantities: Sequence[str] = tuple(PLAI
             _, small, large = PLAIN[letter]
             raise UserError(
                 f"{DATA.units}: {letter}={text} is no unit of a {PLAIN[letter][0]}; one is {small}"
-                f" or {large}, or, "
-                f"where the file has units of its own, so many of them: '89.8 {large}'"
+                f" or {large}, or, where the file has units of its own, so many of them: '89.8"
+                f" {large}'"
             )
 
 
@@ -178,8 +178,8 @@ def _secondary_note(channels: Sequence[Channel], by_size: bool) -> list[str]:
     if by_size:
         told = "by their size, whatever the file says"
     return [
-        f"{SECONDARY_VALUES} ({sizes}), {told}: powers are not in MW; "
-        f"say what one of the file's units is on the primary side, e.g. {DATA.units}={{{setting}}}"
+        f"{SECONDARY_VALUES} ({sizes}), {told}: powers are not in MW; say what one of the file's"
+        f" units is on the primary side, e.g. {DATA.units}={{{setting}}}"
     ]
 
 
@@ -248,8 +248,7 @@ def check_doubt(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> N
     stands = ", ".join(f"{letter}: '1.5 {PLAIN[letter][2]}'" for letter in odd)
     raise UserError(
         f"{recording.source}: {said}: say the unit, {DATA.units}={{{plainly}}} or V, A, or what one"
-        " of the file's "
-        f"units, or one per unit, stands for, {DATA.units}={{{stands}}}"
+        f" of the file's units, or one per unit, stands for, {DATA.units}={{{stands}}}"
     )
 
 

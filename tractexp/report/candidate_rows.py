@@ -85,8 +85,7 @@ def why_not_the_most_helpful(findings: Findings) -> str:
     chosen = next(r for r in list_candidates(findings) if r.rank == 0)
     return (
         f"{promise}, yet the verdict is {join_words(findings.names)}, which lowers the deviance by"
-        f" {chosen.drop:.0f}:"
-        f" {_verdict_on(findings, best.name)}."
+        f" {chosen.drop:.0f}: {_verdict_on(findings, best.name)}."
     )
 
 
@@ -99,9 +98,8 @@ def describe_untestable_beside(findings: Findings) -> str:
         return ""
     return (
         f"With {join_words(chosen)} in the model there is less left for the others to explain: one"
-        " that helps the"
-        " base model alone may here be irrelevant, or not testable because a size that matters"
-        " would stay in the noise."
+        " that helps the base model alone may here be irrelevant, or not testable because a size"
+        " that matters would stay in the noise."
     )
 
 

@@ -63,8 +63,7 @@ def candidates(page: Report, findings: Findings) -> None:
         ["candidate", "deviance lowered by", "status", "size", "why"],
         entries,
         f"Status of a refitted set is that among the sets of its size{single if chosen else ''}."
-        " Sizes have their"
-        " standard error where it was reckoned.",
+        " Sizes have their standard error where it was reckoned.",
         words=(0, 2, 3, 4),
     )
     _sets(page, findings)
@@ -114,8 +113,7 @@ def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
     chance = f"{chance_level(findings):.1f}, what chance gives to the most helpful of all in"
     return (
         f"By how much each alone lowers the deviance of the base model ({', '.join(colors)})."
-        f" Dashed: {chance}"
-        f" {findings.context.criteria.naming_false_alarms:.0%} of cases."
+        f" Dashed: {chance} {findings.context.criteria.naming_false_alarms:.0%} of cases."
     )
 
 
@@ -136,10 +134,9 @@ def _sets(page: Report, findings: Findings) -> None:
             ["set", "deviance", "behind", "verdict", "chance leaves as much"],
             rows,
             "Every set of this size that was refitted; behind is that of Akaike's criterion. A set"
-            " is rejected when its"
-            f" relative likelihood is below {findings.context.criteria.rejected:g}; it is adequate"
-            " when chance may"
-            " leave as much as it does.",
+            " is rejected when its relative likelihood is below"
+            f" {findings.context.criteria.rejected:g}; it is adequate when chance may leave as much"
+            " as it does.",
             words=(3, 4),
         )
 

@@ -21,11 +21,9 @@ def places(page: Report, findings: Findings) -> None:
         best, alpha = first.scores[0], findings.context.criteria.naming_false_alarms
         text += (
             f" The effect that promises most in one linear step, {best.name}, would lower the"
-            " deviance by"
-            f" {best.drop:.1f}, with a probability of {in_words(best.p)} by chance; chance gives"
-            " less than"
-            f" {in_words(first.chance.critical_p(alpha))} to the best of all candidates in"
-            f" {alpha:.0%} of cases."
+            f" deviance by {best.drop:.1f}, with a probability of {in_words(best.p)} by chance;"
+            f" chance gives less than {in_words(first.chance.critical_p(alpha))} to the best of all"
+            f" candidates in {alpha:.0%} of cases."
         )
     page.text(text)
     if not findings.places:
@@ -52,15 +50,13 @@ def noise(page: Report, findings: Findings) -> None:
     if fit.robust is not None:
         page.text(
             "What is left is louder, so all is told by least squares, without faults of the"
-            " measurement and at the"
-            " powers measured before the events."
+            " measurement and at the powers measured before the events."
         )
     if (window := context.records.window) is not None:
         model = " The extended configuration does not do so." if findings.names else ""
         page.text(
             f"{window.describe().capitalize()}, of voltage and current alike: any other window"
-            " would"
-            " make the voltage bend where the power does not. The voltage that the load saw is"
-            " reckoned back from the"
-            f" record, and the current of the model is averaged as the recorder does.{model}"
+            " would make the voltage bend where the power does not. The voltage that the load saw"
+            " is reckoned back from the record, and the current of the model is averaged as the"
+            f" recorder does.{model}"
         )

@@ -40,8 +40,7 @@ KIND = {
 ROLES = {"train": "fitted", "validate": "held out"}
 CURRENTS = (
     ", as the record's estimator sees them in calculated and recorded currents. epsilon_i: what the"
-    " currents of all"
-    " phases miss in the 0.15 s after the dip begins, rms, over their rms before it"
+    " currents of all phases miss in the 0.15 s after the dip begins, rms, over their rms before it"
 )
 
 
@@ -73,8 +72,8 @@ def describe_where(content: Mapping[str, Any]) -> list[str]:
     stretches = "stretches" if others > 1 else "stretch"
     more = f", and {others} more {stretches}" if others else ""
     return [
-        f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of"
-        f" the excess{more}"
+        f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of the"
+        f" excess{more}"
     ]
 
 
@@ -87,8 +86,8 @@ def describe_nearest(content: Mapping[str, Any], sizes: Sequence[str]) -> list[s
         [f"{closed[role]:.0%} {on}" for role, on in ROLES.items() if closed[role] is not None]
     )
     return [
-        f"nearest, not accepted: {join_words(near['effects'])}; gap closed"
-        f" {shares or 'unknown'}; {', '.join(sizes)}"
+        f"nearest, not accepted: {join_words(near['effects'])}; gap closed {shares or 'unknown'};"
+        f" {', '.join(sizes)}"
     ]
 
 

@@ -38,8 +38,7 @@ def laws(page: Report, findings: Findings) -> None:
         ["effect", "where", "what it does there", "law", "effect in the model"],
         rows,
         "The catalogue's laws are tried first, then other laws and places of every family: a wrong"
-        " formula may leave"
-        " nothing where the right one is of another law.",
+        " formula may leave nothing where the right one is of another law.",
         words=(1, 2, 3, 4),
     )
     for form in entries:

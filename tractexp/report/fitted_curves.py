@@ -28,8 +28,8 @@ ROLES = {"train": "fitted", "validate": "held out"}
 MOST_OPEN_EVENTS = 4  # events whose curves are not folded away
 MOST_RIVALS = 4  # structures whose curves a page holds
 NEXT_DIP = (
-    "A dip that was not recorded, as long as those that were. The bands hold the worst sample of"
-    " 95 % of such events: noise, what the model misses of the known events, and the parameters'"
+    "A dip that was not recorded, as long as those that were. The bands hold the worst sample of 95"
+    " % of such events: noise, what the model misses of the known events, and the parameters'"
     " scatter."
 )
 WITHIN = "the load is here in 95 % of events"

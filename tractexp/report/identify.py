@@ -32,18 +32,15 @@ KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
 CHANNELS = (style.ACTIVE, style.REACTIVE, style.PALETTE[2])  # of what is compared
 EXACT = (
     "Nothing but noise is left: the estimate is the most likely set, noise whitened, the power"
-    " before each dip free."
-    " pu: per unit of the record's base."
+    " before each dip free. pu: per unit of the record's base."
 )
 SCATTERED = (
     "More than noise is left: the estimate is the minimum of Eq. (8), and intervals say by how much"
-    " it scatters where"
-    " stretches of 0.1 s are left out. pu: per unit of the record's base."
+    " it scatters where stretches of 0.1 s are left out. pu: per unit of the record's base."
 )
 MODEL_ERROR = (
     "Model error: rms of what is left beyond the noise, from the dip on, over the rms of the load's"
-    " response, both in"
-    " apparent power S. epsilon: Eq. (20)."
+    " response, both in apparent power S. epsilon: Eq. (20)."
 )
 SHARES_HELD = (
     "The motors' share held, all else fitted again: by how much more the fit then leaves than the"
@@ -285,8 +282,7 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
     page.chart(
         _forest(uncertainty, by_event(result.search["parameters"], result.search["per_event"])),
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the"
-        " upper bound); cross:"
-        " where the search ended.",
+        " upper bound); cross: where the search ended.",
     )
     nuisances = result.nuisances
     verdicts = uncertainty.verdicts.items()
@@ -430,8 +426,7 @@ def _starts(page: Report, estimated: EstimationResult, uncertainty: Uncertainty)
     page.chart(
         chart,
         f"Descents of the likelihood from {len(starts)} starts ended at {valleys} heights; those at"
-        " the lowest are the"
-        " estimate's valley. A difference of 3.8 is what a 95 % interval spans.",
+        " the lowest are the estimate's valley. A difference of 3.8 is what a 95 % interval spans.",
     )
     with page.fold_blocks("where each start ended"):
         page.table(
@@ -507,8 +502,8 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
                 for n in uncertainty.noise
             ],
             caption="Noise of each channel, told from what the fit leaves before the dips and at"
-            " the end of the"
-            " records: an autoregression of the channels mixed until they are independent.",
+            " the end of the records: an autoregression of the channels mixed until they are"
+            " independent.",
             words=(1,),
         )
 

@@ -57,8 +57,8 @@ def channels(entry: Mapping[str, Any]) -> Table:
     """The channels of a file, with their quality in detail."""
     caption = (
         "Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise"
-        " about fundamental"
-        " and harmonics in the quietest ten cycles of the first calm, as a share of it."
+        " about fundamental and harmonics in the quietest ten cycles of the first calm, as a share"
+        " of it."
     )
     columns = [
         "number",
@@ -93,8 +93,7 @@ def events(entry: Mapping[str, Any]) -> Table:
     ]
     caption = (
         "Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered"
-        " as data.train and"
-        " data.validate take them."
+        " as data.train and data.validate take them."
     )
     return Table(columns, [event_row(e) for e in entry["events"]], "", caption, words=(1, 9))
 

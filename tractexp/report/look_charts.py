@@ -40,12 +40,10 @@ BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead
 SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
 CAPTION = (
     "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical"
-    " components and powers"
-    " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click"
-    " for the whole."
-    " Above the chart are the values at the cursor, and the one-cycle phasors, turned so that the"
-    " first"
-    " voltage lies at 0°: voltages thin, currents thick."
+    " components and powers of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag"
+    " to zoom, double-click for the whole. Above the chart are the values at the cursor, and the"
+    " one-cycle phasors, turned so that the first voltage lies at 0°: voltages thin, currents"
+    " thick."
 )
 
 

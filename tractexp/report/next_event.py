@@ -40,8 +40,7 @@ def section(page: Report, choice: NextEvent) -> None:
         ["event", "probability [%]"],
         [_row(t) for kind in KINDS for t in _best(choice, kind)],
         "Probability that all rivals but the true one are rejected, the least over all of them as"
-        " the truth. The best"
-        " events of each kind.",
+        " the truth. The best events of each kind.",
         words=(0,),
     )
     best = choice.best
@@ -60,9 +59,8 @@ def section(page: Report, choice: NextEvent) -> None:
     )
     page.text(
         "Each rival in turn is taken as the truth with its fitted parameters, as uncertain as the"
-        " records leave them;"
-        " all others are fitted to the records and the new event together, under the noise of their"
-        " fits"
+        " records leave them; all others are fitted to the records and the new event together,"
+        " under the noise of their fits"
         + (
             ", by a refit of every parameter."
             if best.refitted

@@ -18,8 +18,7 @@ from tractexp.report.waves import Drawn, wave_chart
 BASE, EXTENDED, NEAREST = "#D55E00", "#0072B2", "#CC79A7"
 IN_PHASORS = (
     "The record's estimator run over the recorded and over the calculated currents, so that its"
-    " window cancels; a dip"
-    " of few cycles is smeared alike in both."
+    " window cancels; a dip of few cycles is smeared alike in both."
 )
 CLICK = "Click a curve: below it is said which candidates would explain what is left there."
 MOST_OPEN_OVERLAYS = 4  # events of each role that are not folded

@@ -109,10 +109,8 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     page.heading("What another kind of dip would tell")
     page.text(
         "One property of the dip is varied at a time, the others stay as planned. Each curve is"
-        " half of the 95 %"
-        " interval in percent of the value, in the colors above; it ends where that is ten times"
-        " the value,"
-        " or the record cannot tell it."
+        " half of the 95 % interval in percent of the value, in the colors above; it ends where"
+        " that is ten times the value, or the record cannot tell it."
     )
     page.charts(others)
     with page.fold_blocks("The same in numbers"):
@@ -121,9 +119,8 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     page.heading("What it rests on").items(
         [
             f"Intervals follow from the sensitivity of {planned.problem.domain.compared} to each"
-            " parameter at"
-            " the values above. Where the interval is wide, or the values are far off, so is the"
-            " forecast.",
+            " parameter at the values above. Where the interval is wide, or the values are far off,"
+            " so is the forecast.",
             f"The planned dip falls from 1 pu and comes back along {planned.problem.domain.edges}.",
             "Noise of the recorded voltage, and effects that the model lacks, are not in it.",
         ]
@@ -136,8 +133,7 @@ def _caption(needed: Needed) -> str:
     met = "" if needed.depth is None else ", met at the dotted line"
     return (
         "Half of the 95 % interval of each parameter, in percent of its value, by the depth of the"
-        " dip. Dashed: the"
-        f" ± {100 * needed.within:g} % asked for {needed.parameter}{met}."
+        f" dip. Dashed: the ± {100 * needed.within:g} % asked for {needed.parameter}{met}."
     )
 
 
@@ -202,8 +198,7 @@ def _add_question_section(page: Report, planned: Planned) -> None:
         ["symbol", "meaning", "value", "unit", "bounds"],
         [*_symbols(planned)],
         caption=f"Planned at {planned.origin}. P and Q are the active and reactive power; pu is per"
-        " unit of the"
-        " record's own base.",
+        " unit of the record's own base.",
         words=(1,),
     )
 
@@ -221,8 +216,7 @@ def _symbols(planned: Planned) -> Iterator[list[str]]:
         yield [
             INERTIA,
             f"inertia constant M omega_s / 2, omega_s = 2 pi {frequency:g} rad/s: kinetic energy at"
-            " synchronous"
-            " speed, over the base power",
+            " synchronous speed, over the base power",
             f"{values['M'] * np.pi * frequency:.4g}",
             "s",
             "those of M",

@@ -23,8 +23,8 @@ HISTOGRAM_BINS = 60  # of a histogram
 DOTS = 1500  # draws shown of a pair
 CAPTION = (
     "Blue: how often the draws fall on each value. Dashed: the normal distribution that the"
-    " curvature at the estimate"
-    " stands for. Shaded: the 95 % interval of the posterior. Dotted: the estimate."
+    " curvature at the estimate stands for. Shaded: the 95 % interval of the posterior. Dotted: the"
+    " estimate."
 )
 
 

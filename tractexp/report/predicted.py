@@ -38,10 +38,9 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
     page.chart(
         _bars(findings, rows),
         "The model's error on the held-out events, in percent of the response, with the sets that"
-        " predict them best"
-        " (green: added, orange: tied with it, gray: the base model). All were fitted to the other"
-        " events by least"
-        " squares. Dashed: what a name, or each of the best sets that have it, undercuts.",
+        " predict them best (green: added, orange: tied with it, gray: the base model). All were"
+        " fitted to the other events by least squares. Dashed: what a name, or each of the best"
+        " sets that have it, undercuts.",
     )
     best = f" The best of the {len(every)} that were fitted." if len(rows) < len(every) else ""
     page.table(
@@ -61,11 +60,9 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
             for row in rows
         ],
         "A name, or each of the best sets that have it, divides the error of the base model by"
-        f" {criteria.divides:g}."
-        f" It is ahead of any rival of its size or smaller by {criteria.ahead:g}, and no term of"
-        " the library is"
-        " ahead of it by that, all by more than chance (blocks that share the response, left out in"
-        f" turn).{best}",
+        f" {criteria.divides:g}. It is ahead of any rival of its size or smaller by"
+        f" {criteria.ahead:g}, and no term of the library is ahead of it by that, all by more than"
+        f" chance (blocks that share the response, left out in turn).{best}",
         words=(0, 3, 4),
     )
 

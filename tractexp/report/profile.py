@@ -22,17 +22,15 @@ BELOW = 0.12  # thresholds of room below the best fit
 ENOUGH = "is enough"
 SCATTER = (
     "More than noise is left, so these are intervals of least squares: they hold by how much the"
-    " estimate scatters, not"
-    " by how much what the model lacks moves it."
+    " estimate scatters, not by how much what the model lacks moves it."
 )
 CURVE, PARABOLA, SHADE = PALETTE[0], FAINT, PALETTE[5]
 CAPTION = (
     "Blue: the deviance (twice the fall of the log-likelihood) of the best fit for each value of"
-    " the parameter, above"
-    " the best of all, over what this parameter's may rise by in units of {threshold:.2f}. Dashed:"
-    " the"
-    " parabola of the curvature at the estimate. Where the blue curve crosses the line at"
-    " {threshold:.2f}, the 95 % interval ends; it is shaded. The mark is the estimate."
+    " the parameter, above the best of all, over what this parameter's may rise by in units of"
+    " {threshold:.2f}. Dashed: the parabola of the curvature at the estimate. Where the blue curve"
+    " crosses the line at {threshold:.2f}, the 95 % interval ends; it is shaded. The mark is the"
+    " estimate."
 )
 
 
@@ -77,8 +75,7 @@ def report(scan: Profiles, grade: str = "") -> Report:
     page.heading("What it rests on").items(
         [
             "The interval by curvature is right where the deviance is a parabola; the profile is"
-            " right wherever the"
-            " model and the noise are, and needs no parabola.",
+            " right wherever the model and the noise are, and needs no parabola.",
             f"{scan.simulations} simulations beyond the identification.",
             "An effect that the model lacks moves the estimates and is in neither interval.",
         ]

@@ -77,8 +77,7 @@ def _numbers(page: Report, proposal: Proposal) -> None:
         ["parameter", "in the equation", "meaning", "unit", "value", "95 % interval"],
         rows,
         "Intervals by the curvature of the fit to the fitted events, the base model and the faults"
-        " of the measurement"
-        " left free beside it.",
+        " of the measurement left free beside it.",
         words=(1, 2, 3),
     )
     page.table(
@@ -107,10 +106,8 @@ def _add_explanation(page: Report, proposal: Proposal) -> None:
         ["events", "model's error without it", "with it", "explained"],
         rows,
         "Errors are of the response, faults of the measurement free in both; explained is the"
-        " term's part of what it"
-        " gains and what pushes into the balances or the other terms tried would gain beside it,"
-        " beyond chance;"
-        f" {chance(proposal.p)}.",
+        " term's part of what it gains and what pushes into the balances or the other terms tried"
+        f" would gain beside it, beyond chance; {chance(proposal.p)}.",
     )
 
 
@@ -156,9 +153,8 @@ def _rivals(page: Report, proposal: Proposal) -> None:
     if proposal.alike:
         names = join_words([f"{name} ({share:.0%})" for name, share in proposal.alike])
         page.text(
-            "Textbook effects that look like it, with the share of its change each could have"
-            f" made: {names}. None of"
-            " them is adequate by itself."
+            "Textbook effects that look like it, with the share of its change each could have made:"
+            f" {names}. None of them is adequate by itself."
         )
     else:
         page.text("No textbook effect of the catalogue could have made half of its change.")

@@ -21,13 +21,11 @@ SMALLEST_VOLTAGE_STEP = 0.005
 ITSELF = 0.01  # of the power, by which an error of the exponents is told
 DIPS = (
     "a motor answers dips: have the recorder triggered by 3 to 10 % of the voltage"
-    f" ({SHALLOWEST:.0%} is the least that"
-    " is fitted), with 0.2 s and more before it and 1 s after"
+    f" ({SHALLOWEST:.0%} is the least that is fitted), with 0.2 s and more before it and 1 s after"
 )
 AMBIENT = (
     "static exponents follow from a change of taps before and after, and from ten minutes of RMS"
-    " values each second as"
-    " slopes of ln P and ln Q over ln U"
+    " values each second as slopes of ln P and ln Q over ln U"
 )
 
 
@@ -62,10 +60,9 @@ def _exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
         fixed = " ".join(f"model.fixed.{name}={value:.2g}" for name, value in exponents.items())
         yield (
             f"the {event['kind']} of {abs(event['depth']):.1%} at {event['start']:.3f} s tells the"
-            " static exponents of"
-            f" {feeder['name']}: {values}, each wrong by {ITSELF / abs(log(ratio)):.1g} for every"
-            " percent that the load"
-            f" changed by itself; for another record of it: {fixed}"
+            f" static exponents of {feeder['name']}: {values}, each wrong by"
+            f" {ITSELF / abs(log(ratio)):.1g} for every percent that the load changed by itself;"
+            f" for another record of it: {fixed}"
         )
 
 

@@ -23,29 +23,23 @@ KILO = 1.0  # kA of a peak from which an axis is in kA
 MOST_PREPARED_EVENTS = 4  # events of which it is told how they were prepared
 SPECTRUM = (
     "Amplitudes of measured less calculated currents, in percent of the fundamental before the dip,"
-    " over whole cycles"
-    " of the stationary phases: what is 50 Hz there is 50 Hz here. Above from the dip on"
-    " ({after:.0f} ms), below before"
-    " it ({before:.0f} ms); a longer stretch tells frequencies better apart. Marked are the"
-    " fundamental and its odd"
-    " harmonics. A load of harmonics stands in both, a wrong decay beside the fundamental, an"
-    " offset at 0 Hz."
+    " over whole cycles of the stationary phases: what is 50 Hz there is 50 Hz here. Above from the"
+    " dip on ({after:.0f} ms), below before it ({before:.0f} ms); a longer stretch tells"
+    " frequencies better apart. Marked are the fundamental and its odd harmonics. A load of"
+    " harmonics stands in both, a wrong decay beside the fundamental, an offset at 0 Hz."
 )
 IN_WAVES = (
     "In waveforms the sampled currents are compared, driven by the sampled voltage, both as space"
-    " vectors of the"
-    " stationary frame (alpha along phase a); nothing is averaged over a cycle. One per unit is the"
-    " peak of the"
-    " phase voltage before the dip, and of the current of the same apparent power. P, Q, epsilon_p"
-    " and epsilon_q"
-    " are of the recorded and of the calculated currents through the record's own phasor estimator,"
-    " so they"
-    " compare with those of a run in phasors."
+    " vectors of the stationary frame (alpha along phase a); nothing is averaged over a cycle. One"
+    " per unit is the peak of the phase voltage before the dip, and of the current of the same"
+    " apparent power. P, Q, epsilon_p and epsilon_q are of the recorded and of the calculated"
+    " currents through the record's own phasor estimator, so they compare with those of a run in"
+    " phasors."
 )
 CAPTION = (
     "The currents are instantaneous values, phase by phase, offsets of the recorder taken off."
-    " Dotted: the dip begins"
-    " and ends. Drag to zoom, double-click to go back; zoomed in, every sample is drawn."
+    " Dotted: the dip begins and ends. Drag to zoom, double-click to go back; zoomed in, every"
+    " sample is drawn."
 )
 
 
@@ -257,12 +251,8 @@ def _describe_event_preparation(fit: Fit) -> str:
     )
     return (
         f"{event.record.name}: {event.f0:.3f} Hz, {cycles:.1f} cycles before the dip; offsets of up"
-        " to"
-        f" {1000 * volts:.3g} V and {1000 * amperes:.3g} A taken off.{zero} The periodic voltage"
-        " before the dip is"
-        f" continued back for {event.lead * event.f0 / event.rate:.0f} cycles, in which the"
-        " simulation reaches its"
-        " steady state: over the last of them the calculated currents still change by"
-        f" {fit.unsettled:.2g} of their"
-        " size."
+        f" to {1000 * volts:.3g} V and {1000 * amperes:.3g} A taken off.{zero} The periodic voltage"
+        f" before the dip is continued back for {event.lead * event.f0 / event.rate:.0f} cycles, in"
+        " which the simulation reaches its steady state: over the last of them the calculated"
+        f" currents still change by {fit.unsettled:.2g} of their size."
     )

@@ -46,9 +46,7 @@ def check(where: str, content: Any) -> None:
     elif isinstance(content, str) and holds_credentials(content):
         raise UserError(
             f"{where} is an address with a user's name, password or token in it, which would be"
-            " printed, stored and "
-            "logged; leave it out and give it by MLFLOW_TRACKING_USERNAME and"
-            " MLFLOW_TRACKING_PASSWORD (or "
-            "MLFLOW_TRACKING_TOKEN), by a .netrc that you alone can read, or for PostgreSQL by"
-            " PGPASSWORD or .pgpass"
+            " printed, stored and logged; leave it out and give it by MLFLOW_TRACKING_USERNAME and"
+            " MLFLOW_TRACKING_PASSWORD (or MLFLOW_TRACKING_TOKEN), by a .netrc that you alone can"
+            " read, or for PostgreSQL by PGPASSWORD or .pgpass"
         )

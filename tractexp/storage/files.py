@@ -358,8 +358,7 @@ def _count_nodes(text: str, path: Path | str) -> None:
         if len(within) > DEEPEST or within[-1][1] > MOST_NODES:
             raise UserError(
                 f"{path} holds more than {MOST_NODES} values, aliases written out, or nests them"
-                f" more than {DEEPEST}"
-                " deep, which no configuration does"
+                f" more than {DEEPEST} deep, which no configuration does"
             )
 
 
@@ -517,8 +516,8 @@ def _take_lock(path: Path) -> IO[bytes]:
             if not _try_lock(file):
                 file.seek(0)
                 raise UserError(
-                    f"{path.parent} is in use by {_read_claimant(file)}: wait until that has"
-                    " ended, or give another folder"
+                    f"{path.parent} is in use by {_read_claimant(file)}: wait until that has ended,"
+                    " or give another folder"
                 )
             if os.name == "nt" or (
                 path.exists() and os.path.samestat(os.fstat(file.fileno()), os.stat(path))

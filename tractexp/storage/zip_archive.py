@@ -137,8 +137,8 @@ def _check_sizes(path: str, found: Mapping[str, zipfile.ZipInfo]) -> None:
     whole = sum(entry.file_size for entry in found.values())
     if whole > LARGEST_WHOLE:
         raise UserError(
-            f"{path} holds {whole / 1e6:.4g} MB, and at most {LARGEST_WHOLE / 1e6:.4g} MB are"
-            " read: extract it, and give its folder"
+            f"{path} holds {whole / 1e6:.4g} MB, and at most {LARGEST_WHOLE / 1e6:.4g} MB are read:"
+            " extract it, and give its folder"
         )
 
 

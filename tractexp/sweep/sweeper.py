@@ -201,8 +201,7 @@ def values_of(override: Override) -> list[str]:
     if not values:
         raise UserError(
             f"the sweep has no jobs: {override.input_line} is empty; a range ends before its second"
-            " number, "
-            "as range(0,30) is 0 to 29, and a glob needs a name that matches"
+            " number, as range(0,30) is 0 to 29, and a glob needs a name that matches"
         )
     return values
 
@@ -260,6 +259,5 @@ def failures(jobs: Sequence[SweepJob]) -> str:
         say(f"  {job.name:>4}  {' '.join(o for o in job.overrides if o not in common)}: {why}")
     return (
         f"{len(failed)} of {len(jobs)} jobs failed, as listed; what they printed is in output.txt"
-        " of their folders in "
-        f"{jobs[0].sweep}, an unexpected error in traceback.txt; {REPEAT}"
+        f" of their folders in {jobs[0].sweep}, an unexpected error in traceback.txt; {REPEAT}"
     )

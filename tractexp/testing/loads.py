@@ -239,8 +239,7 @@ def scales_with_its_base(cls: type[Part]) -> None:
     off = np.abs(scaled - one).max() / np.abs(one).max()
     assert off < SCALED, (
         f"{of.title} answers otherwise in another base of power (by {off:.2g}): say in"
-        " 'power_exponent' how each"
-        f" parameter of '{cls.name}' goes with it"
+        f" 'power_exponent' how each parameter of '{cls.name}' goes with it"
     )
 
 

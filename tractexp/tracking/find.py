@@ -75,8 +75,8 @@ def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
             raise
         reason = str(error).strip().partition("\n")[0]
         raise UserError(
-            f"{TASK.filter}={filter} is not a filter that MLflow understands ({reason}); one is "
-            "\"tags.data = 'tibet_50pct' and tags.optimizer = 'issa'\""
+            f"{TASK.filter}={filter} is not a filter that MLflow understands ({reason}); one is"
+            " \"tags.data = 'tibet_50pct' and tags.optimizer = 'issa'\""
         ) from error
 
 

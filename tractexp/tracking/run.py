@@ -383,9 +383,8 @@ def _experiment(client: Any, name: str, uri: str) -> str:
                 raise
     if experiment.lifecycle_stage == "deleted":
         raise UserError(
-            f"the experiment '{name}' in {uri} was deleted: restore it with "
-            f"'mlflow experiments restore --experiment-id {experiment.experiment_id}' or log under"
-            " another name"
+            f"the experiment '{name}' in {uri} was deleted: restore it with 'mlflow experiments"
+            f" restore --experiment-id {experiment.experiment_id}' or log under another name"
         )
     return experiment.experiment_id
 

@@ -196,10 +196,9 @@ def sentences(uri: str) -> Iterator[None]:
         reason = str(error).strip().partition("\n")[0]
         if "database schema" in reason or "Can't locate revision" in reason:
             raise UserError(
-                f"the MLflow store {uri} comes from another version of MLflow: '"
-                f"{quoting.shell('mlflow', 'db', 'upgrade', uri)}' brings an older one up to date"
-                " (keep a copy), a "
-                "newer one needs the newer MLflow"
+                f"the MLflow store {uri} comes from another version of MLflow:"
+                f" '{quoting.shell('mlflow', 'db', 'upgrade', uri)}' brings an older one up to date"
+                " (keep a copy), a newer one needs the newer MLflow"
             ) from error
         raise UserError(f"the MLflow store {uri} cannot be used: {reason}") from error
 

@@ -127,8 +127,8 @@ def _may_go(path: Path, folder: Path, tell: Callable[[str], None]) -> bool:
         return False
     if any(one.name.lower() == MODEL for one in (path, *path.rglob("*"))):
         tell(
-            f"{path} is not sent: MLflow would load it as a model, and run what its maker put"
-            " into it"
+            f"{path} is not sent: MLflow would load it as a model, and run what its maker put into"
+            " it"
         )
         return False
     return True

@@ -36,8 +36,8 @@ def serve(
     check_servable(uri, host, port)
     address = f"http://{host}:{port}/"
     print(
-        f"starting the MLflow UI on port {port}, which takes about {USUAL_START_SECONDS} s;"
-        f" it shows {uri}",
+        f"starting the MLflow UI on port {port}, which takes about {USUAL_START_SECONDS} s; it"
+        f" shows {uri}",
         flush=True,
     )
     started = time.monotonic()

@@ -77,8 +77,7 @@ def written(kind: str, name: str, folder: Path, source: Path | None = None) -> P
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
         raise UserError(
             f"'{name}' cannot be the name of a plugin, which is that of its file; take lower-case"
-            " letters, digits and"
-            " underscores, such as motor_heating"
+            " letters, digits and underscores, such as motor_heating"
         )
     if taken := choices().get(group, {}).get(name):
         raise UserError(

@@ -172,8 +172,7 @@ def benchmark(
         if optimizer.polish:
             raise UserError(
                 f"optimizer {name} polishes by least squares, which need residuals that a BBOB"
-                " function does not"
-                " have; set optimizer.polish=false"
+                " function does not have; set optimizer.polish=false"
             )
     package()
     ordered = tuple(sorted(targets, reverse=True))

@@ -343,8 +343,7 @@ def _compare_gathered_runs(
     if judging["floor"] is not None and len(groups) > 1:
         raise UserError(
             f"{TASK.floor}={judging['floor']:g} is the floor of one problem, and {source} has"
-            f" {len(groups)}; leave it"
-            f" out, or choose one by {TASK.data}"
+            f" {len(groups)}; leave it out, or choose one by {TASK.data}"
         )
     return source, several(
         groups, source, judging, Path(sweep) if sweep else None, bbob, cores, progress, problem

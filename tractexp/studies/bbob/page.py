@@ -18,8 +18,8 @@ def scale(benchmark: BbobRuns) -> str:
     functions, dimensions = len(plan.functions), " and ".join(map(str, plan.dimensions))
     return (
         f"{count_noun(functions, 'BBOB function')} in dimension {dimensions},"
-        f" {count_noun(len(plan.instances), 'instance')} each,"
-        f" {plan.multiplier:,} evaluations per dimension and run"
+        f" {count_noun(len(plan.instances), 'instance')} each, {plan.multiplier:,} evaluations per"
+        " dimension and run"
     )
 
 
@@ -37,8 +37,7 @@ def sentences(benchmark: BbobRuns) -> list[str]:
         ]
         sentences.append(
             f"On BBOB in dimension {d}, {len(plan.instances)} runs of {plan.multiplier * d:,}"
-            " evaluations on each"
-            f" function, {'; '.join(parts)}."
+            f" evaluations on each function, {'; '.join(parts)}."
         )
     return sentences
 
@@ -145,8 +144,8 @@ def _shares(page: Report, benchmark: BbobRuns, d: int) -> None:
     page.table(
         *shares(benchmark, d),
         f"Share of the {len(plan.targets)} targets, {plan.targets[0]:g} to {plan.targets[-1]:g}"
-        " from the optimum,"
-        " met by all runs. Solved: functions on which every run met the last one.",
+        " from the optimum, met by all runs. Solved: functions on which every run met the last"
+        " one.",
     )
     whole, each = drawn.pop("all")
     page.chart(whole, "Runtimes: the share of all targets met by all runs, by evaluations.")
@@ -183,17 +182,14 @@ def _reading(page: Report) -> Report:
     return page.heading("How to read this page").items(
         [
             "ERT, the expected running time, is what all runs spent until they met the target,"
-            " those that did not all"
-            " they had, per run that did; a dash where none did (Hansen et al. 2021, COCO).",
+            " those that did not all they had, per run that did; a dash where none did (Hansen et"
+            " al. 2021, COCO).",
             "A search that ends by itself is started again from new random numbers until the budget"
-            " is spent. All"
-            " optimizers have the same seeds.",
+            " is spent. All optimizers have the same seeds.",
             "Each optimizer has its own settings, tuned for nothing here. An evaluation counts when"
-            " it is made, not at"
-            " the end of its iteration.",
+            " it is made, not at the end of its iteration.",
             "The functions are those of Hansen, Finck, Ros and Auger 2009 in the package ioh,"
-            " searched on the box"
-            " [-5, 5], from which no point is let out.",
+            " searched on the box [-5, 5], from which no point is let out.",
         ]
     )
 

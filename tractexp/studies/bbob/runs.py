@@ -33,8 +33,8 @@ def package() -> Any:
         import ioh
     except ImportError as error:
         raise UserError(
-            f"{setting('task=benchmark')} needs the package 'ioh', which is not installed: "
-            "pip install 'tractexp[benchmark]'"
+            f"{setting('task=benchmark')} needs the package 'ioh', which is not installed: pip"
+            " install 'tractexp[benchmark]'"
         ) from error
     return ioh
 
@@ -72,8 +72,7 @@ class Bbob:
         """Raise `UserError`: a function of BBOB is no sum of squares."""
         raise UserError(
             "a BBOB function is no sum of squares, so least squares have no residuals to work on;"
-            " choose another"
-            " optimizer, without optimizer.polish"
+            " choose another optimizer, without optimizer.polish"
         )
 
     @property

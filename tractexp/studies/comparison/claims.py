@@ -158,16 +158,15 @@ def of_pair(comparison: Comparison, pair: VariantPair) -> str:
         start = f"On {pair.seeds} seeds, "
         reached = (
             f"{pair.first} reaches a median objective of {first} with {number(spent[0].median)}"
-            " simulations "
-            f"(median) against {second} with {number(spent[1].median)} for {pair.second}"
+            f" simulations (median) against {second} with {number(spent[1].median)} for"
+            f" {pair.second}"
         )
     verdict = "is significant" if pair.significant else "is not significant"
     tests = len(comparison.pairs)
     return (
         f"{start}{reached}; the difference {verdict} (Wilcoxon signed-rank, Holm-corrected over"
-        f" {tests} "
-        f"{'pair' if tests == 1 else 'pairs'}, p = {p_value(pair.corrected)}; Vargha-Delaney A ="
-        f" {pair.effect:.2f})."
+        f" {tests} {'pair' if tests == 1 else 'pairs'}, p = {p_value(pair.corrected)};"
+        f" Vargha-Delaney A = {pair.effect:.2f})."
     )
 
 
@@ -187,8 +186,7 @@ def of_ranks(comparison: Comparison) -> str:
     differ = "differ" if ranks.p < SIGNIFICANCE_LEVEL else "do not differ significantly"
     text = (
         f"Over {ranks.seeds} seeds the mean ranks {differ} (Friedman chi-square = {ranks.chi2:.2f},"
-        f" {len(order) - 1} "
-        f"degrees of freedom, p = {p_value(ranks.p)}): {listed}{more}"
+        f" {len(order) - 1} degrees of freedom, p = {p_value(ranks.p)}): {listed}{more}"
     )
     if ranks.p < SIGNIFICANCE_LEVEL:
         text += (
@@ -258,10 +256,8 @@ def of_effect(effect: SwitchEffect) -> str:
     )
     return (
         f"Switching on {switch} multiplies the objective by {number(effect.factor)} (geometric mean"
-        " over "
-        f"{effect.seeds} seeds, 95 % bootstrap interval {number(effect.low)} to"
-        f" {number(effect.high)}, from "
-        f"{_listed_contrasts(effect)}): {verdict}."
+        f" over {effect.seeds} seeds, 95 % bootstrap interval {number(effect.low)} to"
+        f" {number(effect.high)}, from {_listed_contrasts(effect)}): {verdict}."
     )
 
 
@@ -282,9 +278,8 @@ def of_unknown(ablation: Ablation) -> str:
     names = "; ".join(" with ".join(key) for key in ablation.unknown)
     return (
         f"Not to be had from these {len(ablation.variants)} variants: {names}. A main effect takes"
-        " two variants that "
-        "differ in that switch alone, an interaction of two switches takes four that differ in"
-        " those alone."
+        " two variants that differ in that switch alone, an interaction of two switches takes four"
+        " that differ in those alone."
     )
 
 

@@ -174,11 +174,9 @@ def _describe_untested(
     seeds, pair = min(zip(common, pairs, strict=True), key=lambda row: len(row[0]))
     names = " and ".join(variant.name for variant in pair)
     return [
-        f"{few} of {len(pairs)} pairs were not tested, for want of"
-        f" seeds: {names} have "
-        f"{len(seeds)} in common, and the Wilcoxon signed-rank test needs at least"
-        f" {LEAST_SEEDS} to reach "
-        f"{SIGNIFICANCE_LEVEL:.0%}; run more, such as 'seed=range(0,30)'."
+        f"{few} of {len(pairs)} pairs were not tested, for want of seeds: {names} have {len(seeds)}"
+        f" in common, and the Wilcoxon signed-rank test needs at least {LEAST_SEEDS} to reach"
+        f" {SIGNIFICANCE_LEVEL:.0%}; run more, such as 'seed=range(0,30)'."
     ]
 
 
@@ -188,9 +186,9 @@ def _describe_power(tested: Sequence[VariantPair]) -> list[str]:
     if max((pair.seeds for pair in tested), default=needed) >= needed:
         return []
     return [
-        f"With {len(tested)} pairs corrected for, fewer than {needed} seeds can show no"
-        f" difference at {SIGNIFICANCE_LEVEL:.0%}, "
-        "however large: run more seeds, or test against one variant by task.reference=NAME."
+        f"With {len(tested)} pairs corrected for, fewer than {needed} seeds can show no difference"
+        f" at {SIGNIFICANCE_LEVEL:.0%}, however large: run more seeds, or test against one variant"
+        " by task.reference=NAME."
     ]
 
 
@@ -221,8 +219,8 @@ def _ranks(variants: Sequence[Variant], least: float) -> tuple[Ranks | None, lis
     if len(seeds) < LEAST_SEEDS:
         return None, [
             f"The variants were not ranked: they have {len(seeds) or 'no'}"
-            f" {'seed' if len(seeds) == 1 else 'seeds'} in common, "
-            f"and Friedman's test with its critical difference needs at least {LEAST_SEEDS}."
+            f" {'seed' if len(seeds) == 1 else 'seeds'} in common, and Friedman's test with its"
+            f" critical difference needs at least {LEAST_SEEDS}."
         ]
     table = np.array([[max(v.objectives[seed], least) for v in variants] for seed in seeds])
     return friedman([v.name for v in variants], table), []

@@ -30,9 +30,8 @@ def newest_sweep(folder: Path) -> Path:
     sweeps = [path for path in folder.iterdir() if _jobs(path)] if folder.is_dir() else []
     if not sweeps:
         raise UserError(
-            f"there is no sweep under {folder} to compare; make one, such as "
-            "tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)', or name one by"
-            f" {TASK.sweep}=FOLDER"
+            f"there is no sweep under {folder} to compare; make one, such as tractexp -m"
+            f" optimizer=issa,ssa,pso 'seed=range(0,30)', or name one by {TASK.sweep}=FOLDER"
         )
     return max(
         sweeps, key=lambda path: (max(job.stat().st_mtime for job in _jobs(path)), path.name)
@@ -220,8 +219,7 @@ def from_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
     if not runs:
         raise UserError(
             f"{source} matches no run of task={FITTING}; the tags to filter by are task, model,"
-            " optimizer, data and "
-            f"seed, as in {TASK.filter}=\"tags.data = 'tibet_50pct'\""
+            f" optimizer, data and seed, as in {TASK.filter}=\"tags.data = 'tibet_50pct'\""
         )
     return runs
 

@@ -60,8 +60,7 @@ def _overall(page: Report, overall: Overall) -> None:
         page.chart(
             effects(overall),
             f"The factor by which switching an ingredient on multiplies the {what}, with 95 %"
-            " bootstrap"
-            f" intervals{over}: left of 1 it helps.",
+            f" bootstrap intervals{over}: left of 1 it helps.",
         )
         _effects(page, overall, overall.ablation)
     if overall.ranks:
@@ -69,10 +68,8 @@ def _overall(page: Report, overall: Overall) -> None:
         page.chart(
             charts.mean_ranks(overall.ranks, f"mean rank within a {overall.block} (1 is best)"),
             f"Mean ranks over {overall.ranks.seeds} blocks, one for each {overall.block}, with half"
-            " of Nemenyi's"
-            " critical difference to either side: variants whose bars do not overlap differ"
-            " significantly at"
-            f" {SIGNIFICANCE_LEVEL:.0%}.",
+            " of Nemenyi's critical difference to either side: variants whose bars do not overlap"
+            f" differ significantly at {SIGNIFICANCE_LEVEL:.0%}.",
         )
     tell = (lambda x: f"{x:.0%}") if overall.share else (lambda x: number(x, 3))
     ranks = dict(zip(overall.ranks.names, overall.ranks.mean, strict=True)) if overall.ranks else {}
@@ -141,10 +138,9 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
         columns,
         rows,
         f"Main effects over {ablation.effects[0].seeds} blocks, each from"
-        f" {len(ablation.effects[0].contrasts)} pairs"
-        " of variants that differ in that switch alone. Better in: the share of these pairs in"
-        " which the run with it"
-        " ends lower; 50 % is no difference. 95 % bootstrap intervals."
+        f" {len(ablation.effects[0].contrasts)} pairs of variants that differ in that switch alone."
+        " Better in: the share of these pairs in which the run with it ends lower; 50 % is no"
+        " difference. 95 % bootstrap intervals."
         + (" Simulations per iteration: what switching on adds to the cost." if cost else ""),
     )
     if not (ablation.interactions or ablation.company):
@@ -178,21 +174,17 @@ def _reading(page: Report) -> Report:
     return page.heading("How to read this page").items(
         [
             "Every problem has a floor of its own, the lowest objective that least squares reach;"
-            " objectives are told"
-            " in multiples of it, and count as equal where they are within rounding of it.",
+            " objectives are told in multiples of it, and count as equal where they are within"
+            " rounding of it.",
             "Over several records an effect is the mean of its logarithm over the records, seed by"
-            " seed; its interval"
-            " says how much other seeds may change it, not other records. On BBOB the functions are"
-            " drawn anew.",
+            " seed; its interval says how much other seeds may change it, not other records. On"
+            " BBOB the functions are drawn anew.",
             "Under equal simulations every search is laid out to end with its budget; under equal"
-            " iterations it spends"
-            " what its ingredients cost, which the table of effects tells.",
+            " iterations it spends what its ingredients cost, which the table of effects tells.",
             "task=compare task.sweep=FOLDER task.data=NAME makes the whole page of one problem:"
-            " curves, running times,"
-            " every pair of variants, parameters.",
+            " curves, running times, every pair of variants, parameters.",
             "Friedman 1937 and Nemenyi 1963 after Demsar 2006; bootstrap intervals after Efron"
-            " 1979; BBOB: Hansen,"
-            " Finck, Ros and Auger 2009.",
+            " 1979; BBOB: Hansen, Finck, Ros and Auger 2009.",
         ]
     )
 

@@ -89,8 +89,8 @@ def quality(page: Report, comparison: Comparison) -> None:
         [*columns, "in its valley"],
         rows,
         f"Objective of Eq. (8) [pu²] {AT_END}. At floor: share of runs within {FLOOR_SHARE:.0%} of"
-        f" {floor}. In its "
-        "valley: share of the finished runs from whose end least squares reach it.",
+        f" {floor}. In its valley: share of the finished runs from whose end least squares reach"
+        " it.",
     )
     for name in ("epsilon_p", "epsilon_q"):
         rows = [[s.name, *_spread(getattr(s, name), 100.0)] for s in comparison.summaries]
@@ -116,10 +116,8 @@ def _parameters(page: Report, comparison: Comparison) -> None:
     page.chart(
         drawn,
         f"Parameters {AT_END}, each axis as wide as the runs scatter; dashed: those of the lowest"
-        " objective, "
-        f"{number(polished.objective, 5)} pu². Least squares from where they ended lead {inside} of"
-        " "
-        f"{len(polished.reached)} runs there, and the others to higher valleys.",
+        f" objective, {number(polished.objective, 5)} pu². Least squares from where they ended lead"
+        f" {inside} of {len(polished.reached)} runs there, and the others to higher valleys.",
     )
     rows = [
         [
@@ -172,8 +170,7 @@ def _speed(page: Report, comparison: Comparison) -> None:
         columns,
         rows,
         "Median of all simulations made, and expected running time (ERT) to each target: what all"
-        " runs spent until "
-        "they reached it, those that did not all they had, per run that did.",
+        " runs spent until they reached it, those that did not all they had, per run that did.",
     )
 
 
@@ -203,8 +200,8 @@ def _differences(page: Report, comparison: Comparison) -> None:
         page.chart(
             charts.mean_ranks(comparison.ranks),
             "Mean ranks over seeds, with half of Nemenyi's critical difference to either side:"
-            " variants whose bars "
-            f"do not overlap differ significantly at {SIGNIFICANCE_LEVEL:.0%}.",
+            " variants whose bars do not overlap differ significantly at"
+            f" {SIGNIFICANCE_LEVEL:.0%}.",
         )
     if not comparison.pairs:
         return
@@ -252,8 +249,8 @@ def _pairs(page: Report, pairs: list[VariantPair]) -> None:
         ],
         rows,
         "p: Wilcoxon signed-rank test over paired seeds, two-sided, as it is and after Holm's"
-        " correction. A: "
-        "probability that a run of the first ends lower than one of the second (Vargha-Delaney).",
+        " correction. A: probability that a run of the first ends lower than one of the second"
+        " (Vargha-Delaney).",
         words=(1, 8),
     )
 
@@ -323,24 +320,20 @@ def _reading(page: Report, comparison: Comparison) -> None:
     page.heading("How to read this page").items(
         [
             f"Objectives within {comparison.ties:g} of the floor count as equal in the tests: what"
-            " is left there is "
-            "rounding, not quality. The tables show them as they are.",
+            " is left there is rounding, not quality. The tables show them as they are.",
             "A failed run counts as worse than any other in the tests; its budget counts as spent"
-            " in the ERT; "
-            "quartiles and curves are those of the finished runs. An interrupted run counts as"
-            " nothing.",
+            " in the ERT; quartiles and curves are those of the finished runs. An interrupted run"
+            " counts as nothing.",
             "The optimizer is judged by where its own search ended. An identification goes on from"
-            " there: its estimate "
-            "is polished by least squares from several starts, and mostly the same whichever"
-            " optimizer is taken.",
+            " there: its estimate is polished by least squares from several starts, and mostly the"
+            " same whichever optimizer is taken.",
             "A target counts as reached at the end of the iteration in which it was, so running"
-            " times are at most "
-            "one iteration too long.",
+            " times are at most one iteration too long.",
             "Not significant means that these runs do not show a difference, not that there is"
             " none.",
             "Wilcoxon 1945; Holm 1979; Vargha and Delaney 2000; Friedman 1937 and Nemenyi 1963"
-            " after Demsar 2006; ERT "
-            "after Hansen et al. 2021 (COCO); bootstrap intervals after Efron 1979.",
+            " after Demsar 2006; ERT after Hansen et al. 2021 (COCO); bootstrap intervals after"
+            " Efron 1979.",
         ]
     )
 

@@ -180,8 +180,7 @@ def _describe_versions(runs: Sequence[SearchRun]) -> list[str]:
         return []
     return [
         f"The runs were made by different code ({', '.join(sorted(versions))}): a difference"
-        " between variants may"
-        " be one between versions."
+        " between variants may be one between versions."
     ]
 
 
@@ -275,8 +274,7 @@ def _check_same_problem(runs: Sequence[SearchRun], source: str) -> None:
     if len(chosen) > 1:
         raise UserError(
             f"{source} holds runs on different data ({', '.join(chosen)}), whose objectives cannot"
-            " be compared; "
-            f"choose one, such as {TASK.data}={chosen[0]}"
+            f" be compared; choose one, such as {TASK.data}={chosen[0]}"
         )
     keys = set(itertools.chain.from_iterable(run.config for run in runs))
 
@@ -286,7 +284,6 @@ def _check_same_problem(runs: Sequence[SearchRun], source: str) -> None:
             if len(values) > 1:
                 raise UserError(
                     f"{source} holds runs that differ in {key} ({', '.join(values)}), so their"
-                    " objectives cannot be "
-                    "compared; compare one problem at a time, from sweeps of their own or by"
-                    f" {TASK.filter}"
+                    " objectives cannot be compared; compare one problem at a time, from sweeps of"
+                    f" their own or by {TASK.filter}"
                 )

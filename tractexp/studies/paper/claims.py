@@ -208,8 +208,8 @@ def table2(study: Study) -> list[Claim]:
         Claim(
             "table2",
             "the identified values",
-            f"with them Eq. (3) asks for the arcsine of {sine:.2f}, and C ="
-            " (X - X')/X = -2.62 is no ratio of reactances; the record is not public",
+            f"with them Eq. (3) asks for the arcsine of {sine:.2f}, and C = (X - X')/X = -2.62 is"
+            " no ratio of reactances; the record is not public",
             IMPOSSIBLE,
         ),
         Claim(
@@ -257,10 +257,8 @@ def table3(study: Study) -> list[Claim]:
             "table3",
             "the three columns are fits to one record",
             "errors and objective of a column give mean P² and Q²; ISSA's and SSA's give a mean Q²"
-            " of"
-            f" {gap.pairs['issa and ssa'][1]:.2f}, and the best common pair misses"
-            f" {LABELS[worst]}'s objective by"
-            f" {100 * abs(gap.misses[worst]):.0f} %",
+            f" of {gap.pairs['issa and ssa'][1]:.2f}, and the best common pair misses"
+            f" {LABELS[worst]}'s objective by {100 * abs(gap.misses[worst]):.0f} %",
             IMPOSSIBLE,
         )
     )
@@ -396,8 +394,7 @@ def claim_generalization(
                 part,
                 f"ISSA's model has the best {kind} overall",
                 f"median residuals of P, Q [pu]: {'; '.join(phrases)}. The paper's own table has"
-                f" {LABELS[own[0]]}"
-                " lowest in P",
+                f" {LABELS[own[0]]} lowest in P",
                 merge_verdicts(verdicts),
             ),
         ]
@@ -433,16 +430,14 @@ def figure3(study: Study) -> list[Claim]:
             "figure3",
             "with alpha = 0.3 it is relatively uniform",
             f"lowest of the alphas tried: {best.partition(', ')[2]} with {number(tent[best])}; 0.3"
-            " has"
-            f" {number(tent[own])}",
+            f" has {number(tent[own])}",
             CONFIRMED if tent[own] < DIFFERENT * tent[best] else REFUTED,
         ),
         Claim(
             "figure3",
             "initializing by the tent map makes the flock more even",
             f"{far:.2f} times the discrepancy of plain random numbers,"
-            f" {middle[own] / middle['Sobol']:.1f} times"
-            " that of Sobol points",
+            f" {middle[own] / middle['Sobol']:.1f} times that of Sobol points",
             CONFIRMED if far < 1 / DIFFERENT else REFUTED,
         ),
     ]
@@ -464,8 +459,8 @@ def figure4(study: Study) -> list[Claim]:
             "figure4",
             "Eq. (15) gives Lévy steps with beta = 3/2",
             f"as printed the tail exponent is {slopes['printed']:.2f} (2/3 in theory), which a Lévy"
-            " flight of"
-            f" exponent 3/2 has not; Mantegna's |nu|^(1/beta) has {slopes['mantegna']:.2f}",
+            " flight of exponent 3/2 has not; Mantegna's |nu|^(1/beta) has"
+            f" {slopes['mantegna']:.2f}",
             CONFIRMED if abs(slopes["printed"] - 1.5) < 0.2 else REFUTED,
         ),
     ]
@@ -506,8 +501,7 @@ def readings(study: Study) -> list[Claim]:
             "readings",
             "ISSA is better than SSA, whatever the reading of Eqs. (11) to (13)",
             f"of {len(both)} readings, at 300 iterations, ISSA ends significantly lower in"
-            f" {sum(issa)}, SSA in"
-            f" {sum(ssa)}",
+            f" {sum(issa)}, SSA in {sum(ssa)}",
             _sure(study, all(issa)),
         ),
         Claim(
@@ -521,8 +515,7 @@ def readings(study: Study) -> list[Claim]:
             "readings",
             "SSA searches the space without preference",
             "error on the sphere with the optimum one unit off zero over that at zero: SSA"
-            f" {zero['ssa']:.0e},"
-            f" ISSA {zero['issa']:.0e}, PSO {zero['pso']:.1g}",
+            f" {zero['ssa']:.0e}, ISSA {zero['issa']:.0e}, PSO {zero['pso']:.1g}",
             CONFIRMED if zero["ssa"] < 100 else REFUTED,
         ),
     ]

@@ -43,8 +43,8 @@ def _model(parts: Mapping[str, list[Claim]]) -> str:
     said = []
     if good:
         said.append(
-            f"describes {join_words(good)} dip with errors below 5 %,"
-            " with every seed and reading tried"
+            f"describes {join_words(good)} dip with errors below 5 %, with every seed and reading"
+            " tried"
         )
     said += [
         f"of {dip} dip this {verdict}" if verdict.startswith(DEPENDS) else f"not {dip} dip"
@@ -60,8 +60,8 @@ def _values() -> str:
     failed = sum(not check.holds for check in checks)
     return (
         "The parameters printed are not those of the equations printed: Eq. (3) has no steady state"
-        " for any column of"
-        f" Table 3, and of {len(checks)} checks of the print against itself {failed} fail."
+        f" for any column of Table 3, and of {len(checks)} checks of the print against itself"
+        f" {failed} fail."
     )
 
 
@@ -113,9 +113,8 @@ def _random(study: Study) -> str:
     above = ", ".join(f"{LABELS[n]} {np.median(study.above_bottom(n)):.2f}" for n in COMPARED)
     return (
         f"In the valley of the lowest objective end {there} searches, and {control.valley} of"
-        f" {control.n} random points"
-        " descend there; the median objective over that at the bottom of the search's own valley"
-        f" is {above}."
+        f" {control.n} random points descend there; the median objective over that at the bottom of"
+        f" the search's own valley is {above}."
     )
 
 
@@ -146,8 +145,7 @@ def reasons(study: Study) -> list[str]:
     word = word if p < why.SIGNIFICANCE_LEVEL else f"not significantly {word}"
     paragraphs.append(
         f"PSO is in the right valley {word} often than random points (p = {p:.2g}); with its"
-        " velocity limited to 0.2 in"
-        f" {limited.valley} of {limited.n} searches."
+        f" velocity limited to 0.2 in {limited.valley} of {limited.n} searches."
     )
     return paragraphs
 
@@ -167,10 +165,8 @@ def _describe_lack(lack: why.Lack) -> str:
         ended = f"significantly {'higher' if lack.polished.less else 'lower'} than"
     return (
         f"{LABELS[lack.name]} ends {farther}significantly farther above the bottom of its own"
-        " valley than PSO, and is"
-        f" {often}significantly less often in the right valley than {than}. Once least squares have"
-        " ended both, it is"
-        f" {ended} PSO."
+        f" valley than PSO, and is {often}significantly less often in the right valley than {than}."
+        f" Once least squares have ended both, it is {ended} PSO."
     )
 
 
@@ -208,10 +204,9 @@ def valley(study: Study) -> list[str]:
     each = ", ".join(f"{LABELS[n]} {k}" for n, k in ended.items())
     paragraphs = [
         f"{sum(ended.values())} of {3 * study.seeds} searches ({each}) end in a valley whose bottom"
-        f" lies {where}, with"
-        f" {second / lowest:.2f} times the lowest objective, which is at {TRADED} ="
-        f" {right[column]:.3g};"
-        f" {count} of {len(study.control.objective)} random points of the bounds descend there."
+        f" lies {where}, with {second / lowest:.2f} times the lowest objective, which is at"
+        f" {TRADED} = {right[column]:.3g}; {count} of {len(study.control.objective)} random points"
+        " of the bounds descend there."
     ]
     if at_bound and second < LARGEST_NEAR_RATIO * lowest and right[column] > other[column]:
         paragraphs += _attraction(study, lowest, right, other)
@@ -229,9 +224,8 @@ def _attraction(study: Study, lowest: float, right: np.ndarray, other: np.ndarra
     static = static_reactive(study, np.stack((right, other)))
     remark = (
         " There the static load's part of the reactive power, Q_s0 = Q0 - Q_d0, changes its sign:"
-        f" {static[0]:+.2f} pu"
-        f" in the lowest valley, {static[1]:+.2f} pu in the other, which stands for a source such"
-        " as a capacitor."
+        f" {static[0]:+.2f} pu in the lowest valley, {static[1]:+.2f} pu in the other, which stands"
+        " for a source such as a capacitor."
         if static is not None and static[0] * static[1] < 0
         else ""
     )
@@ -264,16 +258,15 @@ def _describe_trade(study: Study, along: np.ndarray, here: int, lowest: float) -
     if "X_prime" in names:
         ratio = path.values[along, names.index("X_prime")] / path.values[along, names.index(TRADED)]
         sentence += (
-            f" {TRADED} trades against X': X'/{TRADED} stays {np.median(ratio):.3f}"
-            f" (within {50 * np.ptp(ratio) / np.median(ratio):.1f} %), so that the motor draws the"
-            " same active power."
+            f" {TRADED} trades against X': X'/{TRADED} stays {np.median(ratio):.3f} (within"
+            f" {50 * np.ptp(ratio) / np.median(ratio):.1f} %), so that the motor draws the same"
+            " active power."
         )
     if {"X_prime", "q_v"} <= set(names):
         q_v = path.values[:, names.index("q_v")]
         sentence += (
             " As the U²/X' of its reactive power grows, the static load takes it off again, with"
-            " its exponent"
-            " approaching that of the motor's term, 2: q_v is"
+            " its exponent approaching that of the motor's term, 2: q_v is"
             f" {join_words([f'{q_v[k]:.2f}' for k in places])} there."
         )
     return sentence
@@ -289,7 +282,6 @@ def _bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
     helps = shares[NARROW] > 1.5 * shares[own] and shares[WIDE] < 1.1 * shares[own]
     return (
         f"Of random points, these descend to the lowest objective by the lower bound of {TRADED}:"
-        f" {listed}, where"
-        " induction motors have it"
+        f" {listed}, where induction motors have it"
         + (". Wider bounds do not help, narrower ones do." if helps else ".")
     )

@@ -170,8 +170,7 @@ def _errors() -> list[Check]:
                 f"Table 3, {LABELS[first]} and {LABELS[second]}",
                 "errors and objectives of one record",
                 "Eq. (8) is epsilon_p² mean(P²) + epsilon_q² mean(Q²), Eq. (20): the means are"
-                f" {P:.2f} and"
-                f" {Q:.2f}, and no mean of squares is negative",
+                f" {P:.2f} and {Q:.2f}, and no mean of squares is negative",
                 min(P, Q) >= 0,
             )
         )
@@ -203,8 +202,7 @@ def _methods() -> list[Check]:
             "Eq. (15)",
             "Lévy steps with beta = 3/2",
             f"-mu/|nu|^beta has the tail exponent {slopes['printed']:.2f}; Mantegna's"
-            " mu/|nu|^(1/beta)"
-            f" {slopes['mantegna']:.2f}",
+            f" mu/|nu|^(1/beta) {slopes['mantegna']:.2f}",
             abs(slopes["printed"] - 1.5) < 0.2,
         ),
         Check(

@@ -44,8 +44,7 @@ def figure3(sheet: Report, study: Study) -> None:
         ["way to scatter", *study.uniformity],
         [[way, *(middle(kind[way]) for kind in study.uniformity.values())] for way in flock],
         "Centered discrepancy (Hickernell 1998), median (lowest .. highest). With alpha = 0.5 an"
-        " orbit reaches 0 in"
-        " about 53 steps of binary arithmetic; it is then started anew.",
+        " orbit reaches 0 in about 53 steps of binary arithmetic; it is then started anew.",
     )
 
 
@@ -123,8 +122,7 @@ def figure9(sheet: Report, study: Study) -> None:
         ["", *(f"{by} to {t:g} × floor" for by in BUDGETS for t in TARGETS)],
         rows,
         "Expected running times: all that was spent until the target, per search that reached it;"
-        " by simulations of"
-        f" the searches that are laid out for {study.equal:,}.",
+        f" by simulations of the searches that are laid out for {study.equal:,}.",
     )
     _reasons(sheet, study)
     if study.has_traded_parameter:
@@ -181,10 +179,8 @@ def _reasons(sheet: Report, study: Study) -> None:
         ],
         rows,
         "In a valley is a search from whose end least squares reach its bottom; at a bottom or at"
-        " the floor means"
-        f" within {FLOOR_FACTOR:g} times of it. The control: {RANDOM} random points of the bounds,"
-        " and the best of"
-        f" {study.equal:,} of them.",
+        f" the floor means within {FLOOR_FACTOR:g} times of it. The control: {RANDOM} random points"
+        f" of the bounds, and the best of {study.equal:,} of them.",
     )
     sheet.table(
         [
@@ -206,8 +202,7 @@ def _reasons(sheet: Report, study: Study) -> None:
             for k in why.lacks(study)
         ],
         "First and last Wilcoxon's test over paired seeds, the others Fisher's exact test;"
-        " two-sided, all by Holm's"
-        " correction. SD = 20, no velocity limit.",
+        " two-sided, all by Holm's correction. SD = 20, no velocity limit.",
     )
 
 
@@ -228,9 +223,8 @@ def _valleys(sheet: Report, study: Study) -> None:
     sheet.chart(
         figures.along(TRADED, grid, shown, own, bottoms),
         f"The best fit for each value of {TRADED}, all other parameters fitted again. Dots: the two"
-        " valleys. Shaded:"
-        f" beyond the bounds of {TRADED}. Q_s0 is what is left of Q before the dip to the static"
-        " load.",
+        f" valleys. Shaded: beyond the bounds of {TRADED}. Q_s0 is what is left of Q before the dip"
+        " to the static load.",
     )
     _add_ends(sheet, study)
     _add_valleys_by_bounds(sheet, study, index[TRADED])
@@ -248,8 +242,7 @@ def _add_ends(sheet: Report, study: Study) -> None:
         ["valley: objective", *(LABELS[n] for n in every), "random points", *names],
         rows,
         f"Where least squares lead the {study.seeds} searches of each and {RANDOM} random points;"
-        " of the latter the"
-        " lowest four.",
+        " of the latter the lowest four.",
     )
 
 

@@ -31,9 +31,8 @@ TITLE = "The paper, table by table"
 
 LEAD = (
     "Wu, Fan and Zou, “Traction Load Modeling and Parameter Identification Based on Improved"
-    " Sparrow Search"
-    " Algorithm”, Energies 2022, 15(14), 5034: what it prints, and what we measure. Written by"
-    " task=paper."
+    " Sparrow Search Algorithm”, Energies 2022, 15(14), 5034: what it prints, and what we measure."
+    " Written by task=paper."
 )
 
 
@@ -58,21 +57,19 @@ def _top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
     names = ", ".join(event.record.name for event in events)
     seeds = f"{study.seeds} seeds; one run means seed 0." + (
         f" Searches were stopped at {study.limits.simulations} simulations, so these are not the"
-        " paper's 300"
-        " iterations."
+        " paper's 300 iterations."
         if study.limits and study.limits.simulations
         else ""
     )
     sheet.text(
         "The paper's record was never published. Our numbers are measured on other records, so no"
-        " value can equal"
-        " the paper's: what can be checked is which statements hold, on data of this kind.",
+        " value can equal the paper's: what can be checked is which statements hold, on data of"
+        " this kind.",
         f"Records: {names}" + (f" ({'; '.join(notes)})" if notes else "") + ".",
         f"{seeds} Where the text can be read in two ways, the tables follow section 4.3: 20 of 50"
-        " sparrows perceive"
-        " danger (section 4.2 has 10), and velocities of particles have no limit, for none is"
-        " printed. The other"
-        " readings stand beside it, and a verdict that depends on the reading says so.",
+        " sparrows perceive danger (section 4.2 has 10), and velocities of particles have no limit,"
+        " for none is printed. The other readings stand beside it, and a verdict that depends on"
+        " the reading says so.",
     )
     if not claims:
         return
@@ -81,10 +78,8 @@ def _top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
         ["where", "the paper's claim", "verdict", "measured"],
         [[_place(c.part), c.text, c.verdict, c.measured] for c in claims],
         "Where the paper does not say it in so many words, a claim is what its argument needs. p:"
-        " Wilcoxon's"
-        " signed-rank test over paired seeds, by Holm's correction; A: the probability that the"
-        " first ends lower"
-        " (Vargha and Delaney).",
+        " Wilcoxon's signed-rank test over paired seeds, by Holm's correction; A: the probability"
+        " that the first ends lower (Vargha and Delaney).",
         words=(1, 2, 3),
     )
 
@@ -115,10 +110,9 @@ def equations_section(sheet: Report, study: Study) -> None:
     )
     sheet.text(
         "T_m is the motor's power before the event, in per unit of a load normalized to about 1;"
-        " Table 3 has 3.38, 3.02"
-        " and 1.23. Mantegna's step and the classical Runge-Kutta method are used unless"
-        " levy_formula=printed and"
-        " model.integration=printed are chosen; experiment=to_the_letter takes all as printed."
+        " Table 3 has 3.38, 3.02 and 1.23. Mantegna's step and the classical Runge-Kutta method are"
+        " used unless levy_formula=printed and model.integration=printed are chosen;"
+        " experiment=to_the_letter takes all as printed."
     )
 
 
@@ -138,11 +132,9 @@ def readings_section(sheet: Report, study: Study) -> None:
         ["reading", "SSA", "ISSA"],
         rows,
         "Objective after 300 iterations [pu²], median (best .. worst). Unless said: unit cube,"
-        " better-only,"
-        f" element-wise, SD = 20. {TO_THE_LETTER} A⁺L in Eq. (12) is one number as printed; step 5"
-        " chooses between"
-        " Gaussian variation and tent perturbation by fitness, section 3.2.3 by stage of the"
-        " search.",
+        f" better-only, element-wise, SD = 20. {TO_THE_LETTER} A⁺L in Eq. (12) is one number as"
+        " printed; step 5 chooses between Gaussian variation and tent perturbation by fitness,"
+        " section 3.2.3 by stage of the search.",
     )
     sheet.heading("ISSA without one of its ingredients", 3)
     rows = [["ISSA", *_costs(study, "issa")]]
@@ -152,17 +144,16 @@ def readings_section(sheet: Report, study: Study) -> None:
         ["", "objective after 300 iterations [pu²]", "simulations"],
         rows,
         "SD = 20. By iterations, an ingredient that costs simulations is paid for by nobody:"
-        " experiment=ablation"
-        " compares at equal simulations too, adds each to SSA, and crosses them.",
+        " experiment=ablation compares at equal simulations too, adds each to SSA, and crosses"
+        " them.",
     )
     sheet.heading("Drawn to zero", 3)
     sheet.table(
         ["sphere in ten dimensions, raw units", "optimum at zero", "one unit away"],
         [[LABELS[n], f"{near:.0e}", f"{far:.0e}"] for n, (near, far) in study.bias.items()],
         "Median error of 7 seeds after 10,000 evaluations, the sparrow searches with one scalar for"
-        " A⁺L, as printed."
-        " Eq. (11) multiplies by numbers below one, and half of the flock starves to"
-        " Q (1, ..., 1).",
+        " A⁺L, as printed. Eq. (11) multiplies by numbers below one, and half of the flock starves"
+        " to Q (1, ..., 1).",
     )
 
 

@@ -325,8 +325,7 @@ class Study:
             which = "no deeper" if kind == "interpolation" else "deeper"
             raise UserError(
                 f"there is no held-out event for the {kind}: a dip {which} than the fitted one is"
-                " needed;"
-                f" name one in {DATA.validate}, or leave the table out with {TASK.parts}"
+                f" needed; name one in {DATA.validate}, or leave the table out with {TASK.parts}"
             )
         return chosen
 

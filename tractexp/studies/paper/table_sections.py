@@ -13,8 +13,7 @@ from tractexp.studies.paper.study import BUDGETS, FLOOR_FACTOR, LEVEL, Study
 
 TO_THE_LETTER = (
     "To the letter: Eqs. (4), (12) and (15) as they are printed, in raw units, every move taken, SD"
-    " = 20, one step per"
-    " sample; the objective is that of this model."
+    " = 20, one step per sample; the objective is that of this model."
 )
 
 THREE = ("paper", "one", "median")
@@ -25,9 +24,8 @@ def table1(sheet: Report, study: Study) -> None:
     sheet.heading("Table 1: three orders of the motor")
     sheet.text(
         "The paper grades the models in words and shows no numbers. Here each is fitted to the same"
-        " record by least"
-        " squares from many starts, with the same static load, and judged on the dips it has not"
-        " seen."
+        " record by least squares from many starts, with the same static load, and judged on the"
+        " dips it has not seen."
     )
     rows, sizes = [], []
     for motor, order in study.orders.items():
@@ -69,8 +67,7 @@ def table1(sheet: Report, study: Study) -> None:
         ],
         rows,
         "Condition: of the information matrix, parameters in units of their ranges. Finite"
-        " intervals: 95 %, inside the"
-        " bounds. Identified: within ± 20 %.",
+        " intervals: 95 %, inside the bounds. Identified: within ± 20 %.",
         words=(1,),
     )
     sheet.table(
@@ -84,10 +81,9 @@ def table1(sheet: Report, study: Study) -> None:
         ],
         sizes,
         "Operations: additions, multiplications, divisions and others of the compiled equations for"
-        " one candidate, four"
-        " stages and the powers of the static load included; a step is as short as the accuracy"
-        " asks for. The time, on"
-        " this machine and among many candidates at once, decides nothing.",
+        " one candidate, four stages and the powers of the static load included; a step is as short"
+        " as the accuracy asks for. The time, on this machine and among many candidates at once,"
+        " decides nothing.",
     )
     verdicts = [
         f"{m}: {n} {v}"
@@ -155,10 +151,9 @@ def table2(sheet: Report, study: Study) -> None:
         study,
         [*(("issa", what) for what in THREE), *others],
         f"The lowest objective known on this record is {number(study.reference.objective)} pu²,"
-        " found by least squares"
-        f" from many starts in {study.reference.simulations:,} simulations. Errors are fractions."
-        " Bounds are ours, in"
-        " s, pu, 1, pu s²/rad, pu, 1 and 1: the paper prints none. " + TO_THE_LETTER,
+        f" found by least squares from many starts in {study.reference.simulations:,} simulations."
+        " Errors are fractions. Bounds are ours, in s, pu, 1, pu s²/rad, pu, 1 and 1: the paper"
+        " prints none. " + TO_THE_LETTER,
     )
 
 
@@ -170,8 +165,7 @@ def table3(sheet: Report, study: Study) -> None:
         study,
         [(name, what) for name in COMPARED for what in THREE],
         "SD = 20, no velocity limit. Medians are taken for each row by itself, over searches that"
-        " end in different"
-        " valleys (see Figure 9). Bounds are ours; the paper prints none.",
+        " end in different valleys (see Figure 9). Bounds are ours; the paper prints none.",
     )
     others = (*TEN.values(), "pso_limited", *LITERAL.values())
     _parameters(
@@ -189,12 +183,9 @@ def table3(sheet: Report, study: Study) -> None:
         ],
         [_spent(study, name) for name in (*LEVEL, *LITERAL.values())],
         f"Median (best .. worst) of {study.seeds} seeds. The floor is {number(study.floor)} pu²; at"
-        " the floor means"
-        f" within {FLOOR_FACTOR:g} times. ISSA simulates its flock about twice in an iteration: by"
-        " iterations it has twice"
-        f" the means. Searches of {study.equal:,} simulations are laid out for them, so that every"
-        " schedule runs"
-        " whole.",
+        f" the floor means within {FLOOR_FACTOR:g} times. ISSA simulates its flock about twice in"
+        f" an iteration: by iterations it has twice the means. Searches of {study.equal:,}"
+        " simulations are laid out for them, so that every schedule runs whole.",
     )
     rows = []
     for by in BUDGETS:
