@@ -34,11 +34,11 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
     leaves.
     """
     from tractexp.configuration.plugin import get
-    from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.disagreement import disagreement
     from tractexp.inference.base_fit import base_fit
     from tractexp.inference.catalogue import catalogue
     from tractexp.inference.context import Context
+    from tractexp.inference.criteria import Criteria
     from tractexp.inference.effort import Effort
     from tractexp.inference.records import Records
     from tractexp.model.model import compose
@@ -73,7 +73,7 @@ def shares(rows: list[dict]) -> dict[float, float]:
     """The share of data sets in which something is named or doubted, for each level of chance that
     naming may take.
     """
-    from tractexp.discrepancy.criteria import Criteria
+    from tractexp.inference.criteria import Criteria
 
     ranks, left = (np.array([row[what] for row in rows]) for what in ("rank", "p_left"))
     return {

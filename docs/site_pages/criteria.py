@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 
 from site_pages.markdown import plain, table
-from tractexp.discrepancy.criteria import Criteria
+from tractexp.inference.criteria import Criteria
 from tractexp.storage import files
 
 HEAD = """# Criteria

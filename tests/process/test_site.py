@@ -12,8 +12,8 @@ import pytest
 from site_pages import api, catalogue, commands, criteria, gallery, markdown, tasks
 from tractexp import PUBLIC
 from tractexp.configuration.plugin import discover, get
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.extend import Effect, Parameter
+from tractexp.inference.criteria import Criteria
 from tractexp.model.printed import list_changed_lines
 
 ROOT = Path(__file__).parents[2]

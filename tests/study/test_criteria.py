@@ -10,8 +10,7 @@ import pytest
 from test_discrepancy import FEW, base, events, steady
 
 from tractexp.configuration.plugin import get
-from tractexp.discrepancy import criteria, disagreement, judgement
-from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
+from tractexp.discrepancy import disagreement, judgement
 from tractexp.discrepancy.decide import decide, holds, needs_all_events
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
@@ -27,10 +26,11 @@ from tractexp.discrepancy.proposal import judge
 from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.discrepancy.ranking import beats
 from tractexp.errors import UserError
-from tractexp.inference import catalogue, chance
+from tractexp.inference import catalogue, chance, criteria
 from tractexp.inference.catalogue import candidate, missing_channel
 from tractexp.inference.chance import Chance
 from tractexp.inference.context import FAULT_PRIOR
+from tractexp.inference.criteria import CHOSEN, DERIVED, Criteria
 from tractexp.inference.fitting import Refit
 from tractexp.inference.free_set import FreeSet
 from tractexp.inference.score_test import Score

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import decide
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.gap import GapTest
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit
 
 

@@ -25,7 +25,6 @@ from tractexp.cache import store
 from tractexp.configuration.plugin import get
 from tractexp.discrepancy import explanations
 from tractexp.discrepancy.all_events import AllEvents
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import holds, needs_all_events
 from tractexp.discrepancy.disagreement import disagreement, examine_fit
 from tractexp.discrepancy.discrepancy_json import content, recommendation, write_left, write_model
@@ -39,6 +38,7 @@ from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.chance import BLURRED, scales
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.fit_effort import FITS_AT_ONCE
 from tractexp.inference.fitting import Refit, refit

@@ -195,7 +195,7 @@ def test_two_dips_whose_loads_differ_are_told_by_parameters_of_each_event():
         ]
         pushed.append(estimate_without_search(Problem(study.model(), events)).surprise)
     assert (pushed[0].loudest, pushed[0].p < 1e-6) == (adequacy.PER_EVENT, True)
-    assert pushed[1].p > adequacy.ADEQUATE_P
+    assert pushed[1].p > goodness_of_fit.ADEQUATE_P
 
 
 def test_what_is_judged_is_the_estimate_against_all_draws(fit, monkeypatch):
@@ -225,7 +225,7 @@ def test_p_of_noise_alone_is_no_smaller_than_it_says():
         again = replace(known.likelihood, problem=problem)
         p.append(adequacy.surprise(replace(observed, problem=problem), again, known.unit).p)
     assert 0.0 <= np.mean(np.array(p) < 0.1) < 0.25
-    assert min(p) > adequacy.ADEQUATE_P
+    assert min(p) > goodness_of_fit.ADEQUATE_P
 
 
 def test_the_thresholds_of_the_grades_are_where_they_are_said_to_be():
@@ -329,8 +329,8 @@ def test_a_model_that_takes_its_error_for_slow_noise_is_found_out_by_least_squar
     observed = Observed.from_problem(likelihood.problem)
     agree = adequacy.surprise(observed, likelihood, known.unit, squares, least)
     apart = adequacy.surprise(observed, likelihood, known.unit, squares, least / 2)
-    assert agree.p > adequacy.ADEQUATE_P
-    assert (apart.loudest, apart.p < adequacy.ADEQUATE_P) == (adequacy.APART, True)
+    assert agree.p > goodness_of_fit.ADEQUATE_P
+    assert (apart.loudest, apart.p < goodness_of_fit.ADEQUATE_P) == (adequacy.APART, True)
 
 
 def test_a_quiet_start_of_a_record_tells_the_noise_of_one_whose_end_is_louder():

@@ -15,7 +15,6 @@ import tractexp.discrepancy.investigate as investigating
 from tractexp.configuration.plugin import discover, get
 from tractexp.discrepancy import families, held_out, rival_sets
 from tractexp.discrepancy.all_events import AllEvents, JointFit
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import Verdict, decide, find_adequate, holds
 from tractexp.discrepancy.discrepancy_json import recommendation
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
@@ -29,6 +28,7 @@ from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
 from tractexp.inference import fit_effort, fitting
 from tractexp.inference.catalogue import catalogue
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import Refit, scatter_starts
 from tractexp.inference.injection import PUSHES

@@ -16,7 +16,7 @@ import pytest
 from baselines import sparse
 
 from hidden_effects import OUTSIDE
-from tractexp.discrepancy.criteria import Criteria
+from tractexp.inference.criteria import Criteria
 
 ROWS = evidence.read(study.NEWEST)
 

@@ -25,7 +25,6 @@ from tractexp.discrepancy.classes import (
     describe_classes,
     group_alike,
 )
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import CONFIRMED_SHARE
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
@@ -47,6 +46,7 @@ from tractexp.extend import Effect, Parameter, sites
 from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import Catalogue, candidate, catalogue
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import refit
 from tractexp.inference.records import Records

@@ -13,7 +13,6 @@ import tractexp
 from hidden_effects import Case, Recorder, make
 from tractexp.blocks import Report
 from tractexp.configuration.plugin import get
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import decide, find_predicting
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.explain import explain, find_nearest_sets
@@ -26,6 +25,7 @@ from tractexp.discrepancy.ranking import beats, find_nearest
 from tractexp.identification.verdict import UNIDENTIFIED
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.linearization import tangent

@@ -9,10 +9,10 @@ import pytest
 import wave_records as waves
 
 import tractexp
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.identification.estimate import held_to_usual
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.records import Records

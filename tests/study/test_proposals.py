@@ -16,7 +16,6 @@ from nasty import NASTY
 import tractexp
 from hidden_effects import EFFECTS, Case, Noise, Recorder, make
 from tractexp.configuration.plugin import get
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import (
@@ -44,6 +43,7 @@ from tractexp.discrepancy.proposal.wording import proposed_in_words
 from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import refit
 from tractexp.inference.records import Records

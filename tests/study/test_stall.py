@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.proposal.propose import ProposalResult
 from tractexp.discrepancy.ranking import beats, find_nearest, rank_sets
 from tractexp.domain import domain_of
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit
 from tractexp.inference.model_error import ModelError, model_error
 from tractexp.model.drive import Drive

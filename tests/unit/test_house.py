@@ -60,12 +60,14 @@ def modules(path: Path) -> list[tuple[str, bool]]:
     return found
 
 
-def imported(path: Path) -> set[str]:
-    """Rooms of the package that a module imports, within functions too, but not for its annotations
-    only.
+def imported(path: Path, *, annotations: bool = False) -> set[str]:
+    """Rooms of the package that a module imports, within functions too; those for its annotations
+    only where they are asked for.
     """
     return {
-        n.split(".")[1] for n, typed in modules(path) if n.startswith("tractexp.") and not typed
+        n.split(".")[1]
+        for n, typed in modules(path)
+        if n.startswith("tractexp.") and (annotations or not typed)
     }
 
 
@@ -78,6 +80,17 @@ def test_a_room_imports_from_its_own_floor_and_below(room):
         f"{path.relative_to(PACKAGE)} imports {other}"
         for path in files
         for other in imported(path)
+        if FLOORS.get(other, 0) > FLOORS[room]
+    }
+    assert up == set()
+
+
+@pytest.mark.parametrize("room", ["noise", "inference", "identification", "discrepancy"])
+def test_the_engine_names_nothing_above_it_in_annotations_either(room):
+    up = {
+        f"{path.relative_to(PACKAGE)} names {other}"
+        for path in (PACKAGE / room).rglob("*.py")
+        for other in imported(path, annotations=True)
         if FLOORS.get(other, 0) > FLOORS[room]
     }
     assert up == set()

@@ -426,7 +426,7 @@ def investigate(
     false_alarms : float, 0.001 to 0.5
         The probability of naming anything where nothing is missing.
     criteria : {name: value}
-        The other thresholds of the decisions, listed in `tractexp.discrepancy.criteria`.
+        The other thresholds of the decisions, listed in `tractexp.inference.criteria`.
     bounds, fixed, substeps, domain : as in `tractexp.identify`
         Of the base model; with "waves" the sampled currents are investigated.
     seed : int
@@ -447,7 +447,7 @@ def investigate(
         For wrong names or values, for events that do not belong together, and for a model with
         `per_event`: the events share its parameters.
     """
-    from tractexp.discrepancy.criteria import Criteria
+    from tractexp.inference.criteria import Criteria
 
     check_range("seed", seed, 0)
     thresholds = Criteria.from_choices({"false_alarms": false_alarms, **(criteria or {})})
@@ -473,8 +473,8 @@ def investigate(
 
 def _steps(question: Question, progress: Progress) -> "Steps":
     """The investigation itself, step by step."""
-    from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.investigate import investigate as findings_of
+    from tractexp.inference.criteria import Criteria
 
     q, base = question, question.model
     with tell_stages(progress) as tell:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement, examine_fit
 from tractexp.inference.base_fit import fitted_from
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Names, Refit, best_of, refit, wide_refit
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.records import Records

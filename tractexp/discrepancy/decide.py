@@ -21,10 +21,10 @@ records agree with the base model, or they do not.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.gap import DENIED, SHOWN, share_gone
 from tractexp.discrepancy.ranking import beats, find_leading
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Names
 
 NONE, CANDIDATE, NAMED, TIED, UNEXPLAINED = "none", "candidate", "named", "tied", "unexplained"

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.blocks import blocks_of
 from tractexp.inference.chance import BLURRED, Chance, chance_at, is_noise_exact, scales
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.fit_effort import NOISE_ROUNDS, QUIETER
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.goodness_of_fit import GoodnessOfFit

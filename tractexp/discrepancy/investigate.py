@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tractexp.discrepancy.classes import EffectClass, compare_predictions, describe_classes
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import (
     NONE,
     TIED,
@@ -56,6 +55,7 @@ from tractexp.identification.verdict import UNIDENTIFIED, size
 from tractexp.inference.base_fit import BaseFit, base_fit
 from tractexp.inference.catalogue import Catalogue, catalogue
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate

@@ -8,8 +8,8 @@ does not beat.
 import itertools
 from collections.abc import Sequence
 
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Names
 
 

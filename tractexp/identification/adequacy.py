@@ -18,7 +18,12 @@ from typing import Any
 import numpy as np
 
 from tractexp.inference import goodness_of_fit
-from tractexp.inference.goodness_of_fit import PER_EVENT, GoodnessOfFit, compare_with_draws
+from tractexp.inference.goodness_of_fit import (
+    ADEQUATE_P,
+    PER_EVENT,
+    GoodnessOfFit,
+    compare_with_draws,
+)
 from tractexp.inference.least_squares import MOST_NUMBERS
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import ModelError, describe_stall
@@ -28,10 +33,6 @@ from tractexp.inference.sandwich import off_walls
 from tractexp.inference.separable import Sensitivities, SeparableBasis
 
 FIT_DRAWS = 199
-# p of what a fit leaves, below which it leaves something. Chosen on calibration seeds: where
-# nothing is missing one set in fifty has a smaller one, with an effect of four detection limits
-# nearly all have.
-ADEQUATE_P = 0.001
 JUDGEMENT_SEED = 20201  # of the draws: the judgement of one record is always the same
 ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
 # of the response: a model that leaves a fifth of it does not describe the load. A word for a size.

@@ -5,13 +5,13 @@ simulate them.
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tractexp.cache import store
 from tractexp.domain import Domain, domain_of
 from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.differences import finite, slopes, two_sided
 from tractexp.inference.effort import Effort
 from tractexp.inference.free_set import FreeSet
@@ -24,9 +24,6 @@ from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.record import Event
-
-if TYPE_CHECKING:
-    from tractexp.discrepancy.criteria import Criteria
 
 # Standard deviation of a fault of the measurement before anything is seen, in its relevant sizes:
 # clocks, windows and drifts beyond that are seen before a record is used.
@@ -64,7 +61,7 @@ class Context:
     records: Records
     kernels: Kernels
     coordinates: FreeSet
-    criteria: "Criteria"
+    criteria: Criteria
     effort: Effort
     prior: float = 0.0  # weight of rows that hold the motor to what machines usually are
 
@@ -76,7 +73,7 @@ class Context:
         records: Records,
         bounds: Mapping[str, Sequence[float]],
         fixed: Mapping[str, float],
-        criteria: "Criteria",
+        criteria: Criteria,
         effort: Effort,
         substeps: int | None = None,
         family: type[Family] = Family,

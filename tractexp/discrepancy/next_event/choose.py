@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, driven, imagine_dips
 from tractexp.discrepancy.next_event.same import Same, same
 from tractexp.discrepancy.next_event.separation import (
@@ -21,6 +20,7 @@ from tractexp.discrepancy.next_event.separation import (
     seen,
 )
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.model_error import in_percent
 from tractexp.inference.noise_in_quiet import QuietNoise

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.gap import curves
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.domain import domain_of
@@ -14,6 +13,7 @@ from tractexp.errors import TASK, UserError
 from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import Catalogue, catalogue
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import Names, Start, refit
 from tractexp.inference.records import Records, check_events

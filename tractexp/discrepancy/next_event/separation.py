@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven, noise_of
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.differences import slopes, two_sided
 from tractexp.inference.fitting import Refit
 from tractexp.inference.linearization import find_active_bounds

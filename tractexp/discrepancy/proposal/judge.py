@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.gap import SHOWN, GapTest, compute_pushed_changes, gap, share_gone
 from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.proposal.bed import carried_over
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, TermFits
 from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit
 from tractexp.inference.records import Records
 from tractexp.noise import Noise

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tractexp.errors import TASK, UserError, among, check_range
-from tractexp.identification.adequacy import ADEQUATE_P
+from tractexp.inference.goodness_of_fit import ADEQUATE_P
 
 DERIVED, CHOSEN = "derived", "chosen"
 # Part of the false alarms that chance's draws may give to naming. With the doubts by what is left a
