@@ -65,12 +65,12 @@ def opposite_pairs(phasors: Snapshots, volts: Sequence[int]) -> list[tuple[int, 
     return pairs
 
 
-def is_opposite(phasors: Snapshots, first: int, second: int, most: float = OPPOSITE) -> bool:
+def is_opposite(phasors: Snapshots, first: int, second: int) -> bool:
     """Whether two channels add up to next to nothing."""
     x, y = np.nan_to_num(phasors.select_channels((first, second)))
     large = np.abs(x) + np.abs(y)
     alive = large > 0.5 * large.max(initial=0.0)
-    return bool(alive.any() and np.median(np.abs(x + y)[alive] / large[alive]) < most / 2)
+    return bool(alive.any() and np.median(np.abs(x + y)[alive] / large[alive]) < OPPOSITE / 2)
 
 
 def is_between_conductors(phasors: Snapshots, voltage: int) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 SIGNIFICANCE_LEVEL = 0.05
+BOOTSTRAP_DRAWS = 4000
 LEAST_SEEDS = 6  # two-sided, Wilcoxon's smallest p is 2 / 2^n: below 0.05 from 6 pairs up
 
 
@@ -82,7 +83,7 @@ class Ranks:
     groups: tuple[tuple[str, ...], ...]
 
 
-def friedman(names: Sequence[str], table: np.ndarray, alpha: float = SIGNIFICANCE_LEVEL) -> Ranks:
+def friedman(names: Sequence[str], table: np.ndarray) -> Ranks:
     """Rank k >= 3 variants within each of N seeds; `table` is (N, k). The chi-square is corrected
     for ties.
 
@@ -96,7 +97,7 @@ def friedman(names: Sequence[str], table: np.ndarray, alpha: float = SIGNIFICANC
         chi2, p = 0.0, 1.0
     else:
         chi2, p = map(float, stats.friedmanchisquare(*table.T))
-    difference = critical_difference(len(names), len(table), alpha)
+    difference = critical_difference(len(names), len(table))
     groups = indifferent(names, mean, difference)
     return Ranks(tuple(names), tuple(map(float, mean)), len(table), chi2, p, difference, groups)
 
@@ -134,12 +135,10 @@ def expected_running_time(spent: np.ndarray, reached: np.ndarray) -> float:
     return float(np.sum(spent) / np.sum(reached)) if np.any(reached) else np.inf
 
 
-def bootstrap(
-    values: np.ndarray, seed: int = 0, draws: int = 4000, share: float = 0.95
-) -> tuple[float, float]:
+def bootstrap(values: np.ndarray) -> tuple[float, float]:
     """The percentile interval of the mean of `values` (n,). Source: Efron 1979."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     values = np.asarray(values, dtype=float)
-    means = values[rng.integers(0, len(values), (draws, len(values)))].mean(axis=1)
-    low, high = np.quantile(means, ((1 - share) / 2, (1 + share) / 2))
+    means = values[rng.integers(0, len(values), (BOOTSTRAP_DRAWS, len(values)))].mean(axis=1)
+    low, high = np.quantile(means, (0.025, 0.975))
     return float(low), float(high)

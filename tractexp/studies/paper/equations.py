@@ -18,10 +18,10 @@ PRINTED_TOLERANCE = 0.01  # of a printed number that rounding explains
 Field = Callable[[np.ndarray], np.ndarray]
 
 
-def steady_state_sine(column: Sequence[float], U0: float = 1.0) -> float:
-    """|2 T_m X'/(C U0²)|, whose arcsine is in Eq. (3): it must not exceed 1."""
+def steady_state_sine(column: Sequence[float]) -> float:
+    """|2 T_m X'/(C U0²)| at U0 = 1 pu, whose arcsine is in Eq. (3): it must not exceed 1."""
     value = dict(zip(printed.NAMES, column, strict=True))
-    return abs(2 * value["T_m"] * value["X_prime"] / (value["C"] * U0**2))
+    return abs(2 * value["T_m"] * value["X_prime"] / value["C"])
 
 
 def refusals(model: Any, drive: Any) -> dict[str, str]:
@@ -265,18 +265,18 @@ def _lowest(where: str, what: str, table: Mapping[str, float]) -> Check:
     )
 
 
-def rest_residual(motor: Sequence[float], U0: float = 1.0) -> float:
-    """The largest derivative of Eq. (1), as printed, in the state of Eq. (3); `motor` is T', X', C,
-    M, T_m.
+def rest_residual(motor: Sequence[float]) -> float:
+    """The largest derivative of Eq. (1), as printed, in the state of Eq. (3) at U0 = 1 pu;
+    `motor` is T', X', C, M, T_m.
     """
     T_prime, X_prime, C, M, T_m = motor
-    delta = 0.5 * np.arcsin(-2 * T_m * X_prime / (C * U0**2))
-    E = C * U0 * np.cos(delta)
-    slip = C * U0 * np.sin(delta) / (T_prime * E)  # omega - omega_s
+    delta = 0.5 * np.arcsin(-2 * T_m * X_prime / C)
+    E = C * np.cos(delta)
+    slip = C * np.sin(delta) / (T_prime * E)  # omega - omega_s
     slopes = (
-        (-E + C * U0 * np.cos(delta)) / T_prime,
-        -C * U0 * np.sin(delta) / (T_prime * E) + slip,
-        (-U0 * E * np.sin(delta) / X_prime - T_m) / M,
+        (-E + C * np.cos(delta)) / T_prime,
+        -C * np.sin(delta) / (T_prime * E) + slip,
+        (-E * np.sin(delta) / X_prime - T_m) / M,
     )
     return float(np.max(np.abs(slopes)))
 

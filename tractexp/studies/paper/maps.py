@@ -58,14 +58,14 @@ def flocks(
 
 
 def discrepancies(
-    n: int, d: int, alphas: tuple[float, ...], draws: int = FLOCK_DRAWS, seed: int = 0
+    n: int, d: int, alphas: tuple[float, ...], draws: int = FLOCK_DRAWS
 ) -> Mapping[str, np.ndarray]:
     """Centered discrepancy of each way to scatter, (draws,) each: the lower, the more even. Source:
     Hickernell 1998.
     """
     from scipy.stats import qmc
 
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     return {
         name: np.array([qmc.discrepancy(np.clip(draw(rng), 0, 1)) for _ in range(draws)])
         for name, draw in flocks(n, d, alphas).items()
@@ -82,8 +82,8 @@ def tails() -> dict[str, np.ndarray]:
     return {formula: flights(formula, LEVY_STEPS, 1)[:, 0] for formula in ("mantegna", "printed")}
 
 
-def tail_exponent(steps: np.ndarray, share: float = LEVY_TAIL_SHARE) -> float:
-    """a in P(|s| > x) ~ x^-a, from the largest `share` of the steps (n,). Source: Hill 1975."""
+def tail_exponent(steps: np.ndarray) -> float:
+    """a in P(|s| > x) ~ x^-a, from the largest of the steps (n,). Source: Hill 1975."""
     size = np.sort(np.abs(steps.ravel()))
-    k = max(2, round(share * len(size)))
+    k = max(2, round(LEVY_TAIL_SHARE * len(size)))
     return float(1 / np.mean(np.log(size[-k:] / size[-k - 1])))
