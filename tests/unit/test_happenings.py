@@ -11,8 +11,9 @@ from field_waves import KA, KV, load, noise, phases, recording, wave
 from tractexp.filetypes import comtrade
 from tractexp.record import Base, Record
 from tractexp.recording import Feeder
-from tractexp.recording.happening import happenings, happenings_of
+from tractexp.recording.happening import happenings_in, happenings_of
 from tractexp.recording.measure import FeederWaves, phasors_of
+from tractexp.recording.trace import of_waves
 
 SEEDS = range(4)
 THREE = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
@@ -28,13 +29,9 @@ def seen(t, volts, amps, f=50.0, sigma=0.002, seed=0, rate=3200.0, extra=0.0, no
 
 def of(record, feeder):
     [segment] = record.segments
-    return happenings(
-        FeederWaves.from_recording(record, feeder, segment)[:, :],
-        segment.rate,
-        0.0,
-        record.frequency,
-        phasors_of(record, feeder, segment),
-    )
+    waves = FeederWaves.from_recording(record, feeder, segment)[:, :]
+    phasors = phasors_of(record, feeder, segment)
+    return happenings_in(of_waves(waves, segment.rate, 0.0, record.frequency, phasors))
 
 
 def grid(seconds, rate=3200.0):
@@ -347,13 +344,8 @@ def test_the_two_dips_of_the_220_kv_station(shared_data):
     events = []
     for segment in record.waveforms():
         phasors = phasors_of(record, feeder, segment)
-        events += happenings(
-            FeederWaves.from_recording(record, feeder, segment)[:, :],
-            segment.rate,
-            segment.start,
-            50.0,
-            phasors,
-        )
+        waves = FeederWaves.from_recording(record, feeder, segment)[:, :]
+        events += happenings_in(of_waves(waves, segment.rate, segment.start, 50.0, phasors))
     assert [(event.kind, event.worth) for event in events] == [("dip", True)] * 2
     assert [event.depth for event in events] == pytest.approx([0.131, 0.127], abs=0.003)
 

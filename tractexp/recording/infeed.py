@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tractexp.record.direction import OUTWARD
-from tractexp.recording.happening import NEGATIVE
+from tractexp.recording.event_worth import NEGATIVE
 from tractexp.recording.kirchhoff import CLOSED_SUM
 
 if TYPE_CHECKING:

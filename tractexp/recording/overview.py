@@ -14,15 +14,9 @@ from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.dips import FileDip, check_load
 from tractexp.record.phasor import Phasors, join_phasors
 from tractexp.recording.arrangement import arrange_feeder
+from tractexp.recording.event_kind import OF_LOADS, find_dead_phases
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.happening import (
-    FEWEST_HALF_CYCLES,
-    OF_LOADS,
-    Happening,
-    find_dead_phases,
-    happenings_in,
-    happenings_of,
-)
+from tractexp.recording.happening import FEWEST_HALF_CYCLES, Happening, happenings_in, happenings_of
 from tractexp.recording.infeed import describe_directions
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.proposal import buses_alone, propose

@@ -8,8 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 from tractexp.blocks import Report, Table
+from tractexp.recording.event_kind import OF_LOADS
+from tractexp.recording.event_worth import name_fallen_phases
 from tractexp.recording.excursion import HYSTERESIS
-from tractexp.recording.happening import OF_LOADS, name_fallen_phases
 from tractexp.recording.transformer import MAYBE_SAME, SAME_CURRENT
 from tractexp.report import unfitted
 from tractexp.report.look import (
