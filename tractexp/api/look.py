@@ -3,29 +3,23 @@ what to fit.
 """
 
 import functools
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, fields, replace
-from datetime import datetime, timedelta
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from tractexp.api.arguments import public
+from tractexp.api.listed import Listed
+from tractexp.api.look_content import build_content
 from tractexp.api.read import node_of, record_from_dict, record_to_dict, table
 from tractexp.blocks import Report, Table
-from tractexp.configuration import plugin
-from tractexp.configuration.overrides import build_typed_command
 from tractexp.errors import UserError
-from tractexp.outcome import Tabulated, Written
+from tractexp.outcome import Written
 from tractexp.record import Event, Record
-from tractexp.record.wave_event import COARSEST, describe_smearing
 from tractexp.recording.event_views import join_event, propose_joining
-from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
-from tractexp.recording.quality import describe_clipped
-from tractexp.recording.railway import DIRECT, describe_direct_beside, direct_voltage
-from tractexp.recording.recording import unit_of
-from tractexp.recording.unrecognized import can_be_named, explain_unrecognized
+from tractexp.recording.overview import Sight, View, sight_of, view_of
 from tractexp.storage import files
 from tractexp.text.progress import Progress, tell_stages
 from tractexp.text.wording import count_noun
@@ -34,49 +28,6 @@ if TYPE_CHECKING:
     import pandas
 
     from tractexp.api.given import Records, Setting
-
-RACE = "model=auto"  # what a load of the field is made of nobody knows: structures are raced
-NAME_THEM = "name the channels of one load: voltages=[...] currents=[...]"
-# cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves
-# out
-EARLIER = 3.0
-
-
-class Listed(Tabulated):
-    """Rows with names, shown as a table and given as a frame or as the mappings they are."""
-
-    def __init__(self, rows: Sequence[Mapping[str, Any]], title: str = ""):
-        """Rows of one kind, {column: value} each."""
-        self.rows, self.title = rows, title
-
-    def __len__(self) -> int:
-        """How many rows there are."""
-        return len(self.rows)
-
-    def __iter__(self) -> Iterator[Mapping[str, Any]]:
-        """The rows."""
-        return iter(self.rows)
-
-    def table(self) -> Table:
-        """The rows with a list in one cell as text."""
-        columns = list(self.rows[0]) if self.rows else []
-        return Table(
-            columns, [[_cell(row[name]) for name in columns] for row in self.rows], self.title
-        )
-
-    def to_frame(self) -> "pandas.DataFrame":
-        """The rows as a pandas frame; what is not known is nan."""
-        import pandas
-
-        frame = pandas.DataFrame(list(self.rows))
-        unknown = [name for name in frame if all(row[name] is None for row in self.rows)]
-        # what no row has is nan, as where some rows have it
-        return frame.astype(dict.fromkeys(unknown, float))
-
-
-def _cell(value: Any) -> Any:
-    """A value as a cell shows it: the items of a list in a line."""
-    return "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -302,7 +253,7 @@ def look(*sources: "Records", progress: Progress = None, **settings: "Setting") 
             with files.limit_time(name):
                 views.append(_view(source, settings))
                 stage("measuring the quality of the channels")
-                contents.append(_content(views[-1]))
+                contents.append(build_content(views[-1]))
     return Look(distinct, settings, files.plain({"files": contents}), views)
 
 
@@ -373,246 +324,6 @@ def series(shown: Sight) -> dict[str, np.ndarray]:
     return {
         name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())
     }
-
-
-def event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]:
-    """An event as plain data: times in s, powers in MW and Mvar, voltages as shares of that before.
-
-    `begun` is the moment of t = 0: then `when` is that of the event's start.
-    """
-    what = event.what
-    return {
-        "kind": what.kind,
-        "start": what.start,
-        "when": begun and (begun + timedelta(seconds=what.start)).isoformat(),
-        "end": what.end,
-        "duration": what.end - what.start,
-        "depth": what.depth,
-        "jump": what.jump,
-        "U2": what.U2,
-        "P_before": what.before[0],
-        "Q_before": what.before[1],
-        "P_after": what.after[0],
-        "Q_after": what.after[1],
-        "dip": event.dip,
-        "worth": event.worth,
-        "why": event.why,
-        "phases": list(what.phases),
-        "exponents": [vars(each) for each in what.exponents],
-    }
-
-
-def _content(view: View) -> dict[str, Any]:
-    """What `look.json` holds of a file."""
-    recording = view.recording
-    content: dict[str, Any] = {
-        "file": view.source,
-        "reader": view.node.get("name", ""),
-        "joined": list(view.node.get("join", ())),
-        "proposed": view.proposed,
-    }
-    if recording is None:
-        record = view.sights[0].record
-        assert record is not None
-        content |= {
-            "station": "",
-            "device": "",
-            "start": view.begun and view.begun.isoformat(),
-            "frequency": record.base.frequency,
-            "rates": [record.rate],
-            "seconds": float(record.t[-1] - record.t[0]),
-            "segments": [
-                {"rate": record.rate, "start": float(record.t[0]), "samples": record.samples}
-            ],
-            "notes": [*record.notes, *filter(None, [view.proposed])],
-            "channels": [],
-        }
-    else:
-        last = recording.segments[-1]
-        shown = any(each.feeder is None or each.feeder.currents for each in view.sights)
-        lacks = "" if shown else explain_unrecognized(recording)
-        named = not lacks or can_be_named(recording)
-        remedy = f"; {NAME_THEM}" if lacks and named else ""
-        content |= {
-            "station": recording.station,
-            "device": recording.device,
-            "start": recording.start and recording.start.isoformat(),
-            "frequency": recording.frequency,
-            "rates": [s.rate for s in recording.segments],
-            "seconds": last.start + (last.stop - last.first) / last.rate,
-            "segments": [
-                {"rate": s.rate, "start": s.start, "samples": s.stop - s.first}
-                for s in recording.segments
-            ],
-            "notes": [
-                *filter(None, [view.proposed]),
-                *recording.notes,
-                *([f"no load was recognised: {lacks}{remedy}"] if lacks else _tell_direct(view)),
-            ],
-            "channels": [_channel(view, number) for number in range(len(recording.channels))],
-        }
-        direct = bool(lacks and direct_voltage(recording))
-        content |= {"lacks": lacks, "can_be_named": named, "direct": direct}
-    content["measured_frequency"] = view.frequency
-    return content | {"feeders": [_feeder(view, shown) for shown in view.sights]}
-
-
-def _tell_direct(view: View) -> list[str]:
-    """What is said of direct voltages beside a load's."""
-    assert view.recording is not None
-    steady = [
-        number
-        for number, channel in enumerate(view.quality)
-        if not abs(channel.offset) <= DIRECT * channel.level
-    ]
-    return describe_direct_beside(view.recording, steady)
-
-
-def _channel(view: View, number: int) -> dict[str, Any]:
-    """A channel's row: name, unit, phase, quality."""
-    assert view.recording is not None
-    channel, fitness = view.recording.channels[number], view.quality[number]
-    share = fitness.noise / fitness.level if fitness.level > 0 else None
-    return {
-        "number": number,
-        "name": channel.name,
-        "phase": channel.phase,
-        "unit": channel.unit,
-        "quantity": channel.quantity,
-        "magnitude": fitness.level,
-        "primary_unit": {"voltage": "kV", "current": "kA"}.get(
-            unit_of(channel.unit)[0], channel.unit
-        ),
-        "noise_share": share,
-        **asdict(fitness),
-    }
-
-
-def _feeder(view: View, shown: Sight) -> dict[str, Any]:
-    """A load's row: its channels, power and what speaks for it."""
-    feeder, powers = shown.feeder, view.powers(shown)
-    names = [c.name for c in view.recording.channels] if view.recording else []
-    row: dict[str, Any] = {
-        "name": shown.name,
-        "connection": "",
-        "voltages": [],
-        "currents": [],
-        "channels": [],
-        "reverse_current": False,
-        "why": [],
-        "loaded": True,
-    }
-    if feeder is not None:
-        row |= {
-            key: getattr(feeder, key)
-            for key in ("voltages", "currents", "reverse_current", "why", "loaded")
-        }
-        row["connection"] = _name(feeder.connection)
-        row["channels"] = [names[i] for i in (*feeder.voltages, *feeder.currents)]
-    U, P, Q = powers if powers and not shown.secondary else (None, None, None)
-    units = ("pu", "pu", "pu") if shown.per_unit else ("kV", "MW", "Mvar")
-    return row | {
-        "U": U,
-        "P": P,
-        "Q": Q,
-        "units": units,
-        **_sums(shown),
-        "said": list(shown.said),
-        "type_test": shown.type_test and shown.type_test.to_dict(),
-        "unexamined": shown.unexamined,
-        "dead_phases": shown.dead_phases,
-        "secondary": shown.secondary,
-        "clipped": _tell_clipped(view, shown),
-        "command": command(view, shown),
-        "events": [hide_secondary(event_row(event, view.begun), shown) for event in shown.events],
-    }
-
-
-def _tell_clipped(view: View, shown: Sight) -> str:
-    """Which channels of a load stop at a limit, one clause; "" where none does."""
-    if view.recording is None or shown.feeder is None:
-        return ""
-    numbers = (*shown.feeder.voltages, *shown.feeder.currents)
-    return describe_clipped(view.recording, {k: view.quality[k].clipped for k in numbers})
-
-
-def hide_secondary(row: dict[str, Any], shown: Sight) -> dict[str, Any]:
-    """The row of an event, without powers where they are those of a transformer's secondary."""
-    return (
-        row | dict.fromkeys(("P_before", "Q_before", "P_after", "Q_after"))
-        if shown.secondary
-        else row
-    )
-
-
-def _name(connection: Any) -> str:
-    """A connection's name."""
-    return connection["name"] if isinstance(connection, Mapping) else str(connection)
-
-
-def command(view: View, shown: Sight) -> str:
-    """What is to be typed to fit the events of a load that are worth it; "" where none is."""
-    choice = shown.choice()
-    if choice is None or not view.node:
-        return ""
-    usual = {f.name: f for f in fields(plugin.get("data", view.node["name"]))}
-    settings = {**view.node, **choice}
-    text = build_typed_command(
-        {
-            key: value
-            for key, value in settings.items()
-            if key == "name" or not _is_usual(usual[key], value)
-        }
-    )
-    raced = [RACE] if _is_from_field(shown) else []
-    sampled = ["domain=waves"] if waves_serve(view, shown) else []
-    return " ".join([text, *raced, *sampled])
-
-
-def _is_from_field(shown: Sight) -> bool:
-    """Whether the load that is fitted is one whose structure nobody knows: of kV and MW."""
-    events = (each.event for each in shown.events if each.worth)
-    return any(event is not None and event.record.is_from_field for event in events)
-
-
-def waves_serve(view: View, shown: Sight) -> bool:
-    """Whether the samples of the dip that is fitted first tell more than its phasors, and can be
-    fitted.
-    """
-    first = next(
-        (event.what for event in shown.events if event.worth and event.dip is not None), None
-    )
-    if view.recording is None or first is None:
-        return False
-    f = view.recording.frequency
-    ends = [(s, s.start + (s.stop - s.first) / s.rate) for s in view.recording.waveforms()]
-    there = next((s for s, end in ends if s.start <= first.start and first.end <= end), None)
-    fine = (
-        there is not None and there.rate >= COARSEST * f and first.start - there.start > EARLIER / f
-    )
-    return fine and bool(describe_smearing(first.end - first.start, first.U2 or 0.0, f))
-
-
-def _is_usual(setting: Any, value: Any) -> bool:
-    """Whether a value is what a setting (a dataclass field) is without it."""
-    return value == (
-        setting.default if setting.default is not MISSING else setting.default_factory()
-    )
-
-
-def _sums(shown: Sight) -> dict[str, Any]:
-    """Kirchhoff: the sums of the three voltages and of the three currents, as shares of a phase's,
-    at the beginning.
-    """
-    sums = {}
-    for key in "VI":
-        value = None
-        if shown.phasors and len(shown.phasors[0].V) == 3:
-            first = getattr(shown.phasors[0], key)[:, :50]
-            scale = float(np.abs(first).mean())
-            value = float(np.abs(first.sum(axis=0)).mean()) / scale if scale > 0 else None
-        sums[f"sum_{key}"] = value
-    return sums
 
 
 def _pick_item(items: Sequence[Any], k: int, what: str) -> Any:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import UNUSABLE, Identification
-from tractexp.api.look import Listed
+from tractexp.api.listed import Listed
 from tractexp.api.station_load import LoadJob, fit_load, read_files
 from tractexp.api.survey import build_fit_command, survey
 from tractexp.api.surveying import FEWEST_DIPS, complete_entries, keys, name_load

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
-from tractexp.api.look import Listed
+from tractexp.api.listed import Listed
 from tractexp.api.surveying import (
     FEWEST_DIPS,
     complete_entries,

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.api.look import command, event_row, hide_secondary, series
+from tractexp.api.load_command import build_load_command
+from tractexp.api.look import series
+from tractexp.api.look_content import event_row, hide_secondary
 from tractexp.cache.store import Store, key
 from tractexp.errors import UserError
 from tractexp.process.workers import Workers
@@ -161,7 +163,7 @@ def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) ->
         "load": shown.name,
         "unit": "secondary" if shown.secondary else "pu" if shown.per_unit else "MW",
         "noise": event and event.noise_share,
-        "command": command(view, shown) if seen.worth else "",
+        "command": build_load_command(view, shown) if seen.worth else "",
         **_pictures(shown, seen),
     }
 

@@ -4,7 +4,7 @@ a record.
 
 from tractexp.configuration.overrides import survey_of
 from tractexp.filetypes import cev, comtrade, pqdif, tidy
-from tractexp.filetypes.mapping import QUANTITIES
+from tractexp.filetypes.column_key import QUANTITIES
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar
 from tractexp.filetypes.table import ENDINGS
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers

@@ -6,10 +6,9 @@ instantaneous primary amperes and kilovolts over the root of two; `>` marks the 
 `*` that of the greatest current; the states of the relay word are hexadecimal.
 """
 
-import csv
 import functools
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -17,6 +16,8 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.filetypes import timeline
+from tractexp.filetypes.cev_scale import ROOT, find_gain, find_usual_unit, read_ratio
+from tractexp.filetypes.cev_text import EventReport, find_marked_row, read_report, read_samples
 from tractexp.filetypes.comtrade_fields import number, quote_field
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.remarks import Remarks
@@ -25,14 +26,10 @@ from tractexp.filetypes.text import decode
 from tractexp.recording.recording import Channel, Recording, StatusChannel, unit_of
 from tractexp.storage import files
 
-ROOT = float(np.sqrt(2))
 LARGEST = 32 * 2**20  # bytes: event reports last seconds
-HEAD = 2000  # lines: the names of the columns stand among them
-LARGEST_SUMMARY_DIFFERENCE = 0.1  # of a current: so well the summary's agrees with the columns
 FEWEST_WAVE_RATE = 10  # samples a cycle: fewer are a filtered report, which holds phasors
 BEGINNING = 1 << 16  # bytes in which a report names the samples in a cycle
 LEAST, MOST = 10.0, 100.0  # Hz
-CURRENTS = ("IA", "IB", "IC", "IA(A)", "IB(A)", "IC(A)")  # as the summary names them
 # what the settings say of the load and of its transformers: full-load and locked-rotor current,
 # service factor, ratios
 RATING = re.compile(
@@ -40,16 +37,6 @@ RATING = re.compile(
 )
 _COLUMN = re.compile(r"\s*([^(]*?)\s*(?:\(\s*([^)]*?)\s*\))?\s*")
 _WAVE = re.compile(r"[IV](?:([ABCNGQ]|AB|BC|CA)(\w?)|1MEM|S\d?|P)", re.ASCII)
-
-
-@dataclass
-class EventReport:
-    """Rows of the file by their meaning."""
-
-    about: dict[str, str] = field(default_factory=dict)  # names over values: FID, date, summary
-    columns: list[str] = field(default_factory=list)
-    rows: list[tuple[int, list[str]]] = field(default_factory=list)  # line, cells of a sample
-    settings: str = ""
 
 
 def recognizes(path: Path | str) -> bool:
@@ -211,11 +198,11 @@ def _open_report(path: Path, encoding: str | None) -> _Opened:
         )
     text, encoding = decode(files.read(path), str(path), encoding)
     remarks = Remarks(str(path))
-    report = _report(path, text, remarks)
-    values, marks, words = _samples(path, report, remarks)
+    report = read_report(path, text, remarks)
+    values, marks, words = read_samples(path, report, remarks)
     per_cycle, frequency = _rate(path, report)
     _note_lost_rows(report, per_cycle, remarks)
-    marked = _find_marked_row(marks, ">*")
+    marked = find_marked_row(marks, ">*")
     if marked is None:
         remarks.add(
             "no row is marked as the trigger's ('>'); the report's time is taken as that of the"
@@ -224,7 +211,7 @@ def _open_report(path: Path, encoding: str | None) -> _Opened:
     if rated := ", ".join(f"{name} = {value}" for name, value in RATING.findall(report.settings)):
         remarks.add(f"the relay's settings: {rated}")
     gain, tracked = (
-        _gain(report, values, marks, per_cycle, remarks),
+        find_gain(report, values, marks, per_cycle, remarks),
         _read_tracked_frequency(report, values, frequency, remarks),
     )
     t = np.concatenate([[0.0], np.cumsum(2 / (tracked[1:] + tracked[:-1]))]) / per_cycle
@@ -276,137 +263,6 @@ def _read_tracked_frequency(
     return column[last]
 
 
-def checksum(text: str) -> str:
-    """The checksum of a row up to its last comma: the sum of its bytes, as four hexadecimal digits.
-
-    Examples
-    --------
-    >>> checksum("AB")
-    '0083'
-    """
-    return f"{sum(text.encode('latin-1', 'replace')) & 0xFFFF:04X}"
-
-
-def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
-    """The report of a file's text: settings, names of columns, rows of numbers; rows whose checksum
-    fails are noted.
-    """
-    body, _, rest = re.sub(r"[\x02\x03\x1a\0]", "", text).partition('"SETTINGS"')
-    report = EventReport(settings=rest.partition("\n")[2].strip())
-    names: list[str] = []
-    sums: list[bool] = []  # whether each row has its checksum
-    for line, row in _join_quoted_rows(body):
-        if line > HEAD and not report.columns:
-            break
-        cells, checked = _split_row(row, line, remarks)
-        if not report.columns:
-            names = _read_summary(report, names, list(map(str.strip, cells)), line, remarks)
-            continue
-        if not cells or cells[0].strip() == "FID":
-            remarks.add("a second report in the file is not read", line)
-            break
-        report.rows.append((line, cells))
-        sums.append(checked)
-    if sums[-2:] == [True, False] and all(sums[:-1]):
-        remarks.add("the file ends within a line, which is not used", report.rows.pop()[0])
-    if not report.rows:
-        raise UserError(
-            f"{path}: no compressed event report: there is no row of column names with TRIG and"
-            " samples below it; get it from the relay with the command CEV, or its COMTRADE file"
-        )
-    return report
-
-
-def _split_row(row: str, line: int, remarks: Remarks) -> tuple[list[str], bool]:
-    """(the cells of a row without its checksum, whether it has one); a remark where that does not
-    fit.
-    """
-    try:
-        cells = next(csv.reader([row], strict=False), [])
-    except csv.Error:  # a cell without end
-        cells = [row]
-    if len(cells) < 2 or not re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
-        return cells, False
-    if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
-        remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
-    return cells[:-1], True
-
-
-def _read_summary(
-    report: EventReport, names: list[str], cells: list[str], line: int, remarks: Remarks
-) -> list[str]:
-    """Take in a row above the samples: their columns, or values below `names`. The names that the
-    next row has values of; [] for none.
-    """
-    if "TRIG" in cells:
-        report.columns = cells
-    elif names:
-        report.about |= zip(names, cells, strict=False)
-    elif report.about or "FID" in cells:
-        return cells
-    else:
-        remarks.add("text before the report is passed over", line)
-    return []
-
-
-def _join_quoted_rows(body: str) -> list[tuple[int, str]]:
-    """Rows with the number of their first line; one with an open quotation goes on in the next
-    line.
-    """
-    rows: list[tuple[int, str]] = []
-    held, start = "", 0
-    for line, text in enumerate(re.split(r"\r\n|\n|\r", body), 1):
-        held, start = (held + text, start) if held else (text, line)
-        if held.count('"') % 2 and len(held) < 100_000:
-            continue
-        if held.strip():
-            rows.append((start, held.strip()))
-        held = ""
-    return rows if not held.strip() else [*rows, (start, held.strip())]
-
-
-def _samples(
-    path: Path, report: EventReport, remarks: Remarks
-) -> tuple[np.ndarray, list[str], list[str]]:
-    """Values (N, columns), marks and hexadecimal words of the samples."""
-    at = report.columns.index("TRIG")
-    wanted = len(report.columns)
-    values, marks, words = [], [], []
-    for k, (line, cells) in enumerate(report.rows):
-        if len(cells) not in (wanted, wanted - 1):
-            if k and k == len(report.rows) - 1:
-                remarks.add("the file ends within a line, which is not used", line)
-                break
-            raise UserError(
-                f"{path}: line {line}: {len(cells)} cells, but {wanted} columns are named; correct"
-                " the line, or get the file from the relay again"
-            )
-        values.append(
-            [
-                _value(path, line, name, cell)
-                for name, cell in zip(report.columns[:at], cells, strict=False)
-            ]
-        )
-        marks.append(cells[at])
-        words.append(cells[at + 1].strip() if len(cells) > at + 1 else "")
-    return np.array(values, float).reshape(len(values), at), marks, words
-
-
-def _value(path: Path, line: int, name: str, cell: str) -> float:
-    """The number of a cell; nan where the relay wrote none. Raises `UserError` for anything
-    else.
-    """
-    value = number(cell) if cell.strip() else float("nan")
-    if value is None and (name == "*" or not set(cell.strip()) - {"$", "*", "-"}):
-        return float("nan")  # so the relay writes a missing value
-    if value is None or abs(value) > HUGE:
-        raise UserError(
-            f"{path}: line {line}: {name or 'column'} {quote_field(cell)} is not a number, up to"
-            " 1e38; correct it"
-        )
-    return value
-
-
 def _rate(path: Path, report: EventReport) -> tuple[float, float]:
     """Samples a cycle and the frequency that the relay sampled by."""
     numbers = {key: number(report.about.get(key, "")) for key in ("SAM/CYC_A", "FREQ")}
@@ -441,90 +297,14 @@ def _channel(
     match = _COLUMN.fullmatch(report.columns[k])
     name, unit = (match[1], match[2] or "") if match else (report.columns[k], "")
     wave = _WAVE.fullmatch(name.upper())
-    unit = unit or _usual_unit(name, wave is not None, remarks)
+    unit = unit or find_usual_unit(name, wave is not None, remarks)
     quantity = "frequency" if name == "FREQ" else unit_of(unit)[0]
     if wave is None:
         return Channel(name, values, unit, quantity, form="value")
     phase = wave[1] or ""
     circuit = wave[2] or ""
-    ratio = _ratio(report, name, remarks)
+    ratio = read_ratio(report, name, remarks)
     return Channel(name, values, unit, quantity, phase, circuit, gain, ratio=ratio, form="waveform")
-
-
-def _usual_unit(name: str, is_wave: bool, remarks: Remarks) -> str:
-    """The unit of a column that names none; "" where it is not known."""
-    if is_wave and name[0] == "V":
-        remarks.add(f"no unit of {name}, kV taken")
-        return "kV"
-    if is_wave and name[0] == "I":
-        return "A"
-    if name == "FREQ":
-        return "Hz"
-    return "V" if name.startswith(("VDC", "VBAT")) else ""
-
-
-def _ratio(report: EventReport, name: str, remarks: Remarks) -> float:
-    """One, unless the summary says that the values are secondary ones (SEL-751)."""
-    if report.about.get("PRIM_VAL", "YES").upper() != "NO":
-        return 1.0
-    column = ("CTR" if name[0] == "I" else "PTR") + "_" + name
-    keys = (column, column[:-1] + "A", column[:3])
-    ratio = next((r for key in keys if (r := number(report.about.get(key, "")))), None)
-    if ratio is None or ratio <= 0:
-        remarks.add(
-            f"secondary values (PRIM_VAL is NO), but no ratio {column} for {name}: they stay"
-            " secondary"
-        )
-        return 1.0
-    return ratio
-
-
-def _gain(
-    report: EventReport, values: np.ndarray, marks: list[str], per_cycle: float, remarks: Remarks
-) -> float:
-    """The root of two, unless the summary's currents, RMS, show that the columns hold instantaneous
-    values.
-    """
-    remarks.add(
-        "columns are taken as instantaneous values over the root of two, as SEL's manuals say"
-    )
-    quarter = round(per_cycle / 4)
-    row = _find_marked_row(marks, "*>")
-    if row is None or row < quarter or 4 * quarter != per_cycle:
-        return ROOT
-    ratio = _compare_with_summary(report, np.hypot(values[row], values[row - quarter]))
-    if ratio is None:
-        return ROOT
-    if abs(ratio / ROOT - 1) < LARGEST_SUMMARY_DIFFERENCE:
-        remarks.add(
-            "but their greatest current, by the summary, says that they are not divided; taken as"
-            " they are"
-        )
-        return 1.0
-    if abs(ratio - 1) > LARGEST_SUMMARY_DIFFERENCE:
-        remarks.add(
-            f"the summary's greatest current is {1 / ratio:.2f} times that of the columns: check"
-            " the scale"
-        )
-    return ROOT
-
-
-def _compare_with_summary(report: EventReport, sizes: np.ndarray) -> float | None:
-    """The size of the greatest current over what the summary gives of it, by the `sizes` of the
-    columns; None where there is none.
-    """
-    ratios = []
-    for column, here in zip(report.columns, sizes.tolist(), strict=False):
-        rms = number(report.about.get(column, "")) if column in CURRENTS else None
-        if rms and here > 0:
-            ratios.append((rms, here / rms))
-    return max(ratios)[1] if ratios else None
-
-
-def _find_marked_row(marks: list[str], signs: str) -> int | None:
-    """The first row with the first of some signs that a row has; None where none has."""
-    rows = (i for sign in signs for i, mark in enumerate(marks) if sign in mark)
-    return next(rows, None)
 
 
 def _start(report: EventReport, before: float, remarks: Remarks) -> datetime | None:

@@ -10,8 +10,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tractexp.errors import DATA, UserError
+from tractexp.filetypes.column_key import PHASES
 from tractexp.filetypes.columns import Role, factor, role
-from tractexp.filetypes.mapping import PHASES, map_times
+from tractexp.filetypes.mapping import map_times
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableFile
 from tractexp.recording.railway import (

@@ -9,17 +9,11 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import DATA, UserError
+from tractexp.filetypes.column_key import LINES, PHASES, check_mapping
+from tractexp.filetypes.column_options import MappedColumn
 from tractexp.filetypes.columns import PER_UNIT, factor
 from tractexp.filetypes.direct_table import check_alternating, describe_direct_table
-from tractexp.filetypes.mapping import (
-    LINES,
-    PHASES,
-    Mapped,
-    MappedColumn,
-    check_mapping,
-    map_columns,
-    map_voltage,
-)
+from tractexp.filetypes.mapping import Mapped, map_columns, map_voltage
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.row_quality import find_bad_rows, find_filled_rows
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar

@@ -7,9 +7,11 @@ import numpy as np
 
 from tractexp.errors import DATA, UserError
 from tractexp.filetypes.cells import is_plain_number
+from tractexp.filetypes.column_key import LINES, PHASES
+from tractexp.filetypes.column_options import find_other_columns
 from tractexp.filetypes.columns import role
 from tractexp.filetypes.comtrade_samples import HUGE
-from tractexp.filetypes.mapping import LINES, PHASES, Mapped, find_other_columns
+from tractexp.filetypes.mapping import Mapped
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableColumn, TableFile
 from tractexp.record.gap import (

@@ -25,7 +25,7 @@ from tractexp.recording.phase_mark import (
     quantity_before,
     spell_marks,
 )
-from tractexp.recording.recording import Channel
+from tractexp.recording.recording import Channel, Recording
 
 RESIDUAL = re.compile(
     (
@@ -442,3 +442,8 @@ def words(text: str) -> set[str]:
     single = {"1", "5"} if re.search(r"[\u2e80-\u9fff][iv](?![a-z])", text) else set()  # "母线I"
     result = {ROMAN.get(word, word) for word in parts if len(word) > 1 or word not in ROMAN}
     return result | {ROMAN[word] for word in parts & {"i", "v"} if ROMAN[word] in single}
+
+
+def name_channel(recording: Recording, number: int) -> str:
+    """ "channel 4 'Ia'"."""
+    return f"channel {number} '{recording.channels[number].name}'"
