@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from tractexp.blocks.chart import script
+from tractexp.blocks.chart_script import script
 
 VOID = {"meta", "br", "img", "path", "use", "rect", "line"}
 

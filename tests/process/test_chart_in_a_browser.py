@@ -9,7 +9,8 @@ from browser import BROWSER, Worked, drawn
 
 from tractexp.blocks import Report, plotly
 from tractexp.blocks.block import Markup
-from tractexp.blocks.chart import Chart, script
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.chart_script import script
 
 BLUE = "#0072B2"
 

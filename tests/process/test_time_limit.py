@@ -15,7 +15,7 @@ from tractexp.api.surveying import rows_of
 from tractexp.api.task import read_events
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.storage import files
+from tractexp.storage import files, time_limit
 
 if os.name == "nt":
     pytest.skip("there is no clock of a processor", allow_module_level=True)
@@ -49,8 +49,8 @@ def endless(tmp_path, monkeypatch):
         (tmp_path / f"dip{ending}").write_bytes((DATA / f"tibet_50pct{ending}").read_bytes())
     path = tmp_path / "dip.cfg"
     tractexp.read(str(path))  # imports are no time of the record's
-    monkeypatch.setattr(files, "PATIENCE", 0.1)
-    monkeypatch.setattr(files, "BYTES_PER_SECOND", 1e12)
+    monkeypatch.setattr(time_limit, "PATIENCE", 0.1)
+    monkeypatch.setattr(time_limit, "BYTES_PER_SECOND", 1e12)
     monkeypatch.setattr(comtrade, "load", spin)
     return path
 
@@ -76,20 +76,20 @@ def test_a_command_ends_with_that_sentence(endless):
 
 
 def test_each_byte_that_is_opened_gives_more_time(tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "PATIENCE", 50.0)
-    monkeypatch.setattr(files, "BYTES_PER_SECOND", 100)
+    monkeypatch.setattr(time_limit, "PATIENCE", 50.0)
+    monkeypatch.setattr(time_limit, "BYTES_PER_SECOND", 100)
     path = files.write(tmp_path / "a", bytes(1000))
-    with files.limit_time(path):
+    with time_limit.limit_time(path):
         files.read(path)
         assert 58.0 < signal.getitimer(signal.ITIMER_VIRTUAL)[0] < 61.0
-        with files.limit_time(path):  # of the same record
+        with time_limit.limit_time(path):  # of the same record
             files.read(path, 1)
         assert 68.0 < signal.getitimer(signal.ITIMER_VIRTUAL)[0] < 71.0
 
 
 def test_waiting_takes_no_time_of_the_record(tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "PATIENCE", 0.05)
-    with files.limit_time(tmp_path):
+    monkeypatch.setattr(time_limit, "PATIENCE", 0.05)
+    with time_limit.limit_time(tmp_path):
         time.sleep(0.1)
 
 
@@ -98,7 +98,7 @@ def test_another_thread_reads_without_a_clock(tmp_path):
     path = files.write(tmp_path / "a", b"x")
 
     def read_in_thread():
-        with files.limit_time(path):
+        with time_limit.limit_time(path):
             read.append((files.read(path), signal.getitimer(signal.ITIMER_VIRTUAL)))
 
     thread = threading.Thread(target=read_in_thread)

@@ -23,7 +23,7 @@ from tractexp.inference.multistart import distinct
 from tractexp.inference.observed import Observed
 from tractexp.inference.problem import Problem
 from tractexp.noise import Noise
-from tractexp.report.identify import tabulate_search_end
+from tractexp.report.fit_tables import tabulate_search_end
 
 TRUTH = study.TYPICAL
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tractexp.blocks import Report, plotly
-from tractexp.blocks.chart import Chart, script
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.chart_script import script
 
 
 @pytest.fixture(scope="module")

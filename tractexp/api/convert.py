@@ -18,7 +18,7 @@ from tractexp.record import Event, Reader, Record
 from tractexp.recording import Recording, Writer
 from tractexp.recording.cut import cut_recording
 from tractexp.recording.reader import WaveformReader
-from tractexp.storage.files import limit_time
+from tractexp.storage.time_limit import limit_time
 from tractexp.text.progress import console
 
 if TYPE_CHECKING:

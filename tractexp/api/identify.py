@@ -412,7 +412,7 @@ class Identification(Written):
 
     def table(self) -> Table:
         """Estimates with intervals and verdicts, the search's end only where it lies outside."""
-        from tractexp.report.identify import parameters
+        from tractexp.report.fit_tables import parameters
 
         return parameters(self)
 
@@ -422,9 +422,9 @@ class Identification(Written):
 
     def summary(self) -> Report:
         """Estimate, intervals and grade."""
-        from tractexp.report import identify
+        from tractexp.report.fit_summary import summary
 
-        return identify.summary(self)
+        return summary(self)
 
     def screen(self) -> Report:
         """The answer on one screen of a terminal."""

@@ -20,7 +20,7 @@ from tractexp.outcome import Written
 from tractexp.record import Event, Record
 from tractexp.recording.event_views import join_event, propose_joining
 from tractexp.recording.overview import Sight, View, sight_of, view_of
-from tractexp.storage import files
+from tractexp.storage import files, time_limit
 from tractexp.text.progress import Progress, tell_stages
 from tractexp.text.wording import count_noun
 
@@ -250,7 +250,7 @@ def look(*sources: "Records", progress: Progress = None, **settings: "Setting") 
             count = f"{k} of {len(distinct)}: " if len(distinct) > 1 else ""
             name = source if isinstance(source, str) else source.name
             stage(f"reading {count}{name}")
-            with files.limit_time(name):
+            with time_limit.limit_time(name):
                 views.append(_view(source, settings))
                 stage("measuring the quality of the channels")
                 contents.append(build_content(views[-1]))
@@ -281,7 +281,7 @@ def _join_given(
     alone = settings or len(paths) < len(sources) or any(map(files.is_archive, paths))
     if alone or not paths:
         return None
-    with files.limit_time(paths[0]):
+    with time_limit.limit_time(paths[0]):
         return join_event(paths)
 
 

@@ -26,7 +26,7 @@ from tractexp.record import (
 from tractexp.record.angle import unwrap_angle
 from tractexp.record.dips import around
 from tractexp.recording.event_views import settings_of
-from tractexp.storage import files
+from tractexp.storage import files, time_limit
 from tractexp.text.wording import count_noun
 
 if TYPE_CHECKING:
@@ -277,7 +277,7 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
 
 def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
     """The records of a file, by the reader its ending names, or of a choice of `conf/data`."""
-    with files.limit_time(path):
+    with time_limit.limit_time(path):
         read = read_records(node_of(path, settings))
     return [*read.train, *read.validate]
 

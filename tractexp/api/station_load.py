@@ -39,7 +39,7 @@ from tractexp.inference.model_error import model_error
 from tractexp.process.workers import Workers
 from tractexp.record import Event, OwnBase, Record, detect
 from tractexp.recording import archive
-from tractexp.storage import files
+from tractexp.storage import files, time_limit
 
 KEPT_BEFORE, KEPT_AFTER = 0.6, 1.5  # s of a record before its dip and after it
 KEPT_RATE = 400.0  # Hz: phasors are means over a cycle, and years of dips are kept in memory
@@ -68,7 +68,7 @@ def read_dips(folder: str, wanted: tuple[str, Sequence[str]]) -> list[Read]:
     """
     file, names = wanted
     try:
-        with files.limit_time(Path(folder, file)):
+        with time_limit.limit_time(Path(folder, file)):
             records = archive.records(Path(folder), list(names), "data.path")
         return [{"record": record_to_dict(_cut_out(record))} for record in records]
     except UserError as error:

@@ -20,7 +20,7 @@ from tractexp.recording.event_views import list_within, propose_joining, shows_l
 from tractexp.recording.overview import LoadEvent, Sight, View
 from tractexp.report.look import describe_dead_phases
 from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
-from tractexp.storage import files
+from tractexp.storage import files, time_limit
 from tractexp.text.progress import Progress, count_parts
 
 Rows = list[dict[str, Any]]
@@ -64,7 +64,7 @@ def rows_of(folder: str, file: str) -> Rows:
     is an error.
     """
     try:
-        with files.limit_time(Path(folder, file)):
+        with time_limit.limit_time(Path(folder, file)):
             within = list_within(Path(folder, file))
         return [
             row
@@ -91,7 +91,7 @@ def _rows_of_one(folder: str, file: str) -> Rows:
     """The rows of one file that is no .zip, or of a .zip that holds the files of one event."""
     row, path = _blank(file), Path(folder, file)
     try:
-        with files.limit_time(path):
+        with time_limit.limit_time(path):
             return _rows_of_view(row, path)
     except UserError as error:
         return [row | {"kind": UNREAD, "why": str(error)}]

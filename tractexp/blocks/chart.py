@@ -6,66 +6,26 @@ has a chart takes along; `chart.js` draws it. Nothing is drawn here and that pac
 imported, so that a page costs milliseconds.
 """
 
-import base64
-import functools
-import gzip
-import json
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tractexp.blocks import plotly, style
-from tractexp.cache import store
-from tractexp.storage import files
+from tractexp.blocks import style
+from tractexp.blocks.packing import encode_curve, list_values, pack_numbers, share_arrays
 from tractexp.text import quoting
 
 # points of a line that are kept: beyond, each stretch keeps its lowest and highest
 MOST_LINE_POINTS = 20_000
 FONT = 'system-ui, "Segoe UI", "Liberation Sans", sans-serif'
-SETTINGS = {
-    "responsive": True,
-    "displaylogo": False,
-    "showSendToCloud": False,  # nothing leaves this computer
-    "plotlyServerURL": "",
-    "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
-    "toImageButtonOptions": {"format": "svg"},
-}
-LICENSE = "// plotly.js, copyright Plotly, Inc., MIT license"
-PAPER = 700  # pixels, the width of a printed page: A4 without its margins of 12 mm
 # pixels: a legend on a phone, one of its entries without the name, a letter
 PHONE, ENTRY, LETTER = 240, 45, 7
 PANEL_GAP = 0.045  # of the height, between panels
 HOVER = "%{y:.5g}"
 DECADE = 20  # an axis that spans less has its ticks between powers of ten
-# points of a sampled line that are drawn at once: twice as many as a page is wide
-MOST_DRAWN_POINTS = 2000
 MOST_LOG_TICKS = 6  # of a vertical axis, where digits between powers of ten would overlap
 TICK = 28  # letters of a trace's name beside its axis
-GREATEST_CODE = 32767  # the greatest of 16 bits; the least stands for a gap
-
-
-@functools.cache
-def script() -> str:
-    """The JavaScript that a page with charts holds once: a license line, and Plotly.js and our
-    `chart.js`, compressed, with what unpacks and runs them.
-    """
-    drawing = files.read_packaged_text("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
-    drawing = drawing.replace("PAPER", str(PAPER)).replace("SHOWN", str(MOST_DRAWN_POINTS))
-    program = store.TEXTS.get(
-        store.key("charts", plotly.digest(), drawing), lambda: pack_program(plotly.code() + drawing)
-    )
-    return "\n".join(
-        [files.read_packaged_text("blocks/unpack.js"), LICENSE, f'run("{program.decode()}");']
-    )
-
-
-def pack_program(program: str) -> bytes:
-    """A program as gzip and base 64 pack it: two fifths of its length, and the same for the same
-    program.
-    """
-    return base64.b64encode(gzip.compress(program.encode(), mtime=0))
 
 
 class Chart:
@@ -190,7 +150,7 @@ class Chart:
         line = {"color": color, "width": width, "dash": dash}
         reading: dict[str, Any] = {"panel": self._panels[panel], "label": label or name}
         return self._add(
-            name, panel, mode="lines", line=line, samples=_encode_curve(start, step, y), **reading
+            name, panel, mode="lines", line=line, samples=encode_curve(start, step, y), **reading
         )
 
     def phasors(
@@ -205,7 +165,7 @@ class Chart:
         """Complex values (n,), every `step` from `start` on, that are seen at the cursor only, as
         arrows.
         """
-        coded = {"re": _encode_curve(start, step, y.real), "im": _encode_curve(start, step, y.imag)}
+        coded = {"re": encode_curve(start, step, y.real), "im": encode_curve(start, step, y.imag)}
         return self._add(
             name,
             panel,
@@ -308,7 +268,7 @@ class Chart:
                 "text": [quoting.html(t) for t in hover],
                 "hovertemplate": "%{text}<extra></extra>",
             }
-        return self._add(name, panel, mode="markers", x=_list_values(x), y=_list_values(y), **trace)
+        return self._add(name, panel, mode="markers", x=list_values(x), y=list_values(y), **trace)
 
     def bars(
         self,
@@ -330,8 +290,8 @@ class Chart:
             panel,
             kind="bar",
             orientation="h",
-            x=_list_values(values),
-            y=_list_values(labels),
+            x=list_values(values),
+            y=list_values(labels),
             marker={"color": color if isinstance(color, str) else list(color)},
             hovertemplate="%{y}: %{x:.4g}<extra></extra>",
             **trace,
@@ -542,7 +502,7 @@ class Chart:
 
     def element(self, label: str) -> str:
         """The chart as HTML, told to screen readers as `label`."""
-        data = quoting.script(_share_arrays(self.plain()))
+        data = quoting.script(share_arrays(self.plain()))
         kind = "readout arrows" if any("phasor" in trace for trace in self._data) else "readout"
         above = "" if self._cursor is None else f'<div class="{kind}"></div>'
         return (
@@ -572,47 +532,6 @@ class Chart:
         return self
 
 
-def _share_arrays(plain: dict[str, Any]) -> dict[str, Any]:
-    """A chart whose traces name their packed arrays by number, so that curves of one record have
-    their times once, and short: values in 16 bits, uniform times by start and step.
-    """
-    arrays: list[dict[str, str]] = []
-    exact = set[int]()
-
-    def share(trace: dict[str, Any], key: str) -> Any:
-        value = trace[key]
-        if not (isinstance(value, dict) and "bdata" in value):
-            return value
-        if value not in arrays:
-            arrays.append(value)
-        number = arrays.index(value)
-        axis = plain["layout"][f"{key}axis{trace.get(f'{key}axis', '')[1:]}"]
-        if axis.get("type") == "log":
-            exact.add(number)
-        return {"array": number}
-
-    traces = [
-        trace | {key: share(trace, key) for key in ("x", "y") if key in trace}
-        for trace in plain["data"]
-    ]
-    short = [a if k in exact else _shorten_array(a) for k, a in enumerate(arrays)]
-    return {**plain, "data": traces, "arrays": short}
-
-
-def _shorten_array(packed: dict[str, str]) -> dict[str, Any]:
-    """A packed array in fewer letters: no worse than a screen shows it."""
-    kind = np.dtype(f"<{packed['dtype']}")
-    values = np.frombuffer(base64.b64decode(packed["bdata"]), kind).astype(float)
-    if kind.itemsize < np.dtype(float).itemsize:
-        return {"dtype": "i2"} | _encode_values(values)
-    count = len(values)
-    step = (values[-1] - values[0]) / (count - 1) if count > 1 else 0.0
-    even = values[0] + step * np.arange(count) if count else values
-    if count and np.allclose(values, even, rtol=0, atol=1e-6 * abs(step)):
-        return {"start": float(values[0]), "step": float(step), "count": count}
-    return packed
-
-
 def _short(name: str) -> str:
     """A name that fits a tick."""
     return name if len(name) <= TICK else f"{name[: TICK - 1]}…"
@@ -632,37 +551,6 @@ def _axis(letter: str, panel: int) -> str:
 def _height(panel: int | None) -> dict[str, Any]:
     """All of a panel, or of the chart."""
     return {"yref": "paper" if panel is None else f"{_axis('y', panel)} domain", "y0": 0, "y1": 1}
-
-
-def _encode_curve(start: float, step: float, y: np.ndarray) -> dict[str, Any]:
-    """Values (n,), every `step` from `start` on."""
-    return {"start": start, "step": step} | _encode_values(y)
-
-
-def _encode_values(y: np.ndarray) -> dict[str, Any]:
-    """Values (n,) in 16 bits between the lowest and the highest; nan is a gap."""
-    finite = np.isfinite(y)
-    low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
-    offset, scale = (low + high) / 2, max((high - low) / (2 * GREATEST_CODE), 1e-300)
-    held = np.where(
-        finite, np.round((np.where(finite, y, offset) - offset) / scale), -GREATEST_CODE - 1
-    ).astype("<i2")
-    packed = base64.b64encode(held.tobytes()).decode()
-    return {"bdata": packed, "offset": offset, "scale": scale}
-
-
-def pack_numbers(values: np.ndarray, kind: str) -> dict[str, str]:
-    """Numbers as Plotly's typed arrays: exact, and a third of the length of their digits."""
-    return {
-        "dtype": kind,
-        "bdata": base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode(),
-    }
-
-
-def _list_values(values: Sequence[Any] | np.ndarray) -> list[Any]:
-    """Values for JSON: text is quoted, nan is a gap."""
-    plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
-    return [quoting.html(v) if isinstance(v, str) else None if v != v else v for v in plain]
 
 
 def _faint(color: str) -> str:

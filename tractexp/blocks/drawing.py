@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.blocks import style
-from tractexp.blocks.chart import GREATEST_CODE, Chart
+from tractexp.blocks.chart import Chart
+from tractexp.blocks.packing import GREATEST_CODE
 from tractexp.text.quoting import unescape_html
 
 WIDTH, PANEL_HEIGHT = 7.0, 1.25  # inches

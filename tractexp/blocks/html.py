@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 
 from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
-from tractexp.blocks.chart import script
+from tractexp.blocks.chart_script import script
 from tractexp.blocks.drawing import draw_equation
 from tractexp.cache import store
 from tractexp.storage import files

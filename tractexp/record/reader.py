@@ -10,7 +10,7 @@ from tractexp.configuration.overrides import survey_of
 from tractexp.configuration.plugin import Plugin, build, discover
 from tractexp.errors import UserError
 from tractexp.record import foreign
-from tractexp.storage import files
+from tractexp.storage import time_limit
 
 if TYPE_CHECKING:
     from tractexp.record.dips import FileDip
@@ -105,7 +105,7 @@ def read_records(data: Mapping[str, Any]) -> Events:
     if reader.folders:  # each file of the folder has its own time
         return reader.read()
     named = getattr(reader, "path", "") or next(iter(getattr(reader, "train", None) or [""]))
-    with files.limit_time(str(named) or reader.name):
+    with time_limit.limit_time(str(named) or reader.name):
         return reader.read()
 
 

@@ -9,7 +9,7 @@ from tractexp.record import Record
 from tractexp.recording.event_views import settings_of
 from tractexp.recording.overview import LoadEvent, Sight, View, view_of
 from tractexp.recording.record_files import find_records
-from tractexp.storage import files
+from tractexp.storage import files, time_limit
 from tractexp.text.wording import count_noun
 
 NAMED = re.compile(r"(?P<file>.+?)(?:#(?P<load>\d+)(?:\.(?P<dip>\d+))?)?")
@@ -19,7 +19,7 @@ def look_at_file(path: Path) -> View:
     """A file of an archive, looked at by the reader of its ending. Raises `UserError` where it
     cannot be read.
     """
-    with files.limit_time(path):
+    with time_limit.limit_time(path):
         return view_of(str(path), settings_of(str(path)))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp.blocks import Report, Table, style
+from tractexp.blocks import Report, style
 from tractexp.blocks.chart import Chart
 from tractexp.configuration.run_command import command
 from tractexp.identification.agreement import EventAgreement
@@ -15,130 +15,26 @@ from tractexp.identification.estimate import EstimationResult
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import IDENTIFIED, TRADES, brief
-from tractexp.identification.yardstick import poles_in_words
-from tractexp.inference.model_error import in_percent, tell_error
+from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
-from tractexp.record.identity import Identity, describe_identities, title
+from tractexp.record.identity import describe_identities, title
+from tractexp.report.fit_summary import headline, machine, samples, yardstick
+from tractexp.report.fit_tables import digits, errors, list_origin, parameters, tabulate_search_end
 from tractexp.report.fitted_curves import MOST_OPEN_EVENTS, ROLES, add_curves, add_next_dip
 from tractexp.report.race import tabulate_race
 from tractexp.report.sliders import add_sliders
-from tractexp.text.wording import as_sentence, epsilon, in_words, shown_in_words
+from tractexp.text.wording import as_sentence, in_words
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification
 
 KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
 CHANNELS = (style.ACTIVE, style.REACTIVE, style.PALETTE[2])  # of what is compared
-EXACT = (
-    "Nothing but noise is left: the estimate is the most likely set, noise whitened, the power"
-    " before each dip free. pu: per unit of the record's base."
-)
-SCATTERED = (
-    "More than noise is left: the estimate is the minimum of Eq. (8), and intervals say by how much"
-    " it scatters where stretches of 0.1 s are left out. pu: per unit of the record's base."
-)
-MODEL_ERROR = (
-    "Model error: rms of what is left beyond the noise, from the dip on, over the rms of the load's"
-    " response, both in apparent power S. epsilon: Eq. (20)."
-)
 SHARES_HELD = (
     "The motors' share held, all else fitted again: by how much more the fit then leaves than the"
     " best does."
 )
-FIXED = "fixed"
 SAME_END_SHARE = 0.01  # of the deviance: starts closer than this ended in the same place
-
-
-def digits(value: float) -> str:
-    """A number with four digits."""
-    return f"{value:.4g}"
-
-
-def summary(fit: "Identification") -> Report:
-    """What it is good for, the estimates, how well they fit, why some are not identified, and what
-    to do next.
-    """
-    result = fit.result
-    verdicts = own_verdicts(result)
-    poor = [f"{name}: {verdict}" for name, verdict in name_verdicts(result).items()]
-    notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
-    start = [text for event in result.events if (text := starts_at_rest(event))]
-    report = Report()
-    if fit.headline:
-        report.text(as_sentence(fit.headline))
-    report.add(parameters(fit), *tabulate_race(result.race))
-    report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(
-        errors(fit)
-    )
-    return report.text(
-        *yardstick(fit),
-        *samples(fit),
-        *correlations(fit),
-        *start,
-        result.acceptance,
-        *([headline(result)] if verdicts else []),
-        *(f"  {sentence}" for sentence in poor),
-        *notes,
-        *filter(None, [fit.end_of_search]),
-        *(f"next: {sentence}" for sentence in fit.next_steps),
-    )
-
-
-def machine(fit: "Identification") -> list[str]:
-    """How the load divides before the dip, in a sentence; [] where its model has no motor."""
-    bound = fit.result.share_bound.get("sentence", "")
-    division = [] if fit.operating_point is None else [str(fit.operating_point)]
-    return [*division, *filter(None, [bound]), *network(fit)]
-
-
-def network(fit: "Identification") -> list[str]:
-    """What the records show beside the load that is fitted, and its nuisances, in a sentence each;
-    [] where nothing.
-    """
-    result = fit.result
-    if not result.shown_effects:
-        return []
-    values = ", ".join(
-        f"{n} {digits(v)} {result.units.get(n, '')}".rstrip(" 1")
-        for n, v in result.nuisances.items()
-    )
-    return [shown_in_words(result.shown_effects), f"nuisances of the fit: {values}"]
-
-
-def name_verdicts(result: Any) -> dict[str, str]:
-    """The verdicts of parameters that are not identified, by their names."""
-    own = own_verdicts(result).items()
-    return {name: verdict for name, verdict in own if not verdict.startswith(IDENTIFIED)}
-
-
-def own_verdicts(result: Any) -> dict[str, str]:
-    """{name: verdict} without nuisances."""
-    return {
-        name: verdict for name, verdict in result.verdicts.items() if name not in result.nuisances
-    }
-
-
-def yardstick(fit: "Identification") -> list[str]:
-    """The best linear network beside it, in a sentence, with its poles where there are some; []
-    where not judged.
-    """
-    poles = fit.result.linear_network.get("poles")
-    beside = f" The network's poles: {poles_in_words(poles)}." if poles else ""
-    return [as_sentence(fit.yardstick) + beside] if fit.yardstick else []
-
-
-def starts_at_rest(event: dict[str, Any]) -> str:
-    """How well a simulation in waveforms begins at rest, in a sentence; "" in phasors, which do so
-    exactly.
-    """
-    if event.get("unsettled") is None:
-        return ""
-    change = (
-        f"the calculated currents still change by {event['unsettled']:.2g} of their size from cycle"
-        " to cycle"
-    )
-    return f"periodic steady state before {event['name']}: {change}"
 
 
 def report(fit: "Identification") -> Report:
@@ -202,75 +98,6 @@ def _of_currents(result: Any) -> str:
     return f" Of the currents themselves epsilon_i is {', '.join(values)}." if values else ""
 
 
-def headline(result: Any) -> str:
-    """How many of the parameters are identified, and which are not, in one sentence."""
-    verdicts = own_verdicts(result)
-    poor = [
-        f"{n} {v.partition(':')[0].partition(' (')[0]}"
-        for n, v in verdicts.items()
-        if not v.startswith(IDENTIFIED)
-    ]
-    good = len(verdicts) - len(poor)
-    return (
-        f"{good} of {len(verdicts)} parameters are identified"
-        + (f"; {', '.join(poor)}" if poor else "")
-        + "."
-    )
-
-
-def parameters(fit: "Identification") -> Table:
-    """The estimates. Where the search ended is a detail, unless that lies outside an interval."""
-    rows = [
-        [
-            e.name,
-            e.about,
-            e.value,
-            e.unit,
-            "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
-            "{:g} .. {:g}".format(*e.bounds),
-            e.search,
-            brief(e.verdict),
-        ]
-        for e in fit.parameters.values()
-        if e.name not in fit.result.nuisances
-    ]
-    columns = [
-        "parameter",
-        "meaning",
-        "value",
-        "unit",
-        "95 % interval",
-        "bounds",
-        "search ended at",
-        "verdict",
-    ]
-    caption = EXACT if fit.adequate else SCATTERED
-    if missing := fit.result.unrecorded:  # a further column: what it would move each by
-        columns.append(f"{missing['swing']:g} Hz of {missing['channel']} moves")
-        rows = [[*row, missing["moves"].get(row[0])] for row in rows]
-    return Table(
-        columns,
-        rows,
-        fit.model.model.title,
-        caption,
-        words=(1, 3, 7),
-        detail=(1, 5) if fit.outside_interval else (1, 5, 6),
-    )
-
-
-def tabulate_search_end(fit: "Identification") -> Table:
-    """Where the search ended beside the estimate, and a word where they differ."""
-    search, result, away = fit.result.search, fit.result, fit.outside_interval
-    keys = [("objective", "pu²"), ("epsilon_p", "1"), ("epsilon_q", "1")] if search else []
-    rows = [[key, search[key], getattr(result, key), unit, ""] for key, unit in keys]
-    rows += [
-        [e.name, e.search, e.value, e.unit, "outside the 95 % interval" if e.name in away else ""]
-        for e in fit.parameters.values()
-        if e.verdict != FIXED
-    ]
-    return Table(["", "search ended at", "estimate", "unit", "they differ"], rows, words=(3, 4))
-
-
 def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -> None:
     """The base of the values, a picture against the bounds, and what rivals make of
     the parameters.
@@ -290,66 +117,6 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
         f"{name}: {v}." for name, v in verdicts if v.word != IDENTIFIED and name not in nuisances
     ]
     page.items([*map(as_sentence, fit.structures), *poor])
-
-
-def errors(fit: "Identification") -> Table:
-    """The model's error on each event, and the errors of Eq. (20)."""
-    return tabulate_errors(fit.result)
-
-
-def tabulate_errors(result: Any) -> Table:
-    """The same of a result."""
-    unknown = {"value": None, "interval": (), "of_S": None}
-    of_events = result.model_error.get("events") or [unknown] * len(result.events)
-    return error_table(result.events, of_events, result.epsilons)
-
-
-def error_rows(result: Any) -> list[list[str]]:
-    """Name, role, model's error and its interval of each event."""
-    return [[str(cell) for cell in row[:4]] for row in tabulate_errors(result).rows]
-
-
-def error_table(events: Sequence[Any], of_events: Sequence[Any], epsilons: Sequence[str]) -> Table:
-    """Entries of `events` and of `model_error` as `result.json` has them, a row each."""
-    columns = ["event", "role", "model error", "95 % interval", "of S", *epsilons]
-    rows = [
-        [
-            e["name"],
-            ROLES[e["role"]],
-            tell_error(m),
-            "" if m.get("stalls") else " .. ".join(map(in_percent, m["interval"])),
-            "" if m.get("stalls") else in_percent(m["of_S"]),
-            *(epsilon(e[key]) for key in epsilons),
-        ]
-        for e, m in zip(events, of_events, strict=True)
-    ]
-    return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(4,))
-
-
-def samples(fit: "Identification") -> list[str]:
-    """How many samples were fitted, in a sentence; [] of an early result."""
-    statistics = fit.result.uncertainty
-    if "samples" not in statistics:
-        return []
-    said = (
-        f"{statistics['samples']} samples compared, {statistics['parameters']} parameters searched"
-    )
-    return [f"fitted: {said}, {statistics['freedom']} degrees of freedom"]
-
-
-def correlations(fit: "Identification") -> list[str]:
-    """The correlations that a terminal has room for, the strongest first; [] where
-    none is strong.
-    """
-    statistics = fit.result.uncertainty
-    names, matrix = statistics.get("names", []), statistics.get("correlation", [])
-    pairs = [(matrix[i][j], names[j], names[i]) for i in range(len(names)) for j in range(i)]
-    strong = [
-        f"{a} and {b} {r:+.3f}"
-        for r, a, b in sorted(pairs, key=lambda p: -abs(p[0]))
-        if abs(r) >= TRADES
-    ]
-    return [f"correlations of {TRADES} and more: {', '.join(strong)}"] if strong else []
 
 
 def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
@@ -545,25 +312,6 @@ def _correlation(page: Report, uncertainty: Uncertainty) -> None:
             for k, (n, row) in enumerate(zip(names, matrix, strict=True), start=1)
         ],
     )
-
-
-def list_origin(result: Any, command: str) -> list[list[str]]:
-    """The command, the version and the records that a result was made of, a row each."""
-    rows = [["command", command]] if command else []
-    rows.append(
-        [
-            "tractexp",
-            f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}",
-        ]
-    )
-    rows += [
-        [
-            f"record {r['name']} ({r['role']})",
-            "; ".join(filter(None, [str(Identity.from_content(r)), f"SHA-256 {r['sha256']}"])),
-        ]
-        for r in result.records
-    ]
-    return rows
 
 
 def _events(page: Report, uncertainty: Uncertainty, together: EventAgreement) -> None:

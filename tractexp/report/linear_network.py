@@ -6,8 +6,8 @@ from tractexp.blocks import Report, Table
 from tractexp.configuration.run_command import command
 from tractexp.inference.model_error import in_percent
 from tractexp.record.identity import title_of
+from tractexp.report.fit_tables import error_table
 from tractexp.report.fitted_curves import all_curves
-from tractexp.report.identify import error_table
 from tractexp.text.wording import as_sentence
 
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ from tractexp.exchange.format import choose_format
 from tractexp.exchange.rating import SOURCE, rate_machine
 from tractexp.identification.verdict import brief
 from tractexp.record.identity import describe_identities, title
-from tractexp.report.identify import error_rows, list_origin, name_verdicts
+from tractexp.report.fit_summary import name_verdicts
+from tractexp.report.fit_tables import error_rows, list_origin
 from tractexp.report.screen import choose_units, describe_load
 from tractexp.text.wording import as_sentence, count_noun, with_error
 

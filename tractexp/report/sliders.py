@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.block import Markup
-from tractexp.blocks.chart import pack_numbers
+from tractexp.blocks.packing import pack_numbers
 from tractexp.cache import store
 from tractexp.errors import UserError
 from tractexp.kernel.layout import PHASOR_INPUTS

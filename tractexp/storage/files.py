@@ -16,10 +16,8 @@ import json
 import math
 import os
 import re
-import signal
 import stat
 import tempfile
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,6 +25,7 @@ from typing import IO, Any
 
 from tractexp.errors import UserError
 from tractexp.storage import zip_archive
+from tractexp.storage.time_limit import grant_time
 from tractexp.storage.zip_archive import is_archive as is_archive
 from tractexp.storage.zip_archive import is_called_archive as is_called_archive
 
@@ -36,8 +35,6 @@ PART = ".tractexp.part"  # ends the name of a file that is being written
 OWN = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(PART), re.DOTALL)
 LARGEST = 2 << 30  # bytes of a file that is read at once: a record
 CONFIGURATION, RESULT = 4 << 20, 128 << 20  # bytes of what a run reads, and leaves
-# s of a processor that the files of one record may take, and bytes of them that may take one more
-PATIENCE, BYTES_PER_SECOND = 120.0, 500_000
 MOST_NODES, DEEPEST = 100_000, 50  # values of a configuration, and how deep within one another
 ODD = {
     stat.S_IFIFO: "a named pipe",
@@ -149,7 +146,7 @@ def open_ordinary_file(path: Path | str) -> Iterator[IO[bytes]]:
     to be one, `OSError` as `open`.
     """
     there(path)
-    _grant_time(size(path))
+    grant_time(size(path))
     if packed := zip_archive.locate(path):
         with zip_archive.open_member(*packed) as file:
             yield file
@@ -159,58 +156,6 @@ def open_ordinary_file(path: Path | str) -> Iterator[IO[bytes]]:
         if kind in ODD:  # put in the place of a file meanwhile
             raise UserError(f"{path} is {ODD[kind]}, no ordinary file")
         yield file
-
-
-class _OutOfTime(BaseException):
-    """The time of a record is over: no error that a reader may take for one of the file's."""
-
-
-def _end_reading(*_: object) -> None:
-    raise _OutOfTime
-
-
-@contextlib.contextmanager
-def limit_time(path: Path | str) -> Iterator[None]:
-    """Let this process work on the record at `path`, and on the files that belong to it, as long as
-    any record takes. Raises `UserError` after that, whatever its reader does then.
-
-    It counts the seconds of a processor in this process, so that neither a slow disk nor another
-    program shortens them, and gives more for each byte that is opened. Within another limit that
-    one holds. A thread that is not the main one, and Windows, have no such clock.
-    """
-    main = threading.current_thread() is threading.main_thread()
-    if not (main and hasattr(signal, "setitimer")) or _has_clock():
-        yield
-        return
-    before = signal.signal(signal.SIGVTALRM, _end_reading)
-    # again each second: where Python ignores what is raised, as in a weak reference's call
-    signal.setitimer(signal.ITIMER_VIRTUAL, PATIENCE, 1.0)
-    try:
-        try:
-            yield
-        finally:
-            signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-    except _OutOfTime:
-        raise UserError(
-            f"{path} takes more than {PATIENCE:g} s of a processor to read, which no record of its"
-            " size does: it is damaged, or made to do so; give a part of it"
-        ) from None
-    finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-        signal.signal(signal.SIGVTALRM, before or signal.SIG_DFL)
-
-
-def _has_clock() -> bool:
-    """Whether the time of a record is being counted."""
-    vtalrm = getattr(signal, "SIGVTALRM", None)
-    return vtalrm is not None and signal.getsignal(vtalrm) is _end_reading
-
-
-def _grant_time(count: int) -> None:
-    """Let a record that is being read take longer, by the bytes of a file of it."""
-    if _has_clock() and threading.current_thread() is threading.main_thread():
-        left, again = signal.getitimer(signal.ITIMER_VIRTUAL)
-        signal.setitimer(signal.ITIMER_VIRTUAL, left + count / BYTES_PER_SECOND, again)
 
 
 def size(path: Path | str) -> int:

@@ -1,0 +1,141 @@
+"""What an identification came to, in sentences and on one screen."""
+
+from typing import TYPE_CHECKING, Any
+
+from tractexp.blocks import Report
+from tractexp.identification.verdict import IDENTIFIED, TRADES
+from tractexp.identification.yardstick import poles_in_words
+from tractexp.report.fit_tables import digits, errors, parameters
+from tractexp.report.race import tabulate_race
+from tractexp.text.wording import as_sentence, shown_in_words
+
+if TYPE_CHECKING:
+    from tractexp.api.identify import Identification
+
+
+def summary(fit: "Identification") -> Report:
+    """What it is good for, the estimates, how well they fit, why some are not identified, and what
+    to do next.
+    """
+    result = fit.result
+    verdicts = own_verdicts(result)
+    poor = [f"{name}: {verdict}" for name, verdict in name_verdicts(result).items()]
+    notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
+    start = [text for event in result.events if (text := starts_at_rest(event))]
+    report = Report()
+    if fit.headline:
+        report.text(as_sentence(fit.headline))
+    report.add(parameters(fit), *tabulate_race(result.race))
+    report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(
+        errors(fit)
+    )
+    return report.text(
+        *yardstick(fit),
+        *samples(fit),
+        *correlations(fit),
+        *start,
+        result.acceptance,
+        *([headline(result)] if verdicts else []),
+        *(f"  {sentence}" for sentence in poor),
+        *notes,
+        *filter(None, [fit.end_of_search]),
+        *(f"next: {sentence}" for sentence in fit.next_steps),
+    )
+
+
+def machine(fit: "Identification") -> list[str]:
+    """How the load divides before the dip, in a sentence; [] where its model has no motor."""
+    bound = fit.result.share_bound.get("sentence", "")
+    division = [] if fit.operating_point is None else [str(fit.operating_point)]
+    return [*division, *filter(None, [bound]), *network(fit)]
+
+
+def network(fit: "Identification") -> list[str]:
+    """What the records show beside the load that is fitted, and its nuisances, in a sentence each;
+    [] where nothing.
+    """
+    result = fit.result
+    if not result.shown_effects:
+        return []
+    values = ", ".join(
+        f"{n} {digits(v)} {result.units.get(n, '')}".rstrip(" 1")
+        for n, v in result.nuisances.items()
+    )
+    return [shown_in_words(result.shown_effects), f"nuisances of the fit: {values}"]
+
+
+def name_verdicts(result: Any) -> dict[str, str]:
+    """The verdicts of parameters that are not identified, by their names."""
+    own = own_verdicts(result).items()
+    return {name: verdict for name, verdict in own if not verdict.startswith(IDENTIFIED)}
+
+
+def own_verdicts(result: Any) -> dict[str, str]:
+    """{name: verdict} without nuisances."""
+    return {
+        name: verdict for name, verdict in result.verdicts.items() if name not in result.nuisances
+    }
+
+
+def yardstick(fit: "Identification") -> list[str]:
+    """The best linear network beside it, in a sentence, with its poles where there are some; []
+    where not judged.
+    """
+    poles = fit.result.linear_network.get("poles")
+    beside = f" The network's poles: {poles_in_words(poles)}." if poles else ""
+    return [as_sentence(fit.yardstick) + beside] if fit.yardstick else []
+
+
+def starts_at_rest(event: dict[str, Any]) -> str:
+    """How well a simulation in waveforms begins at rest, in a sentence; "" in phasors, which do so
+    exactly.
+    """
+    if event.get("unsettled") is None:
+        return ""
+    change = (
+        f"the calculated currents still change by {event['unsettled']:.2g} of their size from cycle"
+        " to cycle"
+    )
+    return f"periodic steady state before {event['name']}: {change}"
+
+
+def headline(result: Any) -> str:
+    """How many of the parameters are identified, and which are not, in one sentence."""
+    verdicts = own_verdicts(result)
+    poor = [
+        f"{n} {v.partition(':')[0].partition(' (')[0]}"
+        for n, v in verdicts.items()
+        if not v.startswith(IDENTIFIED)
+    ]
+    good = len(verdicts) - len(poor)
+    return (
+        f"{good} of {len(verdicts)} parameters are identified"
+        + (f"; {', '.join(poor)}" if poor else "")
+        + "."
+    )
+
+
+def samples(fit: "Identification") -> list[str]:
+    """How many samples were fitted, in a sentence; [] of an early result."""
+    statistics = fit.result.uncertainty
+    if "samples" not in statistics:
+        return []
+    said = (
+        f"{statistics['samples']} samples compared, {statistics['parameters']} parameters searched"
+    )
+    return [f"fitted: {said}, {statistics['freedom']} degrees of freedom"]
+
+
+def correlations(fit: "Identification") -> list[str]:
+    """The correlations that a terminal has room for, the strongest first; [] where
+    none is strong.
+    """
+    statistics = fit.result.uncertainty
+    names, matrix = statistics.get("names", []), statistics.get("correlation", [])
+    pairs = [(matrix[i][j], names[j], names[i]) for i in range(len(names)) for j in range(i)]
+    strong = [
+        f"{a} and {b} {r:+.3f}"
+        for r, a, b in sorted(pairs, key=lambda p: -abs(p[0]))
+        if abs(r) >= TRADES
+    ]
+    return [f"correlations of {TRADES} and more: {', '.join(strong)}"] if strong else []
