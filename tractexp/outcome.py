@@ -36,7 +36,7 @@ class Tabulated:
         raise NotImplementedError
 
     def summary(self) -> Report:
-        """What a terminal and a notebook show; by default the table."""
+        """The report that a terminal and a notebook show; by default the table."""
         return Report().add(self.table())
 
     def to_frame(self) -> "pandas.DataFrame":
@@ -44,11 +44,11 @@ class Tabulated:
         return self.table().to_frame()
 
     def __repr__(self) -> str:
-        """What the command line prints."""
+        """The text that the command line prints."""
         return str(self.summary())
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
+        """The HTML that a notebook shows."""
         return self.summary().fragment
 
 
@@ -65,7 +65,7 @@ class Plain:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """What `to_dict` gave."""
+        """The result that `to_dict` gave."""
         required = [
             f
             for f in _list_saved_fields(cls)
@@ -154,13 +154,13 @@ class Written(Outcome):
     content: Mapping[str, Any]  # for machines
 
     def screen(self) -> Report:
-        """What a command prints of it: the answer on one screen; by default the summary."""
+        """The answer on one screen, which a command prints; by default the summary."""
         return self.summary()
 
     @property
     def next_step(self) -> str:
-        """What a command ends with: what leads on, and the command that does it; "" where that
-        stands on the screen itself.
+        """The sentence that a command ends with: what leads on, and the command that does it; ""
+        where that stands on the screen itself.
         """
         return ""
 
@@ -187,7 +187,7 @@ class Written(Outcome):
         return [files.write_json((folder / self.page).with_suffix(".json"), self.content)]
 
     def drawings(self) -> Mapping[str, Drawing]:
-        """What is made from the results, {name of the file: what makes it}."""
+        """The drawings of the results, {name of the file: what makes it}."""
         return {self.page: lambda path: self.report().save(path)} if self.page else {}
 
     def write(self, folder: Path | str) -> list[Path]:

@@ -113,7 +113,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Box:
-    """What a search may try: bounds (d,), and the way to the unit cube and back.
+    """The values that a search may try: bounds (d,), and the way to the unit cube and back.
 
     A problem's box has the names of its columns. An optimizer's has none: it is the unit cube, or
     the problem's bounds where the optimizer asks for `space="raw"`.

@@ -8,8 +8,8 @@ LEVEL, TIME = 0.0025, 0.2  # how sharp a relay is: in voltage over U_0, and in s
 
 
 def compute_open_share(eq, level, delay, wait, margin, ramp, stage=""):
-    """What is open, 0 to 1: all once the voltage stayed below `level` for `delay`, until it stayed
-    above for `wait`.
+    """The open share, 0 to 1: all once the voltage stayed below `level` for `delay`, until it
+    stayed above for `wait`.
 
     Then it returns within `ramp`. Between samples the voltage is a line, so that the timers start
     where it crosses a level. `stage` ends the names of a second relay's states.

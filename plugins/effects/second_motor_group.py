@@ -52,7 +52,7 @@ class SecondMotorGroup(Effect):
 
 
 def _compute_drawn_output(eq):
-    """What the motor draws: its power, of waveforms its current."""
+    """The power that the motor draws, of waveforms its current."""
     return (sites.motor_current,) if eq.waves else (sites.P_motor, sites.Q_motor)
 
 

@@ -130,7 +130,7 @@ def play(tables, dip):
 
 
 def response(system, motor, bus):
-    """What the load drew: the motor's own variables, and the static load by its law."""
+    """The response of the load: the motor's own variables, and the static load by its law."""
     series, k = system.dae.ts, list(system.Bus.idx.v).index(bus)
     U, angle = series.y[:, system.Bus.v.a[k]], series.y[:, system.Bus.a.a[k]]
     P, Q = np.zeros_like(U), np.zeros_like(U)

@@ -173,8 +173,8 @@ class Andes(Format):
 
 
 def respond(python, tables, settings):
-    """What ANDES has the load of these tables draw along a dip: U, angle, P, Q (N,), P and Q on its
-    base.
+    """The response along a dip that ANDES calculates for the load of these tables: U, angle, P, Q
+    (N,), P and Q on its base.
 
     Raises `UserError` where it fails.
     """

@@ -67,7 +67,9 @@ class LoadJson(Format):
 
 
 def _powers(load):
-    """What load, motor and static load draw before the dip; null for a part that is not there."""
+    """The powers that load, motor and static load draw before the dip; null for a part that is not
+    there.
+    """
     before, stored = load.steady_state, load.result.before
     rows = {"load": (load.ratio * stored["P0"], load.ratio * stored["Q0"])}
     for part in ("motor", "static"):

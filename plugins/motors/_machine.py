@@ -43,8 +43,8 @@ T_M = Parameter(
 
 
 def usual(T_prime, X_prime, C, M, T_m):
-    """What one cage usually is: geometric means of seven types of motor, and one and a half times
-    the logarithms' scatter.
+    """The usual ratios of one cage: geometric means of seven types of motor, and one and a half
+    times the logarithms' scatter.
 
     An aggregate of unknown machines may lie farther off than the types do, hence the half more.
     X'/X and R_s/X' are the machine's; X' T_m and M/T_m are its transient reactance and 2 H/omega_n

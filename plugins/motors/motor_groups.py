@@ -104,8 +104,8 @@ class MotorGroups(Motor):
 
 
 def _name(member):
-    """What a member is called. Raises `UserError` for what is neither a name, nor a mapping that
-    has one.
+    """The name of a member. Raises `UserError` for what is neither a name, nor a mapping that has
+    one.
     """
     name = member.get("name") if isinstance(member, Mapping) else member
     if not isinstance(name, str):

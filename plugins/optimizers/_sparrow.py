@@ -152,8 +152,8 @@ class Sparrow(Iterative):
     def perturbation(
         self, box: Box, iterations: int, rng: np.random.Generator
     ) -> Callable[[int, Flock], None]:
-        """What is done to the flock at the end of iteration t = 1, 2, ... of so many; traditionally
-        nothing.
+        """The change of the flock at the end of iteration t = 1, 2, ... of so many; traditionally
+        none.
         """
         return lambda t, flock: None
 

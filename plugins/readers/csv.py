@@ -216,8 +216,8 @@ class CSV(Tabular, Reader):
     def _base(
         self, record: Record, quantities: Powers, sidecar: Sidecar, same: Base | None
     ) -> tuple[Base, list[str]]:
-        """What one per unit is: given, that of the record before, or the steady state of values in
-        kV and MW.
+        """The base of per-unit values: given, that of the record before, or the steady state of
+        values in kV and MW.
         """
         earlier = sidecar.base or same
         voltage = self.base_voltage or (earlier and earlier.voltage)
@@ -252,7 +252,7 @@ class CSV(Tabular, Reader):
 
 
 def _one_of(absolute: bool | None, size: float, given: Any) -> float:
-    """What a table's values are divided by: the size of one per unit [kV, MVA] where they are
+    """The size of one per unit [kV, MVA] that a table's values are divided by: where they are
     absolute, or have no unit and the user has `given` that size; else 1.
     """
     return size if absolute or (absolute is None and given) else 1.0

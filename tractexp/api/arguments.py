@@ -60,9 +60,7 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
 
 @dataclass(frozen=True)
 class Choice(Plain):
-    """What is chosen in a group: the name of the choice, and the plugin's name and settings it
-    stands for.
-    """
+    """A choice of a group: its name, and the name and settings of the plugin that it stands for."""
 
     name: str
     node: Mapping[str, Any]

@@ -79,7 +79,7 @@ class LoadModel(Portable, Plain, Tabulated):
 
     @functools.cached_property
     def model(self) -> "Model":
-        """What simulates."""
+        """The composed model, which simulates."""
         from tractexp.domain.averaging import check_window
         from tractexp.identification.result import parts
         from tractexp.model.model import compose
@@ -319,8 +319,8 @@ def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
 
 
 def model_of(given: Any, domain: str | None = None) -> LoadModel:
-    """What a call takes as `model`: a name, a path, a mapping of parts, a `LoadModel` or a composed
-    `Model`.
+    """The model that a call was given: a name, a path, a mapping of parts, a `LoadModel` or a
+    composed `Model`.
 
     None is the usual model of the `domain`. Raises `UserError` for an unknown name.
     """

@@ -32,8 +32,8 @@ Part = tuple[str, Recording | Record]  # what is written, and its name
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Converted(Tabulated):
-    """What was written: `files`, each table with its sidecar, each .cfg with its .dat; `said` is a
-    sentence on each.
+    """The `files` that were written, each table with its sidecar, each .cfg with its .dat; `said`
+    is a sentence on each.
     """
 
     files: Sequence[Path]
@@ -44,7 +44,7 @@ class Converted(Tabulated):
         return Table(["file"], [[str(path)] for path in self.files])
 
     def summary(self) -> Report:
-        """What each file holds."""
+        """A sentence on each file."""
         return Report().text(*self.said).items([str(path) for path in self.files])
 
 
@@ -112,7 +112,7 @@ def writer_of(to: str | None) -> Writer:
 
 
 def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
-    """What a reader reads, by the names it is written under."""
+    """The records or recordings that a reader reads, by the names they are written under."""
     if what is not None:
         check_choice("task.what", what, WHAT)
     waves = isinstance(reader, WaveformReader)
@@ -156,7 +156,7 @@ def written(parts: Sequence[Part], writer: Writer, folder: Path) -> Converted:
 
 
 def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, Any]) -> list[Part]:
-    """What a file, an event, or a list of such is written as."""
+    """A file, an event, or a list of such, cut into what is written to a file of its own."""
     if isinstance(source, str | Path):
         with limit_time(source):
             reader: Reader = build(GROUP, node_of(str(source), settings))

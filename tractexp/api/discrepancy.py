@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Question(Given):
-    """What an investigation was asked."""
+    """The records, the model and the settings of an investigation."""
 
     effects: Sequence[str]  # none: the whole catalogue
     false_alarms: float
@@ -115,8 +115,8 @@ class Gaps:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Investigation(Written):
-    """What is missing in a model, how sure that is, and the model with it. `content` is that of
-    `discrepancy.json`.
+    """The effects that a model lacks, how sure that is, and the model with them. `content` is that
+    of `discrepancy.json`.
     """
 
     kind = "investigation"
@@ -165,7 +165,7 @@ class Investigation(Written):
 
     @property
     def recommendation(self) -> str:
-        """What to do next."""
+        """The next step that the evidence asks for, a sentence."""
         return self.content["recommendation"]
 
     @property
@@ -202,8 +202,8 @@ class Investigation(Written):
 
     @property
     def readings(self) -> "list[Reading]":
-        """What the shapes that are left may be physically, and what would decide it; [] where
-        nothing is left.
+        """Physical causes that the shapes which are left may have, each with what would decide it;
+        [] where nothing is left.
         """
         from tractexp.discrepancy.readings import read_shapes
         from tractexp.discrepancy.remainder import Remainder
@@ -309,7 +309,7 @@ class Investigation(Written):
         P0: float | None = None,
         Q0: float | None = None,
     ) -> Response:
-        """What the model of `fit` draws in an event, or from a voltage: see
+        """The response of the model of `fit` to an event or a voltage: see
         `Identification.predict`.
         """
         return self.fit.predict(event, t=t, U=U, f=f, P0=P0, Q0=Q0)
@@ -507,7 +507,7 @@ def _search_end(seed: int, problem: Problem) -> np.ndarray:
 
 
 def _build_investigation(question: Question, steps: "Steps") -> Investigation:
-    """What `discrepancy.json` and `result.json` hold of an investigation."""
+    """The result of an investigation, with the content of `discrepancy.json` and `result.json`."""
     from tractexp.discrepancy.discrepancy_json import content
 
     return Investigation(
@@ -573,8 +573,8 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
 
 
 def choose_next(lines: Sequence[str], result: Investigation) -> str:
-    """What a screen has room for: first what the task says of another domain, then the first
-    command, then what would decide about what is left, else the recommendation.
+    """The one sentence that a screen has room for: of another domain, else the first command, else
+    what would decide about what is left, else the recommendation.
     """
     urgent = [line.removeprefix(NEXT) for line in lines if line.startswith(NEXT)]
     open_ones = result.readings if result.verdict == "unexplained" else []

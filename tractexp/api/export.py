@@ -183,7 +183,7 @@ def _objections(fit: Identification) -> list[str]:
 
 
 def _powers(load: "Identified") -> str:
-    """What the load and its parts draw before the dip, in a sentence."""
+    """The powers that the load and its parts draw before the dip, in a sentence."""
     before, scale = load.steady_state, load.power
     rows = {"load": (load.ratio * load.result.before["P0"], load.ratio * load.result.before["Q0"])}
     rows |= {

@@ -53,8 +53,8 @@ class Generalised(Written):
 
     @property
     def errors(self) -> tuple[str, ...]:
-        """What is told of each dip: residuals and relative errors of P and Q, and in waveforms of
-        the currents.
+        """The names of the errors told of each dip: residuals and relative errors of P and Q, and
+        in waveforms of the currents.
         """
         return (
             *ERRORS,

@@ -57,7 +57,7 @@ LEAST_TOLD_MOVE = 2.0  # standard errors from which a rival structure's move is 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FitSpec(Setup):
-    """What an identification was asked."""
+    """The records, the model and the settings of an identification."""
 
     optimizer: Choice
     check_intervals: bool = True
@@ -158,7 +158,9 @@ class Estimates(dict[str, Estimate]):
 
 
 class FitDetails(NamedTuple):
-    """What stands behind a result: heavy, and computed again from a loaded one."""
+    """Fits, estimate and uncertainty behind a result: heavy, and computed again from a
+    loaded one.
+    """
 
     fits: "list[Fit]"
     estimation: "EstimationResult"
@@ -191,7 +193,9 @@ class Identification(Written):
 
     @functools.cached_property
     def details(self) -> FitDetails:
-        """What stands behind the result: computed again where this was loaded."""
+        """Fits, estimate and uncertainty behind the result: computed again where this was
+        loaded.
+        """
         return self.behind or _conclude_identification(self.spec, self.search_result)[1]
 
     @property
@@ -265,7 +269,7 @@ class Identification(Written):
 
     @property
     def headline(self) -> str:
-        """What this identification is good for, and what speaks against it, in one sentence."""
+        """The grade in words, and what speaks against it, one sentence."""
         sentence = self.result.adequacy.get("sentence", "")
         doubt = self.operating_point.doubt if self.operating_point else ""
         told = [sentence, self.result.next_dip.get("sentence", ""), doubt]
@@ -282,7 +286,7 @@ class Identification(Written):
 
     @property
     def doubts(self) -> list[str]:
-        """What speaks against this model as a physical load, a clause each."""
+        """The reasons why this model is no physical load, a clause each."""
         from tractexp.exchange.operating_point import doubts
 
         return doubts(self.result, self.operating_point)
@@ -309,7 +313,9 @@ class Identification(Written):
 
     @property
     def next_steps(self) -> list[str]:
-        """What to do next, the most pressing first: a model that is usable is handed on."""
+        """Commands and advice that lead on, the most pressing first: a model that is usable is
+        handed on.
+        """
         from tractexp.exchange.format import choose_format
 
         if self.usability != USABLE or not (name := choose_format(self.result)):
@@ -326,12 +332,14 @@ class Identification(Written):
 
     @functools.cached_property
     def model_error(self) -> ModelError:
-        """What the model leaves of the response of the fitted dips."""
+        """The part of the fitted dips' response that the model misses, beyond the noise: rms over
+        that of the response, with its 95 % interval.
+        """
         return self._error(self.result.model_error)
 
     @functools.cached_property
     def model_error_held_out(self) -> ModelError | None:
-        """What it leaves of the held-out ones; None where there are none."""
+        """The same of the held-out dips; None where there are none."""
         held_out = self.result.model_error.get("held_out")
         return held_out and self._error(held_out)
 
@@ -355,7 +363,7 @@ class Identification(Written):
 
     @property
     def advice(self) -> list[str]:
-        """What to do next, the most pressing first; none where it was not judged."""
+        """The advice to the user, the most pressing first; [] where the fit was not judged."""
         return self.result.advice
 
     def predict(
@@ -433,8 +441,8 @@ class Identification(Written):
         return screen.screen(self)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the answer, and the first event beside it; the answer alone of one
-        that was loaded, whose curves would have to be computed first.
+        """The HTML for a notebook: the answer, and the first event beside it; the answer alone of
+        one that was loaded, whose curves would have to be computed first.
         """
         from tractexp.report import glance
 
@@ -449,7 +457,7 @@ class Identification(Written):
         return identify.report(self)
 
     def sheet(self) -> Report:
-        """What is handed in, to be printed: see `tractexp.report.sheet`."""
+        """The sheet to be handed in, for print: see `tractexp.report.sheet`."""
         from tractexp.report import sheet
 
         return sheet.sheet(self)
@@ -474,7 +482,7 @@ class Identification(Written):
 
     @property
     def structures(self) -> list[str]:
-        """What each rival structure makes of the parameters that it moves most, a sentence each."""
+        """A sentence on each rival structure: the parameters that it moves most, and to where."""
         by_name: dict[str, list[str]] = {}
         for name, (structure, value) in sorted(self.moves.items()):
             by_name.setdefault(structure, []).append(f"{name} {value:.4g}")

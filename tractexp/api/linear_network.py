@@ -60,7 +60,7 @@ class NetworkFit(Written):
 
     @functools.cached_property
     def fits(self) -> "list[Fit]":
-        """What it calculates of each event beside what was recorded."""
+        """The calculated response of each event beside the recorded one."""
         return _play_network(self.box, self)
 
     @property
@@ -176,7 +176,7 @@ def _fit_networks(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
 
 
 def _play(box: "BlackBox", event: Event, role: str) -> "Fit":
-    """What a network gives for an event, as a fit of that role."""
+    """The response of a network to an event, as a fit of that role."""
     from tractexp.identification.result import Fit
 
     return Fit(role=role, **vars(box.play(box.domain.event(event))))
@@ -194,7 +194,7 @@ def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
 
 
 def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[str, Any]:
-    """What `linear_network.json` holds."""
+    """The content of `linear_network.json`."""
     from tractexp.identification.result import model_errors
     from tractexp.identification.yardstick import network_in_words
     from tractexp.inference.model_error import ModelError

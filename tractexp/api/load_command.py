@@ -15,7 +15,7 @@ EARLIER = 3.0
 
 
 def build_load_command(view: View, shown: Sight) -> str:
-    """What is to be typed to fit the events of a load that are worth it; "" where none is."""
+    """The command that fits the events of a load that are worth it; "" where none is."""
     choice = shown.choice()
     if choice is None or not view.node:
         return ""

@@ -52,7 +52,7 @@ def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> di
 
 
 def measure_model(fit: "Identification") -> dict[str, float]:
-    """What is logged of a fitted model, whichever task fitted it: grade, errors and estimates."""
+    """Metrics of a fitted model, whichever task fitted it: grade, errors and estimates, by name."""
     return _errors(fit) | _estimates(fit)
 
 

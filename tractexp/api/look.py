@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Look(Written):
-    """What files hold. `content` is that of `look.json`; arrays are read again where a look was
-    loaded.
+    """The content of files: channels, loads, events. `content` is that of `look.json`; arrays are
+    read again where a look was loaded.
     """
 
     kind = "look"
@@ -46,7 +46,7 @@ class Look(Written):
 
     @functools.cached_property
     def views(self) -> list[View]:
-        """What stands behind the tables: recordings, phasors, events."""
+        """Recordings, phasors and events behind the tables, one view a file."""
         return [*self.behind] or [_view(source, self.settings) for source in self.sources]
 
     @property
@@ -286,7 +286,7 @@ def _join_given(
 
 
 def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
-    """What a source shows; of a file the reader is chosen by what it holds."""
+    """The view of a source; of a file the reader is chosen by its content."""
     if isinstance(source, Record):
         return View(source.name, {}, [sight_of(source)])
     if settings.get("join"):

@@ -45,7 +45,7 @@ def event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]
 
 
 def build_content(view: View) -> dict[str, Any]:
-    """What `look.json` holds of a file."""
+    """The entry of a file in `look.json`."""
     recording = view.recording
     content: dict[str, Any] = {
         "file": view.source,
@@ -100,7 +100,7 @@ def build_content(view: View) -> dict[str, Any]:
 
 
 def _tell_direct(view: View) -> list[str]:
-    """What is said of direct voltages beside a load's."""
+    """Sentences on direct voltages beside a load's; [] where there are none."""
     assert view.recording is not None
     steady = [
         number

@@ -32,7 +32,7 @@ class Recommended(Written):
 
     @property
     def sentence(self) -> str:
-        """What to record, or why no event would help."""
+        """The event to record, or why none would help."""
         return self.content["sentence"]
 
     @property
@@ -42,7 +42,7 @@ class Recommended(Written):
 
     @functools.cached_property
     def event(self) -> "NextEvent":
-        """What stands behind the page; of a loaded result it is computed again."""
+        """The chosen event behind the page; of a loaded result it is computed again."""
         return self.behind or _event(self.setup, self.rivals, False)
 
     def table(self) -> Table:

@@ -60,7 +60,7 @@ class Forecasts(Written):
 
     @functools.cached_property
     def forecast(self) -> Planned:
-        """What stands behind the page; of a loaded result it is computed again."""
+        """The planned events behind the page; of a loaded result they are computed again."""
         return self.behind or _forecast_plan(self.setup, **self.asked)
 
     @property
@@ -311,8 +311,8 @@ def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, No
 
 
 def _missed_by(result: Result) -> float:
-    """What an identified model misses of a response beyond the noise; 0 where noise alone leaves as
-    much.
+    """The share of a response that an identified model misses beyond the noise, on average; 0 where
+    noise alone leaves as much.
     """
     told = result.model_error
     if not told or result.adequacy.get("grade") == Grade.ADEQUATE:
@@ -361,7 +361,9 @@ def _describe_shape(shape: DipShape) -> str:
 
 
 def _content(planned: Planned) -> dict[str, Any]:
-    """What `plan.json` holds; half intervals are shares of the value, null where there is none."""
+    """The content of `plan.json`; half intervals are shares of the value, null where there
+    is none.
+    """
     names = planned.problem.space.names
     return {
         "dip": planned.dip,

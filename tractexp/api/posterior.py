@@ -86,7 +86,7 @@ class Sampled(Written):
         return self.fit.summary().add(self.table()).text(*self._describe_effort())
 
     def _describe_effort(self) -> list[str]:
-        """What the draws took, and whether that was enough."""
+        """Sentences on the time that the draws took, and whether they are enough."""
         c, s = self.content, self.settings
         effort = (
             f"{s['steps']} steps of {s['walkers']} walkers in {c['seconds']:.1f} s, acceptance"
@@ -104,7 +104,7 @@ class Sampled(Written):
 
     @property
     def next_step(self) -> str:
-        """What follows from the identification."""
+        """The next step of the identification."""
         return next(iter(self.fit.next_steps), "")
 
     def report(self) -> Report:
@@ -188,7 +188,7 @@ class Posterior(Task, call=posterior):
     """
 
     def collect_log(self, job: Job, result: Sampled) -> dict[str, Any]:
-        """What an identification logs."""
+        """The fields that an identification logs."""
         from tractexp.api.logged import logged_fit
 
         return logged_fit(job, result.fit)

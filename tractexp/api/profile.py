@@ -41,7 +41,7 @@ class Profiled(Written):
 
     @functools.cached_property
     def curves(self) -> "Profiles":
-        """What stands behind the page; of a loaded result it is computed again."""
+        """The profiles behind the page; of a loaded result they are computed again."""
         from tractexp.identification.profile import profiles
 
         return self.behind or profiles(self.fit.details.uncertainty, self.points)
@@ -95,8 +95,8 @@ class Profiled(Written):
 
     @property
     def next_step(self) -> str:
-        """What follows from the identification; of a model that leaves noise alone, the command
-        that plans which dip would tell a parameter that is not identified.
+        """The next step of the identification; of a model that leaves noise alone, the command that
+        plans which dip would tell a parameter that is not identified.
         """
         poor = [n for n, one in self.profiles.items() if brief(one["verdict"]) != IDENTIFIED]
         if self.fit.adequate and poor:
@@ -162,7 +162,7 @@ def profile(
 
 
 def _content(scan: "Profiles", seconds: float) -> dict[str, Any]:
-    """What `profile.json` holds."""
+    """The content of `profile.json`."""
     return files.plain(
         {
             "threshold": scan.threshold,
@@ -192,7 +192,7 @@ class Profile(Task, call=profile):
     """
 
     def collect_log(self, job: Job, result: Profiled) -> dict[str, Any]:
-        """What an identification logs, with these intervals."""
+        """The fields that an identification logs, with these intervals."""
         from tractexp.api.logged import logged_fit
 
         return logged_fit(job, result.identification)

@@ -58,7 +58,7 @@ class Dips(Plain, Tabulated, list[Event]):
 
     @classmethod
     def from_dict(cls, content: Iterable[Mapping[str, Any]]) -> "Dips":  # type: ignore[override]
-        """What `to_dict` gave; the dips are found again."""
+        """The records that `to_dict` gave; their dips are found again."""
         return cls(detect(record_from_dict(one)) for one in content)
 
     def look(self) -> "Look":
@@ -182,7 +182,7 @@ def read(
 
 
 def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
-    """What a call takes as its records: events, or whatever `read` reads, one or a list of them."""
+    """The records of a call: events, or whatever `read` reads, one or a list of them."""
     listed = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     dips = Dips(e for one in listed for e in ([one] if isinstance(one, Event) else read(one)))
     if len(dips) < least:

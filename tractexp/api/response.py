@@ -42,7 +42,7 @@ class Response:
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """What response.csv holds, by name."""
+        """The columns of response.csv, (N,) each, by name."""
         columns = {"t": self.t, "U": self.U, "P": self.P, "Q": self.Q}
         return columns | (
             {"P_measured": self.measured[0], "Q_measured": self.measured[1]}
@@ -141,7 +141,7 @@ def respond_to(
 
 
 def response_of(fit: "Fit", event: Event, own: OwnBase | None = None) -> Response:
-    """What was calculated of an event on the base `own`, on that of its file."""
+    """The calculated response to an event, from the base `own` to that of its file."""
     # of waveforms, as the estimator sees recorded and calculated currents
     record = fit.event.record
     ratio = OwnBase.from_record(record).ratio if own is not None else 1.0

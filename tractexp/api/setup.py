@@ -36,7 +36,9 @@ class Given(Portable, Plain):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Setup(Given):
-    """What searches are asked. Travels to other processes, where compiled models cannot go."""
+    """Records, model, objective and limits of searches. Travels to other processes, where compiled
+    models cannot go.
+    """
 
     objective: Choice
     budget: int | None = None
@@ -90,7 +92,7 @@ class Setup(Given):
         return Limits(self.budget, self.time_limit, self.target)
 
     def lines(self) -> list[str]:
-        """What is read and fitted, a sentence each."""
+        """A sentence on each record that is read, and one on the model."""
         problem = self.problem
         model = f"model: {problem.model.title}, {problem.space.dimension} parameters"
         steps = f"Runge-Kutta steps: {problem.step.describe(problem.events)}"
@@ -109,8 +111,8 @@ class Setup(Given):
 def describe_records(
     train: Sequence[Event], validate: Sequence[Event], held_out: str = "validate"
 ) -> Iterator[str]:
-    """What is read, a sentence for each event and each of its notes, and of each recording which
-    load it is of.
+    """A sentence for each event and each of its notes, and of each recording which load it
+    is of.
     """
     said: list[Identity] = []
     for role, group in (("fit", train), (held_out, validate)):

@@ -111,7 +111,7 @@ class Station(Written):
         return shown.tabulate_loads(self.content)
 
     def summary(self) -> Report:
-        """What each load is, and what differs from dip to dip."""
+        """The table of loads, and by how much their dips differ."""
         return shown.summary(self.content)
 
     def screen(self) -> Report:
@@ -264,7 +264,7 @@ def _group(
     model: LoadModel,
     folder: Path,
 ) -> tuple[list[LoadJob], list[dict[str, Any]]]:
-    """What there is to fit, a job for each load; and the loads of which too few dips are there."""
+    """A job for each load with dips enough, and the entries of the loads with too few."""
     groups = defaultdict[tuple[str, str], list[tuple[str, str | None, Mapping[str, Any]]]](list)
     stamps = defaultdict[tuple[str, str], list[str]](list)
     for row in rows:
@@ -294,7 +294,7 @@ def _group(
 def _fit_loads(
     jobs: Sequence[LoadJob], workers: Workers, keep: Path | None, progress: Progress
 ) -> list[dict[str, Any]]:
-    """What was found of each load; of one that was fitted to the same dips before, what is kept."""
+    """The entry of each load; of one that was fitted to the same dips before, the stored one."""
     store = Store(LOADS, folder=keep or Path())
     names = [
         key(environment(), job.load, job.station, job.keys, job.model) if keep else ""

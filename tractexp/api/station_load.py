@@ -51,8 +51,8 @@ Read = dict[str, Any]  # {"record": plain data} or {"why": sentence}
 
 @dataclass(frozen=True, eq=False)
 class LoadJob(Portable):
-    """What a worker fits: the dips of one load as (event, time or None, record as plain data);
-    `keys` tell these dips from others.
+    """The dips of one load for a worker, as (event, time or None, record as plain data); `keys`
+    tell these dips from others.
     """
 
     load: str
@@ -96,7 +96,7 @@ def read_files(
 
 
 def fit_load(job: LoadJob) -> dict[str, Any]:
-    """What all dips of a load tell of it, as plain data; else why they tell nothing."""
+    """The fit of all dips of a load as plain data; else why they tell nothing."""
     told = {"load": job.load, "station": job.station}
     try:
         return told | files.plain(_fit(job))

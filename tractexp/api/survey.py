@@ -104,7 +104,7 @@ class Surveyed(Written):
 
     @property
     def command(self) -> str:
-        """What is to be typed to fit them together; "" where not asked for."""
+        """The command that fits the chosen events together; "" where not asked for."""
         return self.content["command"]
 
     def to_frame(self) -> "pandas.DataFrame":
@@ -116,7 +116,7 @@ class Surveyed(Written):
         return shown.kinds(self.content)
 
     def summary(self) -> Report:
-        """What the files hold, and which events are worth fitting."""
+        """The counts of events by kind, and those that are worth fitting."""
         return shown.summary(self.content)
 
     def report(self) -> Report:

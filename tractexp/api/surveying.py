@@ -119,9 +119,7 @@ def _rows_of_view(row: dict[str, Any], path: Path) -> Rows:
 
 
 def _without_events(view: View) -> dict[str, str]:
-    """What stands in the row of a file without events: that nothing happened, or why nobody can
-    say.
-    """
+    """The row of a file without events: that nothing happened, or why nobody can say."""
     unexamined = list(dict.fromkeys(shown.unexamined for shown in view.sights if shown.unexamined))
     if not view.sights or (
         len(unexamined) and all(shown.unexamined or not shown.is_loaded for shown in view.sights)
@@ -131,7 +129,7 @@ def _without_events(view: View) -> dict[str, str]:
 
 
 def _quiet(view: View) -> str:
-    """What a file without an event says instead."""
+    """The reason why a file shows no event, a sentence."""
     said = [*(said for s in view.sights for said in s.said), *_find_dead_phases(view)]
     return "; ".join(dict.fromkeys(said)) or "the voltage stays as it is"
 
@@ -142,7 +140,7 @@ def _find_dead_phases(view: View) -> list[str]:
 
 
 def _common(view: View) -> dict[str, Any]:
-    """What all rows of a file share: station, rate, begin."""
+    """The cells that all rows of a file share: station, rate, begin."""
     recording = view.recording
     if recording is None:
         return {
@@ -221,7 +219,8 @@ def complete_entries(
     what: str,
     progress: Progress,
 ) -> tuple[dict[str, Any], int]:
-    """What is kept of each file, and of the others what is computed, stored as it comes.
+    """The entry of each file, stored as it is computed, and how many were computed: those that
+    `keep` has are read.
 
     Parameters
     ----------

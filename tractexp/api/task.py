@@ -183,8 +183,8 @@ class Task(Plugin):
         return job.track(**content | self.collect_log(job, result))
 
     def collect_log(self, job: "Job", result: Any) -> dict[str, Any]:
-        """What is logged of a result: fields of `tractexp.tracking.TrackedRun`, and `values` that
-        were given.
+        """The fields of `tractexp.tracking.TrackedRun` that a result logs, and `values` that were
+        given.
         """
         return {}
 
@@ -241,7 +241,7 @@ def print_paths(paths: Iterable[Path]) -> None:
 
 
 def variant(optimizer: str, chosen: Mapping[str, str]) -> str:
-    """What an optimizer is called with the settings that were chosen beside it, whatever the seed:
+    """The name of an optimizer with the settings that were chosen beside it, whatever the seed:
     "issa levy=false".
 
     Files go without their folders.
@@ -353,7 +353,7 @@ class Job:
 
     @functools.cached_property
     def key(self) -> str:
-        """What identifies its run in the store."""
+        """The random key by which its run is found in the store."""
         return uuid.uuid4().hex
 
     def tell(self, line: str) -> None:

@@ -37,7 +37,7 @@ class Paragraphs:
 
 @dataclass(frozen=True)
 class VerdictBlock:
-    """What the reader should take away: "plain", "good" or "bad"."""
+    """The sentences that the reader should take away, framed as "plain", "good" or "bad"."""
 
     texts: Sequence[str]
     kind: str = "plain"
@@ -264,7 +264,7 @@ class Report:
 
     @contextmanager
     def fold_blocks(self, summary: str) -> Iterator[None]:
-        """What is added inside is hidden on a page until the reader opens it."""
+        """Hide the blocks added inside on a page until the reader opens them."""
         outside, self.blocks = self.blocks, []
         yield
         self.blocks = [*outside, Fold(summary, self.blocks)]
@@ -311,7 +311,7 @@ class Report:
         return files.write(Path(path), self.html)
 
     def __str__(self) -> str:
-        """What a terminal shows."""
+        """The report as a terminal shows it."""
         from tractexp.blocks.terminal import plain
 
         return plain(self)

@@ -308,7 +308,7 @@ class Chart:
         *,
         step: bool = False,
     ) -> "Chart":
-        """What lies between two curves, lightly filled."""
+        """Add the area between two curves (n,), lightly filled."""
         line = {"width": 0, "color": color, **({"shape": "hv"} if step else {})}
         quiet: dict[str, Any] = {"mode": "lines", "line": line, "hoverinfo": "skip"}
         quiet["x"] = pack_numbers(np.asarray(x, dtype=float), "f8")
@@ -421,7 +421,7 @@ class Chart:
             self._notes.append({**note, "showarrow": False, "font": font, **more})
 
     def limits(self, panel: int | None, low: float, high: float) -> "Chart":
-        """What an axis shows at first: of a panel, or of x where `panel` is None."""
+        """Set what an axis shows at first: of a panel, or of x where `panel` is None."""
         axis = self._x if panel is None else self._axes[_axis("yaxis", panel)]
         axis["range"] = np.log10([low, high]).tolist() if axis.get("type") == "log" else [low, high]
         if axis.get("type") == "log" and high < DECADE * low:

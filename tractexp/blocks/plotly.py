@@ -47,7 +47,9 @@ def digest() -> str:
 
 
 def select_needed_modules(whole: str) -> str:
-    """What our charts need of the library; all of it where it is made otherwise than known."""
+    """The modules of the library that our charts need; all of it where it is made otherwise than
+    known.
+    """
     common, lazy = COMMON.search(whole), LAZY.search(whole)
     if not (common and lazy):
         return whole

@@ -40,7 +40,7 @@ def commit(folder: Path = PACKAGE) -> str:
 
 
 def _git(folder: Path, *command: str) -> str:
-    """What git prints for a command in a folder."""
+    """The output of a git command in a folder."""
     done = subprocess.run(
         ["git", *command], cwd=folder, capture_output=True, text=True, timeout=5, check=True
     )

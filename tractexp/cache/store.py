@@ -75,7 +75,9 @@ class Store:
             return None
 
     def _read_secret(self) -> bytes:
-        """What its sums are made with: in a folder that others may have made the user's secret."""
+        """The secret that its sums are made with: in a folder that others may have made the user's,
+        else none.
+        """
         return read_secret() if self.folder else b""
 
     def write(self, key: str, content: bytes) -> None:
@@ -183,7 +185,7 @@ def _sum(path: Path, content: bytes, secret: bytes = b"") -> bytes:
 
 
 def read_secret() -> bytes:
-    """What only this user has, made where there is none yet.
+    """The user's secret, made where there is none yet.
 
     Raises `UserError` where the cache folder cannot keep it.
     """
@@ -232,7 +234,7 @@ def _content(thing: Any) -> bytes:
 
 
 def environment() -> str:
-    """What stands behind every number computed here: the code of all plugins, libraries,
+    """A digest of what every number computed here hangs on: the code of all plugins, libraries,
     interpreter, processor.
     """
     versions = [f"{name} {version(name)}" for name in LIBRARIES]

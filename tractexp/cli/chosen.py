@@ -57,7 +57,7 @@ def _overlap(a: str, b: str) -> bool:
 
 @functools.cache
 def _by_experiment(experiment: str) -> Mapping[str, str]:
-    """What an experiment's file sets, wherever Hydra looks for it."""
+    """The choices {group: name} of an experiment's file, wherever Hydra looks for it."""
     from hydra.core.hydra_config import HydraConfig
 
     from tractexp.configuration.composition import folders, set_by_experiment

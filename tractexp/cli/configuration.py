@@ -24,5 +24,5 @@ def contents(config: Any) -> Mapping[str, str]:
 
 
 def list_named_files(config: Any) -> frozenset[Path]:
-    """What a configuration, as plain data, may name as files that the run reads."""
+    """The files that a configuration, as plain data, may name and the run reads."""
     return frozenset(Path(text).absolute() for text in texts(config) if "\0" not in text)

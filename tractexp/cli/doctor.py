@@ -149,7 +149,7 @@ def caches() -> Iterator[Finding]:
 
 
 def leavings(folder: Path) -> Iterator[Finding]:
-    """What processes left that were killed while they wrote."""
+    """Findings on partial files of processes that were killed while they wrote."""
     halves = files.leftovers(folder) if folder.is_dir() else []
     for path in halves:
         path.unlink(missing_ok=True)
@@ -213,8 +213,8 @@ def _ours(database: Path) -> bool:
 
 
 def _unsound(database: Path) -> str:
-    """What is wrong with an SQLite file, in a few words; "locked" for one that is in use, "" for a
-    sound one.
+    """The fault of an SQLite file, in a few words; "locked" for one that is in use, "" for a sound
+    one.
     """
     try:
         with closing(sqlite3.connect(database, timeout=BUSY)) as connection:

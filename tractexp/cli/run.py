@@ -81,7 +81,7 @@ def so_far(stop: KeyboardInterrupt, place: RunFolder) -> str:
 
 
 def describe_stopped_task(config: Any) -> str:
-    """What becomes of a task that was stopped and has kept nothing in its folder."""
+    """The sentence on a task that was stopped and has kept nothing in its folder."""
     if getattr(get("task", config["task"]["name"]), "resumes", False):
         return "the same command goes on where it was"
     return "nothing was logged for this run"

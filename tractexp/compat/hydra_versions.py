@@ -38,6 +38,6 @@ def store_schema(group: str | None, name: str, schema: type) -> None:
 
 
 def behavior() -> dict[str, str]:
-    """What asks `hydra.main` for the behavior of Hydra 1.3, as its keywords."""
+    """The keywords of `hydra.main` that ask for the behavior of Hydra 1.3."""
     installed = tuple(map(int, hydra.__version__.split(".")[:2]))
     return {} if installed >= NEW else {"version_base": "1.3"}

@@ -49,7 +49,9 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
 
 
 def _merge(composed: Mapping[str, Any], content: Mapping[str, Any]) -> dict[str, Any]:
-    """What a choice says over what its parts do; the settings of one part are merged by key."""
+    """The composed parts with the choice's own content over them; the settings of one part are
+    merged by key.
+    """
     merged = {**composed}
     for key, value in content.items():
         nested = isinstance(value, dict) and isinstance(composed.get(key), dict)
@@ -115,7 +117,7 @@ def _file(group: str, name: str, places: Iterable[Path]) -> Path | None:
 
 
 def _content(group: str, file: Path) -> dict[str, Any]:
-    """What a configuration's file holds. Raises `UserError` where it cannot be read."""
+    """The content of a configuration's file. Raises `UserError` where it cannot be read."""
     import yaml
 
     try:

@@ -88,7 +88,7 @@ def _word(kind: Any) -> str:
 
 
 def _kind(value: Any) -> str:
-    """What a value is, in the words in which it is said what it must be."""
+    """The kind of a value in words: "a number", "a list"."""
     return GIVEN.get(type(value)) or WORDS.get(type(value)) or _article(type(value).__name__)
 
 

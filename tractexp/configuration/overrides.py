@@ -191,7 +191,7 @@ def _take_config_folder(arguments: list[str]) -> tuple[list[str], Path | None, l
 
 @functools.cache
 def groups() -> tuple[str, ...]:
-    """What is chosen by a name."""
+    """The groups whose members are chosen by name."""
     from tractexp.configuration.choices import defaults
 
     own = (name.removeprefix("override ") for name in defaults())
@@ -325,7 +325,7 @@ DEEPER = {"[": 1, "(": 1, "{": 1, "]": -1, ")": -1, "}": -1}  # levels of bracke
 
 
 def _parts(inner: str) -> list[str]:
-    """What commas outside quotes and brackets part."""
+    """The parts of a text between commas that stand outside quotes and brackets."""
     parts, depth, mark, start = [], 0, "", 0
     for i, letter in enumerate(inner):
         if mark:

@@ -48,7 +48,7 @@ class Plugin:
 
     @property
     def label(self) -> str:
-        """What sentences call it."""
+        """The plugin's name in sentences."""
         return self.name
 
     def check(self) -> None:
@@ -238,8 +238,8 @@ def import_all(packages: Iterable[ModuleType]) -> None:
 
 
 def register_all() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, str]]:
-    """What can be used, as `discover`, and {package or module: the sentence on why it cannot}, each
-    tried by itself.
+    """All plugins that can be used, as `discover`, and {package or module: the sentence on why it
+    cannot}, each tried by itself.
     """
     refused: dict[str, str] = {}
 

@@ -70,7 +70,7 @@ def _of_hydra(error: BaseException) -> bool:
 
 
 def _unforeseen(error: BaseException) -> str:
-    """What an error of Hydra's says that no rule of ours knows."""
+    """The sentence for an error of Hydra's that no rule of ours knows."""
     if isinstance(error, RecursionError):
         return (
             "an argument has brackets within brackets, or a reference to itself, deeper than can be"

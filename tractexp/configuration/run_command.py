@@ -63,7 +63,7 @@ def build_again_command(*settings: str, of: Collection[str] = OF_LOAD) -> str:
 
 
 def suggest_run(*settings: str, of: Collection[str] = OF_LOAD) -> str:
-    """What does something else with the records and the load of this run: as
+    """The command that does something else with the records and the load of this run: as
     `build_again_command` where a command started it, elsewhere a call in Python, in which its
     events are called `dips`.
     """

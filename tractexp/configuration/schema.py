@@ -50,7 +50,7 @@ class TrackingConfig:
 
 @dataclass
 class SweepConfig:
-    """What a job of a sweep is to somebody who optimizes over jobs, such as Optuna."""
+    """The metrics that a job returns to an optimizer over jobs, such as Optuna."""
 
     returns: list[str] | None = None  # metrics, as MLflow shows them; null: search_objective
 

@@ -74,7 +74,7 @@ Values are changed by KEY=VALUE
 
 
 def usage() -> str:
-    """What `tractexp --help` prints."""
+    """The text of `tractexp --help`."""
     options = choices()
     tasks = {
         name: re.split("[:;] ", options["task"][name].about)[0]

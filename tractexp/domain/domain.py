@@ -35,7 +35,7 @@ class DipGrid:
 
 
 class Domain(ABC):
-    """What a model is compared with: the power of phasors, or sampled currents. See
+    """The kind of outputs a model is compared by: the power of phasors, or sampled currents. See
     `tractexp.domain`.
     """
 
@@ -208,7 +208,7 @@ class Domain(ABC):
 
     @abstractmethod
     def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
-        """What is compared, by the response of a linear network.
+        """The compared channels (C, N) [pu], by the response of a linear network.
 
         Parameters
         ----------
@@ -340,7 +340,7 @@ class Domain(ABC):
 
 
 def simulate_compared(model: Model, values: np.ndarray, drive: Drive) -> np.ndarray:
-    """What is compared (C, N) [pu], by as many Runge-Kutta steps as it takes.
+    """The compared channels (C, N) [pu] of one candidate, by as many Runge-Kutta steps as it takes.
 
     Parameters
     ----------

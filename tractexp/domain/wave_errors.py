@@ -30,8 +30,8 @@ STRUCK = 8  # samples of the lead after which a single wrong sample of the volta
 
 
 def impulse_responses(problem: "Problem", values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What one standard deviation of a sample of the voltage does to the currents at free values
-    (d,), of waveforms.
+    """The change of the currents by one standard deviation of one sample of the voltage, at free
+    values (d,), of waveforms.
 
     (L,) complex of the space vector and (L,) of the zero sequence, in the stationary frame, from
     shortly before that sample to the dip: what is smooth between samples is changed a little
@@ -51,8 +51,8 @@ def impulse_responses(problem: "Problem", values: np.ndarray) -> tuple[np.ndarra
 
 
 def input_errors(problem: "Problem", values: np.ndarray) -> np.ndarray:
-    """What may be wrong with waveforms and is no noise, as the currents show it at free values
-    (d,), (k, 3, N) [pu].
+    """The modes (k, 3, N) [pu] in which errors of waveforms that are no noise show in the currents,
+    at free values (d,).
 
     The offsets that the channels may have, and those of the voltage as the model passes them on.
     """
@@ -64,8 +64,8 @@ def input_errors(problem: "Problem", values: np.ndarray) -> np.ndarray:
 
 
 def _of_voltage(problem: "Problem", values: np.ndarray, event: int) -> np.ndarray:
-    """What offsets of the voltage do in one event, and what it may be between samples at its edges,
-    (k, 3, N).
+    """The change of one event's currents (k, 3, N) [pu] by offsets of the voltage and by what it
+    may be between samples at its edges.
     """
     drive, part = problem.drive, problem.drive.part(event)
     plain = problem.events[event]
@@ -79,8 +79,8 @@ def _of_voltage(problem: "Problem", values: np.ndarray, event: int) -> np.ndarra
 def _differences(
     problem: "Problem", values: np.ndarray, event: int, variants: Sequence[Event]
 ) -> np.ndarray:
-    """What variants of an event's voltage change in its currents, (n, 3, N) [pu]; what diverged
-    tells nothing.
+    """The change of an event's currents (n, 3, N) [pu] by variants of its voltage; 0 where one
+    diverged.
     """
     drive = Drive.from_events(
         [problem.domain.excitation(e) for e in (problem.events[event], *variants)]

@@ -90,7 +90,7 @@ class WaveDomain(Domain):
         )
 
     def input_errors(self, problem: "Problem", values: np.ndarray) -> np.ndarray:
-        """What errors of the voltage make of the currents, as modes of the noise."""
+        """The modes (k, 3, N) [pu] in which errors of the voltage show in the currents."""
         return wave_errors.input_errors(problem, values)
 
     def comparison(self, event: Event, outputs: np.ndarray) -> Playback:

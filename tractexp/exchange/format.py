@@ -125,7 +125,7 @@ class Restored:
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What another simulator had a load draw.
+    """The response of a load in another simulator.
 
     Attributes
     ----------
@@ -189,11 +189,11 @@ class Format(Plugin):
         """
 
     def notes(self, load: Identified) -> list[str]:
-        """What a user must know to use the file, one sentence each."""
+        """Sentences that a user must know to use the file."""
         return []
 
     def omissions(self, load: Identified) -> list[str]:
-        """What this format's machine lacks of the motor, a sentence each."""
+        """The properties of the motor that this format's machine lacks, a sentence each."""
         if not load.model.motor.within_a_cycle:
             return []
         return ["the stator's transients are not exported: the machine of this format has none"]

@@ -108,7 +108,7 @@ class OperatingPoint:
 
 
 def doubts(result: Result, point: OperatingPoint | None) -> list[str]:
-    """What speaks against an identified load as a physical one, a clause each.
+    """The reasons why an identified load is no physical one, a clause each.
 
     A machine at the end of what machines have is one: what that costs is told beside the fit.
     """

@@ -199,7 +199,7 @@ def _match_jump(jump: float, usual: float, expected: Sequence[float]) -> float:
 
 
 def _moment(cell: Any, row: int) -> _Moment:
-    """What a cell says, with a zone that of UTC; raises `BadCell`."""
+    """The moment in a cell, with a zone that of UTC; raises `BadCell`."""
     moment = _read_text(cell, row) if isinstance(cell, str) else _read_object(cell)
     if moment is None:
         raise BadCell(
@@ -209,7 +209,7 @@ def _moment(cell: Any, row: int) -> _Moment:
 
 
 def _read_object(cell: Any) -> _Moment | None:
-    """What a cell that is no text says, a date its midnight; None where it is no time."""
+    """The moment in a cell that is no text, a date's its midnight; None where it is no time."""
     if isinstance(cell, dt.datetime | dt.time):
         second = cell.hour * 3600 + cell.minute * 60 + cell.second + cell.microsecond * 1e-6
         return _Moment(cell.date() if isinstance(cell, dt.datetime) else None, second)
@@ -227,7 +227,9 @@ def _match_clock(cell: str) -> re.Match[str] | None:
 
 
 def _read_text(cell: str, row: int) -> _Moment | None:
-    """What a text says; None where it is no time. Raises `BadCell` for one with a wrong part."""
+    """The moment in a text; None where it is no time. Raises `BadCell` for one with a wrong
+    part.
+    """
     match = _match_clock(cell)
     if match is None:
         return None

@@ -136,7 +136,7 @@ def _spell_out_names(names: Sequence[str]) -> Sequence[str]:
 
 
 def _resolve_numbered_roles(roles: Mapping[int, Role]) -> dict[str, str]:
-    """What U1, U2, U3 are: the phases where there are three; P1 alone is P."""
+    """The keys of U1, U2, U3: the phases where there are three; P1 alone is P."""
     keys = {one.key for one in roles.values()}
     phases = {}
     for letter in "UIPQ":
@@ -152,8 +152,8 @@ def _resolve_numbered_roles(roles: Mapping[int, Role]) -> dict[str, str]:
 
 
 def _of_one_load(keys: Collection[str]) -> dict[str, str]:
-    """What U L1, P L1, Q L1 are where no L2 and L3 are beside them: the whole of a
-    load called L1.
+    """The keys of U L1, P L1, Q L1 where no L2 and L3 are beside them: the whole of a load called
+    L1.
     """
     if not {"Pa", "Qa"} <= set(keys) or {"P", "Q", "Pb", "Pc", "Qb", "Qc"} & set(keys):
         return {}

@@ -184,7 +184,7 @@ ELECTRICAL = frozenset(BY_UNIT.values())
 
 @dataclass(frozen=True)
 class Role:
-    """What a column of a table is.
+    """The quantity, phase and unit of a table's column.
 
     Attributes
     ----------
@@ -207,7 +207,7 @@ class Role:
 
     @property
     def quantity(self) -> str:
-        """What `data.units` calls it."""
+        """Its key in `data.units`."""
         if self.key.endswith("_angle"):
             return "angle"
         return self.key if self.key in ("t", "f", "dfdt", "frac", "soc", "day") else self.key[0]
@@ -323,7 +323,7 @@ def _count_marks(named: Sequence[tuple[str, str]], order: str) -> int:
 
 
 def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
-    """What a column is, by its name and unit.
+    """The role of a column, by its name and unit; None where they do not tell.
 
     Parameters
     ----------

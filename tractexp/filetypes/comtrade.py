@@ -71,8 +71,8 @@ def load(path: Path, encoding: str | None = None) -> Recording:
 
 
 def read_header(path: Path, encoding: str | None = None) -> Header:
-    """What the configuration of a record announces, without its samples; raises `UserError` as
-    `load` does.
+    """The header of a record's configuration, without its samples; raises `UserError` as `load`
+    does.
     """
     path = Path(path)
     if path.suffix.lower() == ".cff":

@@ -98,7 +98,7 @@ def _read_column(table: TableFile, number: int, unit: str) -> tuple[np.ndarray, 
 
 
 def _find_direct(t: np.ndarray, x: np.ndarray) -> DirectVoltage | None:
-    """What a voltage (N,) [kV] is as a direct one; None where it is none."""
+    """The direct voltage that a column (N,) [kV] shows; None where it is none."""
     rate = _sampling_rate(t)
     direct = DirectVoltage.from_values(x, rate) if rate else None
     return direct if direct and direct.is_direct else None

@@ -313,7 +313,7 @@ def _logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]
 
 
 def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value: bool) -> str:
-    """What a logged series is called, by quantity and phase; "" for a least or greatest value, and
+    """The name of a logged series, by quantity and phase; "" for a least or greatest value, and
     other quantities.
     """
     unit = UNITS.get(definition.unit, "")

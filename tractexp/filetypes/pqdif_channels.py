@@ -81,7 +81,7 @@ MOST_STEPPED = 1_000_000  # of which one series of equal steps has, where no oth
 
 @dataclass(frozen=True)
 class SeriesDefinition:
-    """What a series of a channel is: what its values are of the quantity, its unit (a number of the
+    """A series of a channel: what its values are of the quantity, its unit (a number of the
     standard).
     """
 
@@ -106,8 +106,8 @@ class ChannelDefinition:
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """What an observation holds of a channel: times (N,) [s] since `Observation.start`, and series
-    with N values.
+    """A channel's part of an observation: times (N,) [s] since `Observation.start`, and series with
+    N values.
     """
 
     channel: ChannelDefinition
@@ -117,7 +117,7 @@ class Instance:
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What was observed from `start` on, a day since 30 December 1899 and a second of it."""
+    """The channels observed from `start` on, a day since 30 December 1899 and a second of it."""
 
     start: tuple[int, float]
     triggered: tuple[int, float] | None

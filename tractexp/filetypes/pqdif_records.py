@@ -274,8 +274,8 @@ def _describe_end(where: str, count: int) -> str:
 
 
 def _checksums(content: bytes, body: bytes) -> Iterator[int]:
-    """What writers take for the checksum of a record: Adler-32 or CRC-32, of its body compressed or
-    not.
+    """The checksums that writers give a record: Adler-32 or CRC-32, of its body compressed
+    or not.
     """
     for data in (content, body):
         yield zlib.adler32(data)

@@ -73,7 +73,7 @@ class ReadingProcess:
         return self._answer(name)
 
     def _answer(self, question: object) -> Any:
-        """What the reading process answers. Raises `BadFile` where it has ended."""
+        """The answer of the reading process. Raises `BadFile` where it has ended."""
         stdin, stdout = self._reader.stdin, self._reader.stdout
         assert stdin is not None
         assert stdout is not None
@@ -187,7 +187,7 @@ def _serve(kind: str, memory: int, seconds: int) -> None:
 
 
 def _call(read: Callable[[Any], Any], question: Any) -> Any:
-    """What a library reads; None for what it cannot read."""
+    """The result of a library's reader; None for what it cannot read."""
     with contextlib.suppress(OSError, ValueError):
         return read(question)
 

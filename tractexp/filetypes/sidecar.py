@@ -16,8 +16,8 @@ from tractexp.storage.files import locate_file
 
 @dataclass(frozen=True)
 class Sidecar:
-    """What `name.json` beside `name.csv` says; each key is optional, and other keys are the user's
-    own.
+    """The content of `name.json` beside `name.csv`; each key is optional, and other keys are the
+    user's own.
     """
 
     name: str | None = None
@@ -59,7 +59,7 @@ def read_sidecar(path: str) -> Sidecar:
 
 
 def _take_kind(kind: type[Any], content: Mapping[str, Any], key: str) -> Any:
-    """What stands under a key where it is of that kind, else an empty one."""
+    """The value under a key where it is of that kind, else an empty one."""
     return content[key] if isinstance(content.get(key), kind) else kind()
 
 
@@ -76,7 +76,7 @@ def _window(file: Any, content: Any) -> Window | None:
 
 
 def _base(file: Any, content: Any) -> Base | None:
-    """What one per unit is, where the sidecar says it in numbers."""
+    """The base of per-unit values, where the sidecar tells it in numbers; else None."""
     if not isinstance(content, dict):
         return None
     numbers = {key: content[key] for key in ("voltage", "power", "frequency") if key in content}

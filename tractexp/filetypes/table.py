@@ -106,7 +106,7 @@ class TableFile(ABC):
         return {name: cells[number].values for name, number in wanted.items()}
 
     def label(self, number: int) -> str:
-        """What messages call a column."""
+        """A column's name in messages."""
         return self.heading.names[number] or f"{number} (from 0)"
 
     def refuse(self, row: int, number: int, why: str) -> UserError:
@@ -247,7 +247,7 @@ def content(path: str, limit: int | None = None, whole: tuple[bytes, ...] = ()) 
 
 
 def _describe_missing(path: str, file: Path) -> str:
-    """What to give in place of a file that is not there."""
+    """The sentence on a file that is not there, with what to give in its place."""
     if file.is_dir():
         return f"{path} is a folder, not a file; give a file in it, or task=survey data.path={path}"
     folder = file.parent

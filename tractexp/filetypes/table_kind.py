@@ -20,8 +20,8 @@ from tractexp.filetypes.table import TableFile
 def find_kind(
     table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]
 ) -> tuple[str, list[str]]:
-    """What the table holds, and the keys that make it up, t first; raises `UserError` for what is
-    no such table.
+    """The kind of a table, and the keys that make it up, t first; raises `UserError` for what is no
+    such table.
     """
     kinds = _find_kinds(table, options)
     times = [key for key in ("t", "frac") if key in options]

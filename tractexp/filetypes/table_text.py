@@ -318,9 +318,7 @@ def _lines(head: bytes, whole: bool) -> list[tuple[int, str]]:
 
 
 def _delimiter(lines: Sequence[str]) -> str:
-    """What parts the cells: the mark that cuts most of the last lines into equally many values, two
-    or more.
-    """
+    """The mark that cuts most of the last lines into equally many values, two or more."""
     tail = lines[len(lines) // 2 :][-50:]
 
     def alike(mark: str) -> tuple[float, int]:

@@ -120,7 +120,7 @@ def _record_voltage(source: str, table: TableFile, mapping: Mapped, nominal: flo
 
 
 def kind_of(path: str, *join: str) -> str:
-    """What the table in a file, or in those of one event, holds: "powers", "phasors" or "waves";
+    """The kind of the table in a file, or in those of one event: "powers", "phasors" or "waves";
     "powers" where it is ambiguous.
     """
     try:
@@ -329,7 +329,9 @@ def _guess_line(
 
 
 def _describe_secondary_size(columns: Mapping[str, np.ndarray]) -> list[str]:
-    """What is said of a line voltage [kV] that only secondaries of transformers have."""
+    """A sentence on a line voltage [kV] that only secondaries of transformers have; [] where none
+    is.
+    """
     level = float(np.nanmedian(columns["U"]))
     if not SECONDARY_LINES[0] <= level <= SECONDARY_LINES[1]:
         return []

@@ -111,7 +111,9 @@ class _Emitter:
     # The steady state
 
     def _rest(self) -> str:
-        """What vanishes before the event, as `steady` calls it."""
+        """The text of a function that computes what vanishes before the event, as `steady` calls
+        it.
+        """
         f, lanes, scalars = self._function()
         lowered = self.lowered
         phase = self.lowered.rest
@@ -411,7 +413,9 @@ class _Emitter:
                 self._step(self._group(g), first, points, ahead)
 
     def _points(self, address: str) -> list[dict[Symbol, str]]:
-        """What is the same in all lanes at the beginning, the middle and the end of a step."""
+        """The values that are the same in all lanes at the beginning, the middle and the end of a
+        step.
+        """
         count = len(self.moving)
         return [
             {

@@ -135,7 +135,7 @@ class Function:
 
     @contextmanager
     def when(self, condition: str) -> Iterator[None]:
-        """What is done only where a condition (i1) holds."""
+        """Within it, instructions that run only where a condition (i1) holds."""
         inside, end = self._label(), self._label()
         self.do(f"br i1 {condition}, label %{inside}, label %{end}")
         self._begin(inside)

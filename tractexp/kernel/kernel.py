@@ -24,8 +24,8 @@ PREFIX = "; room "  # of the line of a kernel's text that tells its `Room`
 
 @dataclass(frozen=True)
 class Room:
-    """What a call needs beside its arrays: numbers of each candidate, of each event, and of the
-    work space.
+    """The room that a call needs beside its arrays: numbers of each candidate, of each event, and
+    of the work space.
     """
 
     width: int  # lanes of a vector

@@ -34,7 +34,7 @@ class Apart:
         return self._add_suffix(what) in self._eq
 
     def __getitem__(self, what: Site | str) -> Symbol:
-        """What stands at a site or word of this group, else of the whole model."""
+        """The symbol at a site or of a word of this group, else of the whole model."""
         return self._eq[self._add_suffix(what) if what in self else what]
 
     def _add_suffix(self, what: Site | str) -> str:

@@ -64,7 +64,7 @@ def _foreign(eq: Equations, part: Part) -> str:
 
 
 def motor_alone(motor: Motor) -> Equations:
-    """What a motor declares by itself."""
+    """The equations of a motor without load and effects."""
     eq = Equations()
     _motor(eq, motor)
     return eq

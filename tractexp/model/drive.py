@@ -86,7 +86,7 @@ class Excitation:
 
     @property
     def measurements(self) -> np.ndarray:
-        """What a simulation is compared with (2, N): P and Q."""
+        """The recorded P and Q (2, N) [pu] that a simulation is compared with."""
         return np.stack([self.P, self.Q])
 
     @property
@@ -158,7 +158,7 @@ class WaveformDrive:
 
     @property
     def measurements(self) -> np.ndarray:
-        """What a simulation is compared with (3, N): the currents."""
+        """The recorded currents (3, N) [pu] that a simulation is compared with."""
         return self.currents
 
 

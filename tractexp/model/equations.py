@@ -177,7 +177,7 @@ class Equations:
         return [*self.definitions, *self.states, *self.memories, *map(_real, self.parameters)]
 
     def expression(self, site: Site | str) -> sympy.Expr:
-        """What stands at a site now, before any later edit."""
+        """The expression at a site now, before any later edit."""
         site = sites.find_site(site)
         return self._drawn[site] if site in self._drawn else self.definitions[self[site]]
 
@@ -223,8 +223,8 @@ class Equations:
         )
 
     def outputs(self) -> dict[str, sympy.Expr]:
-        """What a simulation is compared with, by name: the power, or the currents in the stationary
-        frame.
+        """The expressions that a simulation is compared by, by name: the power, or the currents in
+        the stationary frame.
         """
         if not self.waves:
             return dict(zip(OUTPUTS[PHASORS], (self.P, self.Q), strict=True))
@@ -234,7 +234,7 @@ class Equations:
     # What parts write
 
     def write(self, name: str) -> None:
-        """What follows is written by the part of this name."""
+        """Let the part of this name own all that is written from here on."""
         self._writer = name
 
     def declare(self, parameters: Iterable[Parameter]) -> dict[str, Symbol]:
@@ -667,8 +667,8 @@ class Equations:
     before, apart = evaluate_before, view_with_suffix  # their names in version 0.2
 
     def _starts(self) -> dict[Symbol, sympy.Expr]:
-        """What stands before the event for all that moves, states and their parts by what they
-        start from.
+        """The values before the event of all that moves, states and their parts by what they start
+        from.
         """
         at_start = {symbol: start_symbol(symbol) for symbol in (*self.states, *self.memories)}
         for symbol, start in list(at_start.items()):
@@ -709,12 +709,16 @@ class Equations:
         return rows
 
     def real_starts(self) -> list[Symbol]:
-        """What states and memories start from, in the order of the kernel, phasors split in two."""
+        """The symbols that states and memories start from, in the order of the kernel, phasors
+        split in two.
+        """
         starts = map(start_symbol, (*self.states, *self.memories))
         return [part for s in starts for part in ((s,) if s.is_real else phasor_parts(s))]
 
     def real_balances(self) -> list[sympy.Expr]:
-        """What vanishes in the steady state before the event, one for each real state."""
+        """The expressions that vanish in the steady state before the event, one for each real
+        state.
+        """
         rows: list[sympy.Expr] = []
         for state in self.states.values():
             balance = self.parts(state.derivative if state.balance is None else state.balance)

@@ -190,9 +190,7 @@ def _phase(
     expressions: list[sympy.Expr],
     steps: Mapping[Symbol, sympy.Expr] | None = None,
 ) -> Phase:
-    """What one phase computes: the steps that its expressions need, with constants and signals
-    taken out.
-    """
+    """The steps of one phase that its expressions need, with constants and signals taken out."""
     signals = ()
     needed = _select_needed_steps(expressions, steps or {})
     targets = list(needed)

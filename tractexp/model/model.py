@@ -36,7 +36,7 @@ CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")
 
 @dataclass(frozen=True, eq=False)
 class ModelResponse:
-    """What a load draws, for n candidates.
+    """The response of a load, for n candidates.
 
     Attributes
     ----------
@@ -218,7 +218,7 @@ class Model:
         )
 
     def _in_cache(self, what: str) -> str:
-        """What a text is called in the cache: those of phasors by themselves."""
+        """The kind of a text in the cache: those of phasors by themselves."""
         return f"{what}_{self.domain}" if self.waves else what
 
     def _written(self) -> str:

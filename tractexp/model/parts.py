@@ -89,7 +89,7 @@ class Motor(Part):
         """
 
     def usual(self, *_: Any, **parameters: Any) -> "Iterable[tuple[Any, float, float]]":
-        """What such machines usually are, to which `model.priors` holds an estimate.
+        """The usual sizes of such machines' quantities, to which `model.priors` holds an estimate.
 
         Two machines of three have a quantity within `factor` times or over its median.
 
@@ -152,7 +152,7 @@ class Static(Part):
         return DAMPING
 
     def require(self, *_: Any, **parameters: Any) -> Iterable[tuple[Any, ...]]:
-        """What must hold for a steady state.
+        """The conditions of a steady state.
 
         Parameters
         ----------

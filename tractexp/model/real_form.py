@@ -64,7 +64,7 @@ class RealForm:
         return self.parts(expression)[0]
 
     def _complex_states(self) -> dict[Symbol, sympy.Expr]:
-        """What stands for complex states and for their values before the event."""
+        """The expressions for complex states and for their values before the event."""
         both = (
             s for state in self.states if not state.is_real for s in (state, start_symbol(state))
         )
@@ -100,7 +100,7 @@ class RealForm:
         return real, imaginary
 
     def _map_real_names(self, expression: sympy.Expr) -> dict[Symbol, sympy.Expr]:
-        """What the real names in an expression stand for."""
+        """The expressions that the real names in an expression stand for."""
         return {s: self.real(s) for s in symbols_of(expression) & self.definitions.keys()}
 
 

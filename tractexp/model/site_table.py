@@ -11,11 +11,11 @@ from tractexp.model.sites import SITES
 
 
 class HoldsModel(Protocol):
-    """What carries a composed model, as what `tractexp.compose` makes does."""
+    """An object that carries a composed model, as `tractexp.compose` gives."""
 
     @property
     def model(self) -> Model:
-        """What simulates."""
+        """The composed model, which simulates."""
         ...
 
 

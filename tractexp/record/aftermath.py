@@ -66,7 +66,7 @@ def _cut_aftermath(record: Record, at: int, why: str) -> Record:
 
 
 def loss(record: Record, end: int, S: complex) -> list[str]:
-    """What is said of a load that has less than half of its power `S`, P + jQ, left after a dip; []
+    """A sentence on a load that has less than half of its power `S`, P + jQ, left after a dip; []
     of any other.
     """
     first, stop = np.searchsorted(record.t, record.t[end] + np.array(SETTLED)).tolist()

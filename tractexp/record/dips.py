@@ -133,7 +133,7 @@ def check_load(where: str, U: float, S: float = 0.0) -> None:
 
 
 def signs(record: Record) -> list[str]:
-    """What is odd about P and Q of a table before its first dip, one sentence each.
+    """A sentence on each odd sign of P and Q in a table before its first dip.
 
     Raises `UserError` for a load that is counted out of itself for certain.
     """

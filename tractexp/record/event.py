@@ -64,7 +64,7 @@ class Event:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """What is recorded beside t, U, P and Q, and these, by name."""
+        """The names of all recorded channels, t, U, P and Q among them."""
         return tuple(self.record.channels)
 
     @property

@@ -46,8 +46,8 @@ FOREIGN = {
 
 
 def sentence(path: str | Path) -> str:
-    """What a file of a listed foreign ending is and how to convert it, a sentence; "" for other
-    endings.
+    """The sentence on a file of a listed foreign ending: what it is and how to convert it; "" for
+    other endings.
     """
     kind = FOREIGN.get(Path(path).suffix.lower())
     return f"{path} is {kind}" if kind else ""

@@ -88,7 +88,7 @@ class Identity:
 
     @property
     def parts(self) -> list[str]:
-        """What is known of where the record is from and of its bases, each in words."""
+        """The origin and the bases of the record, as far as they are known, each in words."""
         said = [
             text if key == "file" else f"{key} {text}" for key, text in self.source.items() if text
         ]
@@ -139,7 +139,7 @@ def label(identities: Iterable[Identity]) -> str:
 
 
 def title(identities: Iterable[Identity], names: Iterable[str]) -> str:
-    """What a page is about: station and load, where these are known, and the records' own names."""
+    """The title of a page: station and load, where these are known, and the records' own names."""
     return ": ".join(filter(None, (label(identities), ", ".join(names))))
 
 

@@ -53,7 +53,7 @@ DECLARATION, LOAD = "given", "load"
 
 @dataclass(frozen=True)
 class Base:
-    """What one per unit stands for. Voltage is line-to-line RMS; power is three-phase.
+    """The base of per-unit values. Voltage is line-to-line RMS; power is three-phase.
 
     `origin` says who chose it: "load", the steady state of the load itself before a dip, or
     "given", by a user or by the file. A power of 1 from a user or a file means that nobody said how
@@ -206,7 +206,7 @@ class Record:
 
     @property
     def where(self) -> str:
-        """What messages call this record: its source, else its name."""
+        """The record's name in messages: its source, else its name."""
         return self.source or self.name
 
     @property
@@ -400,7 +400,7 @@ class Record:
         )
 
     def _uneven(self, steps: np.ndarray, usual: float) -> str:
-        """What is said of times that a simulator chose."""
+        """The note on times that a simulator chose."""
         short, long = (
             int(np.count_nonzero(steps < 0.5 * usual)),
             int(np.count_nonzero(steps > 1.5 * usual)),

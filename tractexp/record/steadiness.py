@@ -30,7 +30,7 @@ HISTORY = 3.0  # s before an event in which steps are looked for
 
 
 def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[str]]:
-    """What of the samples `part` before an event is steady, and what is to be said of it.
+    """The samples of `part` before an event that are steady, and notes on the others.
 
     From the last step of the load or of its voltage on. Raises `UserError` where fewer than `least`
     samples are left.

@@ -83,7 +83,7 @@ class WaveEvent(Event):
 
     @property
     def calm(self) -> np.ndarray:
-        """What neither fundamental nor harmonics explain before the dip, which is the noise."""
+        """The noise: currents before the dip without fundamental and harmonics, [pu]."""
         return self.unexplained
 
     @property
@@ -286,8 +286,8 @@ def _find_bridged_of_dip(waves: Waves, event: Event, lead: int) -> list[int]:
 
 
 def describe_smearing(duration: float, U2: float, frequency: float) -> str:
-    """What phasors make of a dip of this duration [s] and share of U2, as the end of a sentence; ""
-    where no harm.
+    """The harm that phasors do to a dip of this duration [s] and share of U2, as the end of a
+    sentence; "" where none.
     """
     if duration * frequency < LONGEST_SHORT_DIP:
         return (

@@ -46,7 +46,7 @@ class Waves:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """What JSON holds of the waves beside their samples."""
+        """The waves as JSON holds them, without their samples."""
         late = None if self.late is None else self.late.tolist()
         fields = {"start": self.start, "rate": self.rate, "estimator": self.estimator, "late": late}
         fields |= {"bridged": list(self.bridged)} if self.bridged else {}

@@ -24,7 +24,7 @@ def look_at_file(path: Path) -> View:
 
 
 def event_name(file: str, load: int, event: LoadEvent) -> str:
-    """What an event is called within its archive: FILE#LOAD.DIP, both counted from 1."""
+    """The name of an event within its archive: FILE#LOAD.DIP, both counted from 1."""
     return f"{file}#{load}" + ("" if event.dip is None else f".{event.dip}")
 
 

@@ -35,7 +35,7 @@ ORDERS = ("abc", "rst", "uvw", "ryb", "rwb")  # of phases in files' names, besid
 
 
 def tell_apart(paths: Sequence[str]) -> list[str]:
-    """What each file's name has that the others' have not, the names of their folders included.
+    """The part of each file's name that the others' have not, the names of their folders included.
 
     Examples
     --------

@@ -58,7 +58,7 @@ def _is_within(trace: Trace, e: Excursion, slips: Sequence[Excursion]) -> bool:
 
 
 def _name_load_change(change: Change) -> str:
-    """What a change of a load's own is called."""
+    """The kind of a load's own change."""
     return "load loss" if change.ratio < SMALL_LOAD_SHARE else "load step"
 
 

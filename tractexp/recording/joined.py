@@ -75,7 +75,7 @@ def _align(recordings: Sequence[Recording]) -> Alignment:
 
 
 def _shape(segment: Segment) -> tuple[float, ...]:
-    """What segments of files must share to be joined without moving a sample."""
+    """The numbers that segments of files must share to be joined without moving a sample."""
     return segment.first, segment.stop, round(segment.rate, 3), round(segment.start, 6)
 
 

@@ -412,9 +412,7 @@ def _find_common_start(texts: Sequence[str]) -> str:
 
 
 def shared_name(channels: list[Channel]) -> str:
-    """What the group is called: its circuit where the names say no more, else what the
-    names share.
-    """
+    """The name of a group: its circuit where the names say no more, else what the names share."""
     names = [c.name.strip() for c in channels]
     head = _find_common_start(names)
     rests = [name.removeprefix(head) for name in names]

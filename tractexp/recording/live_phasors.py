@@ -111,6 +111,8 @@ def find_answer(live: LivePhasors, permutation: tuple[int, ...] = (0, 1, 2)) -> 
 
 
 def _still(live: LivePhasors) -> np.ndarray:
-    """What turns phasors so that V1 has angle zero: windows far apart can then be compared."""
+    """The factors (M,) that turn phasors so that V1 has angle zero: windows far apart can then be
+    compared.
+    """
     V1 = sequences(live.V)[0]
     return V1.conj() / np.maximum(np.abs(V1), 1e-12)

@@ -133,7 +133,9 @@ def _part_of_railway(
     voltage: int,
     current: int,
 ) -> tuple[str, ...]:
-    """What is said of a current that carries a part of a load only, or brings it back."""
+    """A sentence on a current that carries a part of a load only, or brings it back; () for
+    others.
+    """
     if is_return(recording, current):
         return (
             "the current of a return conductor or the rail: what the contact line brings flows back"
@@ -159,8 +161,8 @@ def _part_of_railway(
 def _part_of_phases(
     recording: Recording, phasors: Snapshots, volts: Sequence[int], voltage: int
 ) -> tuple[str, ...]:
-    """What is said of a single voltage that is one of several phases: by its name and angle, or by
-    its size.
+    """A sentence on a single voltage that is one of several phases: by its name and angle, or by
+    its size; () for others.
     """
     x, channels = phasors.select_channels([voltage])[0], recording.channels
     for other in volts:

@@ -36,8 +36,8 @@ LATEST_START = 0.06  # s: three cycles, within which what happened and the dip t
 
 @dataclass(frozen=True)
 class _Bus:
-    """What the loads of one bus have in common, by segment: tracked frequencies, phasors of the
-    voltages.
+    """Tracked frequencies and phasors of the voltages that the loads of one bus share, by
+    segment.
     """
 
     tracked: dict[Segment, dict[int, np.ndarray]] = field(default_factory=dict)
@@ -189,7 +189,7 @@ class View:
 
     @functools.cached_property
     def quality(self) -> list[Quality]:
-        """What each channel is fit for."""
+        """The quality of each channel."""
         recording = self.recording
         if recording is None:
             return []
@@ -435,7 +435,7 @@ def _describe_slow_segments(recording: Recording) -> str:
 
 
 def _improbable(where: str, shown: Sight) -> list[str]:
-    """What is said of a load that no network feeds."""
+    """A sentence on a load that no network feeds; [] for others."""
     try:
         known = shown.feeder is not None and shown.feeder.loaded and not shown.secondary
         if known and (load := shown.powers()) is not None:
@@ -532,8 +532,8 @@ def _numbers(changes: Sequence[Happening], dips: Sequence[FileDip]) -> list[int 
 
 
 def _why(what: Happening, event: Event | None, refused: str) -> str:
-    """What makes it (not) worth fitting: the event itself, or that it gives no record; what the
-    detection noted.
+    """The reason why an event is (not) worth fitting: itself, or that it gives no record; and what
+    the detection noted.
     """
     if not what.worth:
         return what.why

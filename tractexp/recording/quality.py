@@ -336,7 +336,7 @@ def _fit(
     level: float,
     noise: float,
 ) -> str:
-    """What the channel is fit for, one sentence."""
+    """The sentence on what a channel is fit for."""
     if form != "waveform":
         return f"holds {form} values, no waveform: fit for what they say, not for phasors"
     if f is None or segment.rate < FEWEST_PER_CYCLE * f:

@@ -160,9 +160,7 @@ def contact_first(recording: Recording, pair: tuple[int, int]) -> tuple[int, int
 
 
 def direct_voltage(recording: Recording) -> str:
-    """What is said of a recording whose voltages are direct: mean, ripple and dip, one clause; else
-    "".
-    """
+    """The mean, ripple and dip of direct voltages, one clause; "" where none are recorded."""
     said = ""
     for number, channel in enumerate(recording.channels):
         if channel.form != "waveform" or kind(channel) != "voltage" or in_doubt(channel):

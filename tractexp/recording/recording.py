@@ -50,7 +50,7 @@ NOTHING_BRIDGED = (np.empty(0, dtype=int), np.empty(0))
 
 
 def unit_of(text: str) -> tuple[str, float]:
-    """What a unit measures.
+    """The quantity of a unit and its size in kV, kA, ...
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ class StatusChannel:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What one file holds.
+    """The channels of one file: waveforms, states, marks and where they are from.
 
     Channels have equal lengths; each segment of them is sampled uniformly.
 

@@ -79,7 +79,7 @@ class Snapshots:
         return self.remember(("size", *numbers), lambda: self._size(numbers))
 
     def remember(self, key: Any, answer: Callable[[], Any]) -> Any:
-        """What was answered before, or the answer."""
+        """The answer to a question asked before, else this `answer`, which is then kept."""
         if key not in self.remembered:
             self.remembered[key] = answer()
         return self.remembered[key]

@@ -159,8 +159,8 @@ def _compare_currents(
 
 
 def _find_sides(recording: Recording, high: Feeder, low: Feeder) -> tuple[float, float] | None:
-    """What the names say of the sides: kV where they do, else 1 of a high side and 0 of a low one;
-    None for nothing.
+    """The kV of both sides where names tell them, else 1 of a high side and 0 of a low one; None
+    for neither.
     """
     sides = [_read_side(recording, each.currents) for each in (high, low)]
     known = [side for side in sides if side is not None]

@@ -80,8 +80,8 @@ class TypeTest:
 
     @property
     def bounds(self) -> dict[str, list[float]]:
-        """What `model.bounds` may hold a motor to that is fitted on this base: at standstill a
-        machine is its transient reactance.
+        """The `model.bounds` of a motor that is fitted on this base: at standstill a machine is its
+        transient reactance.
         """
         by_name = {each.name: each for each in self.values}
         reactance = by_name.get("X_locked", by_name.get("X_2"))

@@ -157,8 +157,8 @@ def _set_secondary(channel: Channel) -> Channel:
 
 
 def _secondary_note(channels: Sequence[Channel], by_size: bool) -> list[str]:
-    """What is said of secondary values, which may be told by their size, and the setting that gives
-    their ratio; [] where there are none.
+    """A note on secondary values, which may be told by their size, and the setting that gives their
+    ratio; [] where there are none.
     """
     ours = [c for c in channels if c.side == "S" and c.quantity in ("voltage", "current")]
     if not ours:
@@ -189,7 +189,7 @@ def secondary_of(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> 
 
 
 def _note(channels: Sequence[Channel], taken: Mapping[str, Sequence[int]]) -> list[str]:
-    """What was taken for what, in one sentence; [] where nothing was."""
+    """A note on units that were taken for others; [] where none were."""
     names = ", ".join(channels[i].name.strip() for numbers in taken.values() for i in numbers)
     small, large = (
         " and ".join(PLAIN[x][1] for x in taken),

@@ -104,7 +104,7 @@ def describe_untestable_beside(findings: Findings) -> str:
 
 
 def _verdict_on(findings: Findings, name: str) -> str:
-    """What became of one effect, as the end of a sentence."""
+    """The verdict on one effect, as the end of a sentence."""
     row = next((r for r in list_candidates(findings) if r.names == (name,)), None)
     if row is None:
         return "it was not refitted alone"
@@ -121,7 +121,7 @@ def _tell_set(findings: Findings, row: SetEvidence) -> CandidateRow:
 
 
 def _tell_fate(findings: Findings, row: SetEvidence) -> tuple[str, str]:
-    """What became of a refitted set, and why."""
+    """The verdict on a refitted set, and why."""
     evidence, verdict = findings.evidence, findings.verdict
     if row in verdict.kept:
         left = f"leaves {'more' if evidence.is_predicted else 'no more'} than chance does"

@@ -94,13 +94,13 @@ def _bars(
 
 
 def _describe_bar(row: CandidateRow) -> str:
-    """What the pointer over a bar shows."""
+    """The text at the pointer over a bar."""
     drop = f"{row.drop:.{0 if row.drop >= 100 else 1}f}"
     return f"{drop}, {row.status}" if row.rank < 2 else drop
 
 
 def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
-    """What the colors mean."""
+    """The caption with the meaning of the colors."""
     colors = []
     if findings.names:
         colors.append("green: added")
@@ -142,7 +142,7 @@ def _sets(page: Report, findings: Findings) -> None:
 
 
 def _further(page: Report, findings: Findings) -> None:
-    """What the others would add once the chosen effects are in the model."""
+    """Add what the other effects would gain once the chosen ones are in the model."""
     rows = []
     for j in judgements(findings):
         size = ""

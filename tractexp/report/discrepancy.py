@@ -188,7 +188,7 @@ def report(
 
 
 def _describe_grade(findings: Findings) -> str:
-    """What the model that the investigation ends with is good for."""
+    """The grade of the model that the investigation ends with, in a sentence."""
     which = "extended" if findings.names else "base"
     graded = findings.final_grade
     grade, doubt = graded.adequacy, f"; {graded.doubt}" if graded.doubt else ""
@@ -254,7 +254,7 @@ def _off(misfit: Mapping[str, Any], *, waves: bool) -> list[str]:
 
 
 def _add_remainder_section(page: Report, findings: Findings) -> None:
-    """What is left beside the names, or what nothing explains, in words."""
+    """Add what is left beside the names, or what nothing explains, in words."""
     page.heading("What is left")
     shapes, near = findings.remainder, findings.nearest
     whose = (

@@ -16,7 +16,7 @@ MOST_TOLD = 4  # of them in a sentence, those that leave least there
 
 
 class Answer(NamedTuple):
-    """What is said of a stretch of time [s]."""
+    """The explanation of a stretch of time [s]."""
 
     start: float
     end: float

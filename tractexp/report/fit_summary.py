@@ -14,9 +14,7 @@ if TYPE_CHECKING:
 
 
 def summary(fit: "Identification") -> Report:
-    """What it is good for, the estimates, how well they fit, why some are not identified, and what
-    to do next.
-    """
+    """Grade, estimates, errors, why some parameters are not identified, and the next steps."""
     result = fit.result
     verdicts = own_verdicts(result)
     poor = [f"{name}: {verdict}" for name, verdict in name_verdicts(result).items()]
@@ -51,8 +49,8 @@ def machine(fit: "Identification") -> list[str]:
 
 
 def network(fit: "Identification") -> list[str]:
-    """What the records show beside the load that is fitted, and its nuisances, in a sentence each;
-    [] where nothing.
+    """Sentences on what the records show beside the fitted load, and on its nuisances; [] where
+    nothing.
     """
     result = fit.result
     if not result.shown_effects:

@@ -116,7 +116,7 @@ def event_curves(
 
 
 def _draw_beside(beside: Sequence[tuple[str, Any]]) -> list[CalculatedCurve]:
-    """What other models calculate of an event, drawn where it is asked for."""
+    """The curves that other models calculate of an event, drawn where they are asked for."""
     colors = itertools.cycle(style.PALETTE[2:])
     return [
         CalculatedCurve(name, np.stack((one.P, one.Q)), color, "dash", hidden=True)

@@ -276,7 +276,7 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
 
 
 def _conclusion(speaking: Sequence[dict[str, Any]], tests: int) -> str:
-    """What the tests of the residual say, in a sentence."""
+    """The verdict of the tests on the residual, in a sentence."""
     if not tests:
         return "There are too few samples to test what is left."
     if not speaking:
@@ -315,7 +315,7 @@ def _correlation(page: Report, uncertainty: Uncertainty) -> None:
 
 
 def _events(page: Report, uncertainty: Uncertainty, together: EventAgreement) -> None:
-    """What each event of a joint fit adds, and which does not belong."""
+    """Add what each event of a joint fit contributes, and which does not belong."""
     page.heading("What each event adds")
     if together.notes:
         page.verdict(*(f"{note}." for note in together.notes), kind="bad")

@@ -39,7 +39,7 @@ def poles(fit: "NetworkFit") -> Table:
 
 
 def numbers(fit: "NetworkFit") -> Table:
-    """What networks of fewer and of more poles leave."""
+    """The errors that networks of fewer and of more poles leave."""
     keys = ["model_error", "held_out"] if fit.validate else ["model_error"]
     rows = [
         [row["poles"], *(in_percent(row[key]) for key in keys)] for row in fit.content["by_poles"]

@@ -77,7 +77,7 @@ def channels(entry: Mapping[str, Any]) -> Table:
 
 
 def events(entry: Mapping[str, Any]) -> Table:
-    """What happened to a load."""
+    """The events of a load, a row each."""
     _, P, Q = entry["units"]
     columns = [
         "dip",
@@ -225,7 +225,7 @@ def _describe_entry(entry: Mapping[str, Any]) -> list[str]:
 
 
 def quiet(entry: Mapping[str, Any]) -> str:
-    """What is said of a load without events."""
+    """The sentence on a load without events."""
     if entry.get("unexamined"):
         return f"{NOT_EXAMINED}: {entry['unexamined']}"
     if dead := describe_dead_phases(entry.get("dead_phases")):
@@ -236,7 +236,7 @@ def quiet(entry: Mapping[str, Any]) -> str:
 
 
 def describe_dead_phases(dead: str | None) -> str:
-    """What is said of phases that have no voltage from first to last; "" of none."""
+    """The sentence on phases that have no voltage from first to last; "" of none."""
     return f"no voltage in phase {dead} from first to last" if dead else ""
 
 

@@ -203,7 +203,7 @@ def _of_waves(
 
 
 def _further(view: View) -> str:
-    """What is said of status channels below a chart."""
+    """The caption's part on status channels; "" without them."""
     count = len(view.operations)
     most = f", the first {TRACES} of {count}" if count > TRACES else ""
     return f" Status channels that change are below{most}." if count else ""
@@ -252,8 +252,8 @@ def _colors(phases: int) -> tuple[str, ...]:
 
 
 def _name_waves(recording: Recording, feeder: Feeder, phases: int) -> list[str]:
-    """What the waves of a load are called at the cursor: by phase, and by channel where they are
-    its channels.
+    """The names of a load's waves at the cursor: by phase, and by channel where they are its
+    channels.
     """
     numbers = (*feeder.voltages, *feeder.currents)
     # line voltages, or two current transformers, of which phases are made

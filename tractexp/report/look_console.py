@@ -38,8 +38,8 @@ Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
 
 
 def screen(content: Entry) -> Report:
-    """What 25 lines of a terminal hold: which load and which dip to fit by which command; then of
-    each file where it is from, its buses, and which loads are worth fitting.
+    """The answer in 25 lines: which load and which dip to fit by which command; then of each file
+    where it is from, its buses, and which loads are worth fitting.
     """
     entries = content["files"]
     reasons = unfitted.sentences(entries)[:MOST_REASONS]
@@ -107,7 +107,7 @@ def summary(content: Entry) -> Report:
 
 
 def build_full_report(content: Entry) -> Report:
-    """What files hold: notes, channels, loads and why they are such, all events, all commands."""
+    """Notes, channels, loads and why they are such, all events and all commands of the files."""
     page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
         page.text(_about(entry), *(f"  note: {n}" for n in entry["notes"]))
@@ -203,15 +203,15 @@ def _event(event: Entry) -> str:
 
 
 def _reservation(why: str) -> str:
-    """What is to be known of an event that is worth fitting nevertheless: the first clause after
-    its size.
+    """The first clause after the size of an event that is worth fitting: what speaks against it
+    nevertheless; "" where nothing.
     """
     return f", but {_clause(why, '; ')}" if "; " in why else ""
 
 
 def _clause(why: str, after: str) -> str:
-    """What decides, of a sentence such as 'the voltage falls by 30 %, but P is negative before it:
-    ...'.
+    """The deciding clause of a sentence such as 'the voltage falls by 30 %, but P is negative
+    before it: ...'.
     """
     return re.split(r"[:(]", why.split(after, 1)[-1])[0].strip()
 
@@ -237,12 +237,12 @@ def _buses(feeders: Sequence[Entry]) -> list[list[Entry]]:
 
 
 def _same(event: Entry) -> tuple[Any, ...]:
-    """What two loads' views of one event share."""
+    """The facts of an event that two loads' views of it share."""
     return event["kind"], event["start"], event["end"]
 
 
 def _common(bus: Sequence[Entry]) -> list[Entry]:
-    """What happened to the voltage: the events that all loads of a bus have."""
+    """The events that all loads of a bus have: they happened to the voltage."""
     each = [feeder["events"] for feeder in bus if feeder["loaded"]] or [
         feeder["events"] for feeder in bus
     ]
@@ -251,8 +251,7 @@ def _common(bus: Sequence[Entry]) -> list[Entry]:
 
 
 def _of_voltage(bus: Sequence[Entry]) -> list[Entry]:
-    """What happened to the voltage of a bus: what its loads share, and the worst of what each of
-    them shows.
+    """The events of a bus's voltage, each with the worst that any of its loads shows.
 
     Circuits that open at different instants divide one fault at different times: it is told from
     first to last.
@@ -330,7 +329,7 @@ def _loads(entry: Entry, buses: Sequence[Sequence[Entry]]) -> Table:
 
 
 def _own(feeder: Entry, common: Sequence[Entry]) -> str:
-    """What happened to a load and not to its bus."""
+    """The events of a load that its bus did not have, in words."""
     shared = {_same(event) for event in common}
     own = (event for event in feeder["events"] if _same(event) not in shared)
     return ", ".join(f"{_label(event)} at {starts(event, ' s')}" for event in own)

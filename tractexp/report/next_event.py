@@ -71,7 +71,7 @@ def section(page: Report, choice: NextEvent) -> None:
 
 
 def _caption(choice: NextEvent) -> str:
-    """What the chart shows."""
+    """The caption of the chart."""
     decided = f"Dashed: the {DECIDED:.0%} from which an event is recommended as sure."
     return (
         "Probability that one dip more tells all rivals apart, by its depth and duration."

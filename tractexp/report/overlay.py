@@ -80,7 +80,7 @@ def currents(event: WaveEvent, overlay: Overlay) -> Chart:
 
 
 def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
-    """What the record's estimator sees in the currents, calculated and recorded."""
+    """The chart of phasors by the record's estimator, of calculated and recorded currents."""
     curves = [
         (name, as_phasors(event, calculated), color, dash)
         for name, calculated, color, dash in _models(overlay)
@@ -95,7 +95,7 @@ def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
 
 
 def _models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:
-    """What there is: name, what it draws, color and dash."""
+    """The models to draw, as (name, curves, color, dash)."""
     models = (
         ("base model", overlay.before, BASE, "solid"),
         ("nearest candidates", overlay.nearest, NEAREST, "dot"),
@@ -109,5 +109,5 @@ def _models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:
 
 
 def _best(overlay: Overlay) -> np.ndarray:
-    """What the best model calculates."""
+    """The curves of the best model."""
     return overlay.before if overlay.after is None else overlay.after

@@ -58,7 +58,7 @@ def percent(relative: float) -> str:
 
 
 def summary(content: Mapping[str, Any]) -> Report:
-    """What is planned and at which values, the forecasts, the answer, and the best events."""
+    """The plan and its values, the forecasts, the answer, and the best events."""
     values = ", ".join(f"{name} {value:.4g}" for name, value in content["parameters"].items())
     report = Report().text(content["dip"], f"parameters, {content['origin']}: {values}")
     report.add(*(scan(content, label, FEW) for label in content["half_intervals"]))
@@ -129,7 +129,7 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
 
 
 def _caption(needed: Needed) -> str:
-    """What the chart shows."""
+    """The caption of the chart."""
     met = "" if needed.depth is None else ", met at the dotted line"
     return (
         "Half of the 95 % interval of each parameter, in percent of its value, by the depth of the"

@@ -100,7 +100,7 @@ def _row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[str]:
 
 
 def meaning(scan: Profiles, profile: LikelihoodProfile) -> str:
-    """What a profile says beside the interval of the curvature, in a sentence."""
+    """The interval of a profile beside that of the curvature, in a sentence."""
     open_sides = _name_sides(profile, End.BOUND)
     short = _name_sides(profile, End.POINTS)
     low, high = profile.interval
@@ -173,7 +173,7 @@ def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
 
 
 def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
-    """What is not identified, in words."""
+    """The parameters that are not identified, in words."""
     poor = [
         f"{name} is {verdict.word}"
         for name, verdict in verdicts.items()

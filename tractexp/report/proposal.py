@@ -23,7 +23,7 @@ EVENTS = 4  # whose charts are shown at once
 
 
 def headlines(findings: Findings) -> list[str]:
-    """What the box at the top says of a proposal."""
+    """The sentences on a proposal in the box at the top."""
     return [as_sentence(s) for s in proposed_in_words(to_dict(findings.proposed, PLUGIN), None)[:2]]
 
 
@@ -112,7 +112,7 @@ def _add_explanation(page: Report, proposal: Proposal) -> None:
 
 
 def _plot_term(page: Report, proposal: Proposal) -> None:
-    """What the base model misses in each event, and what the term makes of it."""
+    """Add a chart for each event: what the base model misses, and what the term makes of it."""
     for role, judged in (("fitted", proposal.train), ("held out", proposal.validate)):
         page.text(
             "What the base model misses, and what the model with the term draws beyond it"
@@ -124,7 +124,7 @@ def _plot_term(page: Report, proposal: Proposal) -> None:
 
 
 def _plot_missed_part(judged: GapTest, e: int) -> Chart:
-    """What the base model misses of an event, beside what the term adds."""
+    """The chart of what the base model misses of an event, beside what the term adds."""
     bench = judged.context
     assert bench is not None
     event = bench.events[e]

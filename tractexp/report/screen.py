@@ -83,8 +83,8 @@ def describe_load(result: Result, names: Sequence[str]) -> str:
 
 
 def choose_units(result: Result) -> tuple[float, tuple[str, str]]:
-    """What powers are multiplied by, and the units of P and Q that they then have: MW and Mvar
-    where the record tells them.
+    """The factor of powers, and the units of P and Q that they then have: MW and Mvar where the
+    record tells them.
     """
     own = result.base
     return (own.power, ("MW", "Mvar")) if own.in_mva else (own.ratio, ("pu", "pu"))

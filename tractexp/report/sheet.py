@@ -68,7 +68,7 @@ def sheet(fit: "Identification") -> Report:
 
 
 def _tabulate_powers(fit: "Identification") -> Table:
-    """What the load and its parts draw before the dip."""
+    """The powers that the load and its parts draw before the dip."""
     (scale, units), point = choose_units(fit.result), fit.operating_point
     before = fit.result.before
     rows = [["load", scale * before["P0"], scale * before["Q0"]]]
@@ -165,7 +165,7 @@ def _draw(chart: Chart, one: Any, scales: tuple[float, float, float]) -> None:
 
 
 def _list_limits(fit: "Identification") -> list[str]:
-    """What the model is not good for, a sentence each."""
+    """The limits of the model's use, a sentence each."""
     said = [as_sentence(doubt) for doubt in fit.doubts]
     said += [f"{name} is {verdict}." for name, verdict in name_verdicts(fit.result).items()]
     said += map(as_sentence, fit.structures)

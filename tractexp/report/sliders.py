@@ -63,7 +63,7 @@ def _write_program(fit: "Identification") -> str:
 
 
 def _collect(fit: "Identification") -> dict[str, Any]:
-    """What the page needs of the first event and of the estimates."""
+    """The data of the first event and of the estimates that the page needs."""
     problem, own = fit.spec.problem, fit.result.base
     drive, part, substeps = problem.drive, problem.drive.part(0), int(problem.step.substeps[0])
     if (part.stop - part.start) * substeps > MOST_PAGE_STEPS:

@@ -135,7 +135,7 @@ def _tell_unfitted(content: Mapping[str, Any]) -> list[str]:
 
 
 def describe_load(load: Mapping[str, Any]) -> str:
-    """What differs from dip to dip, what is predicted, and what was left out, in a line."""
+    """The differences between dips, the predicted dips, and what was left out, in a line."""
     told = [f"{load['usability']}: {load['reason']}", _tell_variation(load)]
     differs = {r["name"]: r["spread"] for r in load["constants"] if r["spread"]}
     differs.pop("H", None)

@@ -222,7 +222,7 @@ def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
 
 
 def describe_preparation(problem: Problem, fits: Sequence[Fit]) -> list[str]:
-    """What was done to each record before it was fitted, and how it is simulated, in sentences."""
+    """Sentences on how each record was prepared for the fit, and how it is simulated."""
     steps = f"Runge-Kutta steps of the fit: {problem.step.describe(problem.events)}."
     return [
         *(

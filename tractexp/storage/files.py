@@ -165,7 +165,8 @@ def size(path: Path | str) -> int:
 
 
 def list_folder(folder: Path) -> list[Path]:
-    """What lies in a folder, or the files of one in a .zip, in order of name; [] where it is none.
+    """The paths in a folder, or those of the files of one in a .zip, in order of name; [] where it
+    is none.
 
     Raises `UserError` for a .zip that cannot be read.
     """
@@ -216,7 +217,7 @@ def read_text(path: Path | str, largest: int = LARGEST) -> str:
 
 
 def read_json(path: Path | str, largest: int = RESULT) -> Any:
-    """What a JSON file holds. Raises `UserError` for what is none, and as `read`."""
+    """The content of a JSON file. Raises `UserError` for what is none, and as `read`."""
     try:
         text = read(path, largest=largest).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -227,7 +228,7 @@ def read_json(path: Path | str, largest: int = RESULT) -> Any:
 
 
 def parse_json(text: str, path: Path | str) -> Any:
-    """What a text in JSON says, that came from `path`. Raises `UserError` for what is none."""
+    """The content of a text in JSON that came from `path`. Raises `UserError` for what is none."""
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
@@ -241,8 +242,8 @@ def parse_json(text: str, path: Path | str) -> Any:
 
 
 def read_yaml(path: Path | str, largest: int = CONFIGURATION) -> Any:
-    """What a configuration in YAML holds: plain data, in which 1e-3 is a number. Raises `UserError`
-    for what is none, and as `read`.
+    """The content of a configuration in YAML: plain data, in which 1e-3 is a number. Raises
+    `UserError` for what is none, and as `read`.
 
     An alias repeats what it stands for, so that a few lines of aliases of aliases fill any memory.
     What they come to is counted before anything is made of it.

@@ -92,8 +92,8 @@ class RunFolder:
         return paths
 
     def conclude(self) -> None:
-        """What a task leaves that writes files for others, but no result: results that are there
-        keep their own.
+        """Settle the folder of a task that writes files for others, but no result: results that are
+        there keep their own.
         """
         if self.next.exists() and not any((self.folder / name).exists() for name in RESULTS):
             self._commit()

@@ -31,8 +31,8 @@ class FailedSearch:
 
 @dataclass(frozen=True)
 class _Chunk:
-    """What a worker is sent. The optimizer goes as it was built, so that the worker imports the
-    module of a plugin that stands in no installed package.
+    """The searches that a worker is sent. The optimizer goes as it was built, so that the worker
+    imports the module of a plugin that stands in no installed package.
     """
 
     label: str

@@ -43,7 +43,9 @@ class Composed:
 
 @dataclass(frozen=True)
 class SweepJob:
-    """What a worker is sent. `configuration` and `inputs` say whether two jobs are the same."""
+    """A job as a worker is sent it. `configuration` and `inputs` say whether two jobs are
+    the same.
+    """
 
     config: Mapping[str, Any]
     choices: Mapping[str, str]
@@ -99,11 +101,11 @@ class SweepJob:
 
     @property
     def name(self) -> str:
-        """What the job is called within its sweep."""
+        """The job's name within its sweep."""
         return self.subdir or self.folder.name
 
     def variant(self, common: Collection[str]) -> str:
-        """What the optimizer is called with the settings that it does not share with all jobs: the
+        """The name of the optimizer with the settings that it does not share with all jobs: the
         `common` ones.
         """
         own = collect_chosen_settings(
@@ -118,7 +120,7 @@ class SweepJob:
         return self.config.get("sweep", {}).get("returns")
 
     def select_returned(self, end: Status) -> float | list[float] | None:
-        """What it gives back, having ended so."""
+        """The metrics that an ended job gives back to an optimizer over jobs."""
         return (
             select_returned_metrics(end.metrics, self.returns) if end.status == FINISHED else None
         )

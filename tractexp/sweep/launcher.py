@@ -167,7 +167,7 @@ class Cores(Launcher):
 
 
 def _trace(job: SweepJob) -> Status | bool:
-    """What a job has left whose worker did not answer: its end, or whether it had begun."""
+    """The end that a job has written whose worker did not answer, or whether it had begun."""
     state = status.read_newest(job.folder)
     if state is not None and state.status in ENDED:
         return state
@@ -204,7 +204,7 @@ class Ended(JobReturn):
 
     @property
     def return_value(self) -> Any:
-        """What the job returned; what it raised is raised where it failed."""
+        """The value that the job returned; what it raised is raised where it failed."""
         if self.status == JobStatus.FAILED:
             raise self._return_value
         return self._return_value

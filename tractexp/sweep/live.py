@@ -46,7 +46,7 @@ class Standing:
 
     @property
     def rank(self) -> tuple[bool, float, str]:
-        """What variants are ranked by on the page: the best end, none last."""
+        """The key by which variants are ranked on the page: the best end, none last."""
         return not self.ends, min(self.ends, default=0.0), self.name
 
 

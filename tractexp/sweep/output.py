@@ -21,7 +21,7 @@ class _ByThread:
         self.usual = usual
 
     def __getattr__(self, name: str) -> Any:
-        """What the stream of this thread has."""
+        """An attribute of this thread's stream."""
         main = threading.main_thread().ident or 0
         return getattr(
             _outputs.get(threading.get_ident()) or _outputs.get(main) or self.usual, name

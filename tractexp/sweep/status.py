@@ -49,7 +49,7 @@ class Status:
     metrics: Mapping[str, float | None] = field(default_factory=dict)
 
     def metric(self, name: str) -> float | None:
-        """What was measured; None where the job has not ended well or its task measures no such
+        """A measured metric; None where the job has not ended well or its task measures no such
         thing.
         """
         value = self.metrics.get(name)
@@ -99,8 +99,8 @@ def objective(folder: Path, name: str = SEARCHED) -> float | None:
 def select_returned_metrics(
     metrics: Mapping[str, float | None], names: Sequence[str] | None
 ) -> float | list[float] | None:
-    """What a job gives back to whoever optimizes over jobs: the metrics of these names, one or a
-    list.
+    """The metrics of these names, one or a list, which a job gives back to whoever optimizes over
+    jobs.
 
     Without names where its search ended; None where its task searches for nothing. What was never
     reached is infinite.

@@ -150,7 +150,7 @@ def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) 
 
 
 def _select_still_outputs(of: Model, drive: Drive, outputs: np.ndarray) -> np.ndarray:
-    """What stands still where the voltage turns steadily."""
+    """The outputs that stand still where the voltage turns steadily."""
     if not of.waves:
         return outputs
     rows = dict(zip(INPUTS, drive.inputs, strict=True))

@@ -59,7 +59,7 @@ def gives_the_same_bits_for_the_same_seed(cls: type[Optimizer]) -> None:
 
 
 def stays_in_the_box_and_ends_at_the_budget(cls: type[Optimizer]) -> None:
-    """What is evaluated lies in the bounds, no more often than the budget says."""
+    """All evaluated points lie in the bounds, no more of them than the budget says."""
     problem = Noted()
     result = _run(cls, problem, 3)
     points = np.concatenate(problem.batches)
@@ -112,7 +112,7 @@ def finds_the_bottom_of_a_bowl(cls: type[Optimizer]) -> None:
 
 
 def _run(cls: type[Optimizer], problem: Bowl, seed: int, space: str = "unit") -> SearchResult:
-    """What an optimizer finds within the tests' budget."""
+    """The result of an optimizer within the tests' budget."""
     return search(problem, cls(space=space), seed, Limits(BUDGET))
 
 

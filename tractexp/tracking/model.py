@@ -101,7 +101,7 @@ def _save(folder: Path, result: Path, run_id: str, logged: Any) -> None:
 
 
 def _load_pyfunc(path: str) -> "Predictor":
-    """What `mlflow.pyfunc.load_model` calls with the stored result file."""
+    """The predictor that `mlflow.pyfunc.load_model` makes of the stored result file."""
     from tractexp.identification.result import load
 
     return Predictor(load(Path(path)))

@@ -30,7 +30,7 @@ def _machine() -> tuple[str, str, str]:
 
 
 def _read(path: Path) -> str:
-    """What a file of the system says; "-" where it is not there."""
+    """The text of a file of the system; "-" where it is not there."""
     try:
         return path.read_text().strip() or "-"
     except OSError:

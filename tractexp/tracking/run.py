@@ -39,7 +39,7 @@ Line: TypeAlias = "Sequence[float] | np.ndarray"  # (n,), steps or values of a c
 
 @dataclass(frozen=True)
 class TrackedRun:
-    """What one job leaves in MLflow.
+    """The entry of one job in MLflow.
 
     `parameters` is the flattened configuration, `metrics` the figures of the result. An infinite
     one, of what was never reached, is left out: a database keeps the largest number there is in its

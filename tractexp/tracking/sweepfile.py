@@ -31,7 +31,7 @@ def waits(folder: Path) -> bool:
 
 
 def _content(folder: Path) -> dict[str, Any]:
-    """What the file of a sweep's folder holds; {} where it is none of ours."""
+    """The content of the file of a sweep's folder; {} where it is none of ours."""
     try:
         content = files.read_json(folder / FILE, files.CONFIGURATION)
     except (OSError, UserError):

@@ -64,7 +64,7 @@ AXES = {
 
 
 def _plot_comparison(metric_x: str, metric_y: str) -> dict[str, Any]:
-    """What one metric cost in terms of another, a point a run."""
+    """The chart of one metric against another, a point a run."""
     axes = {
         axis: {"key": key, "type": "METRIC"}
         for axis, key in (("xaxis", metric_x), ("yaxis", metric_y))

@@ -42,13 +42,13 @@ class BenchmarkResult(Written):
 
     @property
     def sentences(self) -> list[str]:
-        """What may be quoted."""
+        """Sentences to quote."""
         from tractexp.studies.bbob.page import sentences
 
         return sentences(self.bbob)
 
     def table(self) -> Table:
-        """What each optimizer reaches, by dimension."""
+        """The share of targets that each optimizer reaches, by dimension."""
         from tractexp.studies.bbob.page import scale, span
 
         bbob = self.bbob

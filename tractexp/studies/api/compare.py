@@ -50,7 +50,7 @@ class ComparisonResult(Written):
 
     @functools.cached_property
     def comparison(self) -> "Comparison | Several":
-        """What stands behind the page. A loaded result reads the runs again."""
+        """The comparison behind the page. A loaded result reads the runs again."""
         return self.computed or _compare_gathered_runs(self.searches, **self.call)[1]
 
     @property
@@ -72,7 +72,7 @@ class ComparisonResult(Written):
 
     @property
     def sentences(self) -> list[str]:
-        """What may be quoted."""
+        """Sentences to quote."""
         return self.content["sentences"]
 
     def table(self) -> Table:
@@ -135,7 +135,7 @@ class ComparisonResult(Written):
         return page.text(*(f"- {sentence}" for sentence in told))
 
     def _over_all(self) -> Iterator[Table]:
-        """What several problems come to under each of the terms, the best variants first."""
+        """A table for each of the terms over several problems, the best variants first."""
         for overall in getattr(self.comparison, "overall", ()):
             best = list(overall.figures.items())[:MOST_TERMINAL_SENTENCES]
             cells = [

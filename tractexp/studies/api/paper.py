@@ -63,7 +63,7 @@ class PaperResult(Written):
 
     @functools.cached_property
     def study(self) -> "Study":
-        """What stands behind the page; each part is measured at its first use."""
+        """The study behind the page; each part is measured at its first use."""
         return self.measured or _study(self.setup, **self.settings)
 
     @property

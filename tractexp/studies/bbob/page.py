@@ -173,7 +173,7 @@ def _times(page: Report, benchmark: BbobRuns, d: int) -> None:
 
 
 def _caption(plan: Any, target: int) -> str:
-    """What the table of running times shows."""
+    """The caption of the table of running times."""
     return f"ERT to {plan.targets[target]:g} from the optimum, in evaluations (runs that met it)."
 
 
@@ -195,8 +195,8 @@ def _reading(page: Report) -> Report:
 
 
 def content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What `benchmark.json` holds: the plan, each optimizer's settings, every run; the same for the
-    same seed.
+    """The content of `benchmark.json`: the plan, each optimizer's settings, every run; alike for
+    the same seed.
 
     Evaluations to a target that was not met, and running times to one that no run met, are None.
     """

@@ -83,7 +83,7 @@ class Bbob:
 
 @dataclass(frozen=True)
 class BbobPlan:
-    """What is run: every optimizer on each function, dimension and instance."""
+    """The runs to make: every optimizer on each function, dimension and instance."""
 
     functions: tuple[int, ...]
     dimensions: tuple[int, ...]

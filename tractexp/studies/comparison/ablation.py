@@ -74,7 +74,7 @@ class VariantFamily:
         return ablation if ablation.effects else None
 
     def cost(self, spent: Mapping[str, float]) -> dict[str, float]:
-        """What each switch adds, on average over its pairs, to what the variants spend."""
+        """The simulations {switch: number} that each switch adds, on average over its pairs."""
         pairs = {
             s: [(on | {s}, on) for on in self.members if s not in on and on | {s} in self.members]
             for s in self.switches

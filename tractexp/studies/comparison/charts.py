@@ -221,7 +221,7 @@ def mean_ranks(ranks: Ranks, label: str = "mean rank over the seeds (1 is best)"
 
 
 def _about(values: Sequence[float]) -> tuple[float, float]:
-    """What an axis shows of these values: all of them, and of equal ones a neighbourhood."""
+    """The ends of an axis for these values: all of them, and of equal ones a neighbourhood."""
     low, high = min(values), max(values)
     edge = 0.08 * (high - low) or 1e-3 * max(abs(high), 1e-9)
     return low - edge, high + edge

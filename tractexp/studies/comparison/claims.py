@@ -81,7 +81,9 @@ def _advice(comparison: Comparison, best: str, others: list[str]) -> str:
 
 
 def _spent(comparison: Comparison, best: str) -> str:
-    """What the best variant spent, where that is more than another did."""
+    """The clause on the simulations of the best variant, where they are more than another's; ""
+    else.
+    """
     (first,) = (summary for summary in comparison.summaries if summary.name == best)
     least = min(comparison.summaries, key=lambda summary: summary.simulations.median)
     if not first.simulations.median > LEAST_TOLD_RATIO * least.simulations.median:
@@ -245,7 +247,7 @@ def _describe_shares(rows: list[tuple[float, int, str]]) -> str:
 
 
 def of_effect(effect: SwitchEffect) -> str:
-    """What a switch does, in a sentence."""
+    """The effect of a switch, in a sentence."""
     (switch,) = effect.switches
     verdict = (
         "no effect is shown"
@@ -272,7 +274,9 @@ def _listed_contrasts(effect: SwitchEffect) -> str:
 
 
 def of_unknown(ablation: Ablation) -> str:
-    """What these variants cannot tell, and which would; "" where nothing is missing."""
+    """The sentence on effects that these variants cannot tell, and which variants would; "" where
+    none is missing.
+    """
     if not ablation.unknown:
         return ""
     names = "; ".join(" with ".join(key) for key in ablation.unknown)

@@ -44,8 +44,8 @@ class VariantPair:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What `comparison.json` and `comparison.html` show. Summaries: lowest median first, of equal
-    ones fastest.
+    """The content of `comparison.json` and `comparison.html`. Summaries: lowest median first, of
+    equal ones fastest.
     """
 
     gathered: Gathered
@@ -136,7 +136,7 @@ def seeds_needed(pairs: int) -> int:
 
 
 def _measure_standing(median: float, least: float) -> tuple[bool, float]:
-    """What variants are ranked by: nan last, medians below the least count as that."""
+    """The key by which variants are ranked: nan last, medians below the least count as that."""
     return bool(np.isnan(median)), max(median, least)
 
 

@@ -75,8 +75,8 @@ def several(
 
 
 def _collect_notes(comparisons: Mapping[str, Comparison]) -> list[str]:
-    """What a reader must know, once, with the problems that it is true of unless that is all of
-    them.
+    """The notes of all comparisons, each once, with the problems that it is true of unless that is
+    all of them.
     """
     of: dict[str, list[str]] = {}
     for label, comparison in comparisons.items():
@@ -130,8 +130,8 @@ def _load_stored_runs(folder: Path, settings: Mapping[str, Any]) -> BenchmarkRes
 def _polish_described_problem(
     gathered: Gathered, progress: Any, problem: Problem | None
 ) -> tuple[Polished | None, str]:
-    """What polishing found on the problem that the runs' configuration describes; None, and why,
-    where it cannot.
+    """The descents on the problem that the runs' configuration describes; None, and why, where they
+    are impossible.
     """
     runs = [run for variant in gathered.variants for run in variant.runs]
     try:

@@ -21,8 +21,8 @@ SOLVED = 1e-8  # a distance to the optimum of a BBOB function below which it cou
 
 @dataclass(frozen=True, eq=False)
 class Overall:
-    """What variants come to on several problems under the same terms. Lower figures are better
-    unless `share`.
+    """The ranks and effects of variants over several problems under the same terms. Lower figures
+    are better unless `share`.
     """
 
     terms: str  # "15,000 simulations"
@@ -51,8 +51,8 @@ class Several:
 
 
 def terms_of(runs: Sequence[SearchRun]) -> str:
-    """What ended the searches: "15,000 simulations", "300 iterations", or "" where they had no end
-    in common.
+    """The limit that ended the searches: "15,000 simulations", "300 iterations", or "" where they
+    had none in common.
     """
     budgets = {run.config.get("budget") for run in runs}
     if len(budgets) == 1 and (budget := budgets.pop()) is not None:
@@ -104,8 +104,8 @@ def _ablate_mean(
     logs: Mapping[str, Mapping[int, list[float]]],
     seeds: Sequence[int],
 ) -> Ablation | None:
-    """What the switches do to the mean over all problems, seed by seed; None where no contrast
-    can be made.
+    """The effects of the switches on the mean over all problems, seed by seed; None where no
+    contrast can be made.
     """
     mean = np.mean([[by_seed[seed] for seed in seeds] for by_seed in logs.values()], axis=0)
     return chosen.ablation(dict(zip(names, mean.T, strict=True)))
@@ -203,7 +203,7 @@ def _order_names(names: Sequence[str], ranks: Ranks | None) -> list[str]:
 
 
 def _cost(chosen: VariantFamily | None, comparisons: Iterable[Comparison]) -> dict[str, float]:
-    """What each switch adds to the simulations of an iteration."""
+    """The simulations of an iteration that each switch adds, {switch: number}."""
     if chosen is None:
         return {}
     each: dict[str, list[float]] = {name: [] for name in chosen.members.values()}

@@ -11,7 +11,7 @@ from tractexp.text.wording import in_words, join_words, percent
 
 
 def answer(several: Several) -> str:
-    """What is ranked first under each of the terms."""
+    """The sentence on the best rank under each of the terms."""
     return " ".join(of_ranks(overall) for overall in several.overall)
 
 
@@ -62,7 +62,7 @@ def of_effect(effect: SwitchEffect) -> str:
 
 
 def of_cost(overall: Overall) -> str:
-    """What each switch costs; "" where that is not known."""
+    """The sentence on the simulations that each switch costs; "" where that is not known."""
     if not overall.cost:
         return ""
     costs = [f"{switch} {cost:+.1f}" for switch, cost in overall.cost.items()]

@@ -190,7 +190,7 @@ def _reading(page: Report) -> Report:
 
 
 def content(several: Several, source: str) -> dict[str, Any]:
-    """What `comparison.json` holds: each problem as if it were alone, and what they come to."""
+    """The content of `comparison.json`: each problem as if it were alone, and all together."""
     return files.plain(
         {
             "source": source,

@@ -339,7 +339,7 @@ def _reading(page: Report, comparison: Comparison) -> None:
 
 
 def content(comparison: Comparison, source: str) -> dict[str, Any]:
-    """What `comparison.json` holds: every number of the page. What is not finite is None."""
+    """The content of `comparison.json`: every number of the page. What is not finite is None."""
     failed, interrupted = _without_result(comparison)
     polished = comparison.polished
     return files.plain(
@@ -374,7 +374,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
 
 
 def _of_run(variant: Variant, run: SearchRun, comparison: Comparison) -> dict[str, Any]:
-    """What `comparison.json` holds of a run."""
+    """The entry of a run in `comparison.json`."""
     inside = comparison.polished.in_valley(run) if comparison.polished else None
     fields = {
         key: getattr(run, key)

@@ -61,7 +61,7 @@ class SearchRun:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """What `to_dict` gave: plain data have no numbers that are not finite."""
+        """The run that `to_dict` gave: plain data have no numbers that are not finite."""
         arrays = {name: np.array(content[name], dtype=float) for name in ARRAYS}
         unknown = {"objective": np.inf, "epsilon_p": np.nan, "epsilon_q": np.nan}
         numbers = {
@@ -203,7 +203,7 @@ Settings = tuple[str, tuple[tuple[str, str], ...]]  # the optimizer as chosen, a
 
 
 def _settings(run: SearchRun) -> Settings:
-    """What tells variants apart: the optimizer and its settings."""
+    """The optimizer and its settings, which tell variants apart."""
     settings = {
         key: value for key, value in run.config.items() if key.partition(".")[0] in SETTINGS
     }
@@ -211,18 +211,18 @@ def _settings(run: SearchRun) -> Settings:
 
 
 def _identity(run: SearchRun) -> tuple[Settings, int]:
-    """What tells runs apart: the variant and the seed."""
+    """The variant and the seed, which tell runs apart."""
     return _settings(run), run.seed
 
 
 def name_variants(runs: Sequence[SearchRun]) -> list[str]:
-    """What the variant of each run is called."""
+    """The name of each run's variant."""
     names = _names(runs)
     return [names[_settings(run)] for run in runs]
 
 
 def _names(runs: Sequence[SearchRun]) -> dict[Settings, str]:
-    """What each variant is called: its optimizer, and the settings in which runs of that optimizer
+    """The name of each variant: its optimizer, and the settings in which runs of that optimizer
     differ.
     """
     groups: dict[str, list[Settings]] = defaultdict(list)

@@ -32,7 +32,7 @@ DIFFERENT = 1.1  # accuracies within a tenth of each other count as equal in Tab
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper says and where, what we measured, and the verdict."""
+    """A statement of the paper and its place, our measurement, and the verdict."""
 
     part: str  # the table or figure it belongs to
     text: str
@@ -326,7 +326,9 @@ def faster(study: Study, first: str, second: str, by: str) -> tuple[str, list[st
 def _mark_reached_cost(
     spent: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """What `numpy.where` takes: the cost where the target was reached, else without end."""
+    """The arguments of `numpy.where`: whether the target was reached, the cost there, else
+    infinity.
+    """
     return spent[1], spent[0], np.inf
 
 
@@ -444,7 +446,7 @@ def figure3(study: Study) -> list[Claim]:
 
 
 def figure4(study: Study) -> list[Claim]:
-    """What the Lévy flight is."""
+    """The claims on the Lévy flight."""
     slopes = {formula: maps.tail_exponent(steps) for formula, steps in study.tails.items()}
     even = {formula: float(np.mean(steps > 0)) for formula, steps in study.tails.items()}
     return [
@@ -522,7 +524,7 @@ def readings(study: Study) -> list[Claim]:
 
 
 def agreement(study: Study) -> list[Claim]:
-    """What is printed against the printed equations."""
+    """The claims on printed values against the printed equations."""
     checks = equations.checks()
     failed = [check for check in checks if not check.holds]
     wrong = equations.order(equations.as_printed)

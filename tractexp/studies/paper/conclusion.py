@@ -99,7 +99,7 @@ def _differ(study: Study, first: str, second: str, by: str) -> bool:
 
 
 def _lack(study: Study) -> str:
-    """What the sparrow searches lack, in a sentence."""
+    """The reasons why the sparrow searches rank behind PSO, in a sentence."""
     said = why.answer(why.lacks(study))
     return (
         f"That convergence at the end, not exploration, is what the sparrow searches lack {said}."
@@ -151,7 +151,7 @@ def reasons(study: Study) -> list[str]:
 
 
 def _describe_lack(lack: why.Lack) -> str:
-    """What one search lacks, in a sentence."""
+    """The reasons of one search, in a sentence."""
     farther = "" if lack.convergence.lacks else "not "
     others = {
         "PSO": lack.valley,
@@ -242,8 +242,8 @@ def _attraction(study: Study, lowest: float, right: np.ndarray, other: np.ndarra
 
 
 def _describe_trade(study: Study, along: np.ndarray, here: int, lowest: float) -> str:
-    """What trades along the valley, which `along` are points of the path; its bottom within the
-    bounds is `here`.
+    """The sentence on the parameters that trade along the valley, which `along` are points of the
+    path; its bottom within the bounds is `here`.
     """
     grid, path = study.path
     names = study.problem.space.names

@@ -25,7 +25,7 @@ def steady_state_sine(column: Sequence[float]) -> float:
 
 
 def refusals(model: Any, drive: Any) -> dict[str, str]:
-    """What the model answers to each column of Table 3; "" where it has a steady state."""
+    """The refusal of each column of Table 3 by the model; "" where it has a steady state."""
     return {
         name: model.refusal(np.array(column), drive) or ""
         for name, column in printed.TABLE_3.items()
@@ -101,7 +101,7 @@ def order(step: Callable[[Field, np.ndarray, float], np.ndarray], halvings: int 
 
 @dataclass(frozen=True)
 class Check:
-    """What the paper prints, where, what an equation of it gives, and whether both agree."""
+    """A printed number and its place, the value that an equation gives, and whether both agree."""
 
     where: str
     printed: str
@@ -110,7 +110,7 @@ class Check:
 
 
 def checks() -> list[Check]:
-    """What is printed, put into the printed equations."""
+    """The printed numbers, put into the printed equations."""
     return [*_steady_states(), *_errors(), *_methods(), *_rankings()]
 
 

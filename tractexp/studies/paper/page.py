@@ -47,7 +47,7 @@ def report(study: Study, parts: Sequence[str], claims: Sequence[Claim]) -> Repor
 
 
 def _top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
-    """What the reader must know first, and the verdicts."""
+    """Add the verdicts, and what the reader must know first."""
     sheet.verdict(
         f"Of {count_verdicts(claims)}." if claims else "The parts chosen hold no claim.",
         *conclusion.sentences(study, claims),

@@ -185,7 +185,7 @@ class Study:
         return OptimizerPair(wilcoxon(a, b)[0], vargha_delaney(a, b))
 
     def spent(self, name: str, target: float, by: str) -> tuple[np.ndarray, np.ndarray]:
-        """What each search spent until `target` times the floor or in all (seeds,), and whether it
+        """The cost of each search until `target` times the floor or in all (seeds,), and whether it
         got there.
         """
         spent, reached = [], []

@@ -96,7 +96,9 @@ def table1(sheet: Report, study: Study) -> None:
 
 
 def _list_values(study: Study, reading: str, place: int | None) -> list[float]:
-    """What the searches of a reading found for the parameter at a place; [] where it has none."""
+    """The values of the parameter at a place that the searches of a reading found; [] where it has
+    none.
+    """
     return [] if place is None else [one.values[place] for one in study.run_searches(reading)]
 
 

@@ -48,7 +48,7 @@ class Test:
 
 @dataclass(frozen=True)
 class Lack:
-    """What a sparrow search lacks beside PSO and beside random points."""
+    """The tests of a sparrow search beside PSO and beside random points."""
 
     name: str
     # depth in its own valley, paired with PSO's: the objective over that of the bottom
