@@ -36,29 +36,31 @@ class SecondMotorGroup(Effect):
 
     def edit(self, eq, group_share, inertia_ratio):
         omega, moving = eq.omega, _list_needed_states(eq)
+        # {symbol: that of the second machine}: states, their values before the event, quantities
         twins = {s: eq.twin(s, "_2") for s in moving}
         twins |= {eq.evaluate_before(s): eq.evaluate_before(twin) for s, twin in twins.items()}
         touched = [s for s in eq.definitions if eq.expand(s).free_symbols & twins.keys()]
         for symbol in touched:
             twin = eq.definitions[symbol].xreplace(twins)
             twins[symbol] = eq.define(f"{symbol.name}_2", twin, rf"{{{eq.latex_names[symbol]}}}_2")
+        # the second machine obeys the same equations, its speed with another inertia
         for symbol in moving:
             state, slower = eq.states[symbol], inertia_ratio if symbol == omega else 1
             eq.moves(twins[symbol], state.derivative.xreplace(twins) / slower, state.initial)
             eq.states[twins[symbol]].derived = state.derived
-        for site in _compute_drawn_output(eq):
+        for site in _list_drawn_sites(eq):
             second = twins[eq[site]]
             eq.edit(site, lambda own, second=second: (1 - group_share) * own + group_share * second)
 
 
-def _compute_drawn_output(eq):
-    """The power that the motor draws, of waveforms its current."""
+def _list_drawn_sites(eq):
+    """The sites of what the motor draws: its power, of waveforms its current."""
     return (sites.motor_current,) if eq.waves else (sites.P_motor, sites.Q_motor)
 
 
 def _list_needed_states(eq):
     """The states the motor's power depends on, and those that these depend on in turn."""
-    states, read = set(), {eq[site] for site in _compute_drawn_output(eq)}
+    states, read = set(), {eq[site] for site in _list_drawn_sites(eq)}
     while read:
         new = set().union(*(eq.expand(e).free_symbols for e in read)) & eq.states.keys() - states
         states |= new

@@ -130,6 +130,7 @@ class ISSA(Sparrow):
 
     @property
     def perturbation_cost(self) -> float:
+        """Simulations that the perturbation adds to an iteration, on average."""
         shares = self.gaussian * BETTER, self.tent_perturbation * (1.0 - BETTER)
         # all in one half of the iterations, the best alone in the other
         if self.schedule == "stage":

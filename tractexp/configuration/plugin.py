@@ -286,7 +286,7 @@ def _check_decorated(module: ModuleType) -> None:
     """Raise `UserError` for a class of a module that would be a plugin if it were decorated."""
     classes = tuple(cls for classes in _registry.values() for cls in classes.values())
     for cls in vars(module).values():
-        if _forgotten(cls, module.__name__, classes):
+        if _lacks_decorator(cls, module.__name__, classes):
             base = next(b for b in cls.__mro__ if "group" in vars(b))
             raise UserError(
                 f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class"
@@ -295,8 +295,10 @@ def _check_decorated(module: ModuleType) -> None:
             )
 
 
-def _forgotten(cls: Any, module: str, classes: tuple[type, ...]) -> bool:
-    """Whether a class of a module is neither a plugin, nor what plugins are made from."""
+def _lacks_decorator(cls: Any, module: str, classes: tuple[type, ...]) -> bool:
+    """Whether a class of a module is meant as a plugin and not marked as one: it is neither private
+    nor a base of plugins.
+    """
     if not (
         isinstance(cls, type)
         and issubclass(cls, Plugin)

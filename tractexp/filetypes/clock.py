@@ -114,7 +114,8 @@ def first_day(cells: Sequence[Any]) -> dt.date | None:
 
 
 def times(cells: Sequence[Any]) -> ClockTimes:
-    """The times of cells; they run on past midnight, those without hours past the full hour.
+    """The times of cells. Those without a date run on past midnight, those without hours past the
+    full hour; leap seconds, and jumps of a clock that was set, are taken out.
 
     Raises `BadCell` for what is no time.
     """
@@ -123,20 +124,30 @@ def times(cells: Sequence[Any]) -> ClockTimes:
     moments = [_moment(cell, row) for row, cell in enumerate(cells)]
     _check_dates(moments, cells)
     clock = np.array([one.second for one in moments])
-    start = None
-    remarks = []
     if moments[0].day is not None:
         seconds, start, remarks = _add_days(moments, clock)
     else:
-        turn = HOUR if isinstance(cells[0], str) and cells[0].count(":") == 1 else DAY
-        seconds = clock + turn * np.cumsum(np.diff(clock, prepend=clock[0]) < -turn / 2)
-    leap = np.array([one.leap for one in moments])
-    seconds[1:] += np.cumsum(leap[:-1] & ~leap[1:])
-    local = np.full(len(cells), np.inf) if any(one.zone for one in moments) else clock
-    seconds, jumps = _run_on(seconds, local)
+        seconds, start, remarks = _unwrap_clock(clock, cells[0]), None, []
+    seconds = seconds + _count_leap_seconds(moments)
+    has_zone = any(one.zone for one in moments)
+    seconds, jumps = _take_out_jumps(seconds, np.full(len(cells), np.inf) if has_zone else clock)
     if _offset(zone := moments[0].zone):
         remarks.append((0, f"times are told in UTC, and the file's are those of UTC{zone}"))
     return ClockTimes(seconds - seconds[0], start, (*remarks, *jumps), moments[0].second)
+
+
+def _unwrap_clock(clock: np.ndarray, first: Any) -> np.ndarray:
+    """Seconds (N,) that run on where a clock begins anew: each day, or each hour where the `first`
+    cell has no hours.
+    """
+    turn = HOUR if isinstance(first, str) and first.count(":") == 1 else DAY
+    return clock + turn * np.cumsum(np.diff(clock, prepend=clock[0]) < -turn / 2)
+
+
+def _count_leap_seconds(moments: Sequence[_Moment]) -> np.ndarray:
+    """How many leap seconds (N,) are over by each moment."""
+    leap = np.array([one.leap for one in moments])
+    return np.cumsum(np.concatenate(([False], leap[:-1] & ~leap[1:])))
 
 
 def _check_dates(moments: Sequence[_Moment], cells: Sequence[Any]) -> None:
@@ -161,7 +172,9 @@ def _add_days(
     return clock + since, start, remarks
 
 
-def _run_on(seconds: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, list[tuple[int, str]]]:
+def _take_out_jumps(
+    seconds: np.ndarray, local: np.ndarray
+) -> tuple[np.ndarray, list[tuple[int, str]]]:
     """Times (N,) [s] without the jumps of a clock that was set, and what is said of each.
 
     `local` (N,) are the seconds of the day by which an hour that is left out in spring is known;

@@ -197,7 +197,7 @@ def _lines(
         )
     lines += [_number(recording.frequency), "0" if rates[0][0] == 0 else str(len(rates))]
     lines += [f"{_number(rate)},{stop}" for rate, stop in rates]
-    lines += [*_dates(recording), kind, _number(timemult)]
+    lines += [*_format_moments(recording), kind, _number(timemult)]
     if revision >= 2013:
         lines += [
             recording.extra.get("time_code") or "0,0",
@@ -218,17 +218,16 @@ def _side(channel: Channel, original: tuple[float, float, str]) -> tuple[float, 
     )
 
 
-def _dates(recording: Recording) -> tuple[str, str]:
+def _format_moments(recording: Recording) -> tuple[str, str]:
     """The lines of the first sample's moment and the trigger's: as the file that was read had them,
     where they still hold.
     """
-    first, second = recording.extra.get("dates", ("", ""))
-    start = date(first, False)[0]
-    at = date(second, False)[0]
-    if recording.extra.get("revision", 1991) >= 1999 and start is not None and at is not None:
-        trigger = None if at == EPOCH else (at - start) / timedelta(seconds=1)
+    lines = recording.extra.get("dates", ("", ""))
+    start, triggered = (date(line, False)[0] for line in lines)
+    if recording.extra.get("revision", 1991) >= 1999 and start and triggered:
+        trigger = None if triggered == EPOCH else (triggered - start) / timedelta(seconds=1)
         if (start, trigger) == (recording.start, recording.trigger):
-            return first, second
+            return lines[0], lines[1]
     begin = recording.start or EPOCH
     trigger = EPOCH if recording.trigger is None else begin + timedelta(seconds=recording.trigger)
     return f"{begin:%d/%m/%Y,%H:%M:%S.%f}", f"{trigger:%d/%m/%Y,%H:%M:%S.%f}"

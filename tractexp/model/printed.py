@@ -14,10 +14,13 @@ from tractexp.model.symbols import phasor_parts, start_symbol
 if TYPE_CHECKING:
     from tractexp.model.equations import Equations
 
+BEFORE_EVENT = "|_0"  # ends the LaTeX of a value before the event
+
 
 def lines(eq: "Equations") -> list[str]:
     """The equations one a line: states, memories, named quantities, what is drawn, steady state."""
-    starts = {start_symbol(s): f"{{{eq.latex_names[s]}}}|_0" for s in (*eq.states, *eq.memories)}
+    moving = (*eq.states, *eq.memories)
+    starts = {start_symbol(s): f"{{{eq.latex_names[s]}}}{BEFORE_EVENT}" for s in moving}
     names = eq.latex_names | starts
     for s in eq.states:
         halves = phasor_parts(start_symbol(s))
@@ -39,17 +42,14 @@ def lines(eq: "Equations") -> list[str]:
 
 
 def list_changed_lines(before: Sequence[str], after: Sequence[str]) -> list[tuple[str | None, str]]:
-    """(line before, line after) of equations that are not as they were; None before one that came
-    in.
+    """(line before, line after) of each equation that changed; None before one that is new.
 
-    What holds before the event is left out: it follows from the others.
+    Equations are matched by their left side. Values before the event are left out: they follow from
+    the others.
     """
-    old = {line.split("=")[0]: line for line in before}
-    return [
-        (old.get(line.split("=")[0]), line)
-        for line in after
-        if line not in before and "|_0" not in line
-    ]
+    old = {line.partition("=")[0]: line for line in before}
+    changed = [line for line in after if line not in before and BEFORE_EVENT not in line]
+    return [(old.get(line.partition("=")[0]), line) for line in changed]
 
 
 class _Printer(PythonCodePrinter):

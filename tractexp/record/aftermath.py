@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.cache.provenance import digest
-from tractexp.record.change import CHANGED, clause, from_to, load_changes, smear, without_gaps
+from tractexp.record.change import (
+    CHANGED,
+    clause,
+    describe_power_change,
+    load_changes,
+    smear,
+    without_gaps,
+)
 from tractexp.record.record import Record
 
 LOST = 0.5  # of the apparent power before: what has less left after a dip has lost load in it
@@ -78,7 +85,7 @@ def loss(record: Record, end: int, S: complex) -> list[str]:
         return []
     return [
         f"the load loses {100 * (1 - abs(left) / abs(S)):.0f} % of its power in the dip"
-        f" ({from_to(record, S, left)}): it trips, which a model without the effect"
+        f" ({describe_power_change(record, S, left)}): it trips, which a model without the effect"
         " undervoltage_trip cannot follow"
     ]
 

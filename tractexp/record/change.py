@@ -190,14 +190,14 @@ def clause(record: Record, begin: int, change: Change) -> str:
     """A clause on a step of the load, whose samples count from sample `begin` of the record."""
     name = "is switched off" if change.ratio < SMALL_LOAD_SHARE else "changes"
     when = record.t[begin + (change.first + change.stop) // 2]
-    return (
-        f"the load {name} at t = {when:g} s ({from_to(record, change.before, change.after)}) while"
-        " the voltage stays"
-    )
+    powers = describe_power_change(record, change.before, change.after)
+    return f"the load {name} at t = {when:g} s ({powers}) while the voltage stays"
 
 
-def from_to(record: Record, before: complex, after: complex) -> str:
-    """Two powers P + jQ of a record in words, in MW and Mvar where its base says so."""
+def describe_power_change(record: Record, before: complex, after: complex) -> str:
+    """A change of power P + jQ in words, "P 1 to 0.5, ...", in MW and Mvar where the base of the
+    record says so.
+    """
     base = record.base
     size, units = (base.power, (" MW", " Mvar")) if base.in_mva else (1.0, ("", ""))
     parts = zip("PQ", units, (before.real, before.imag), (after.real, after.imag), strict=True)

@@ -41,7 +41,7 @@ USES = {
 
 
 def sheet(fit: "Identification") -> Report:
-    """All of it, to be printed on A4."""
+    """The sheet, for A4: verdict, powers, parameters, errors, limits, equations, origin."""
     result = fit.result
     names = [event["name"] for event in result.events if event["role"] == "train"]
     page = Report(

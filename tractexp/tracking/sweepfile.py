@@ -36,5 +36,5 @@ def _content(folder: Path) -> dict[str, Any]:
         content = files.read_json(folder / FILE, files.CONFIGURATION)
     except (OSError, UserError):
         return {}
-    run = content.get("run") if isinstance(content, dict) else 0
-    return content if run is None or isinstance(run, str) else {}
+    is_ours = isinstance(content, dict) and isinstance(content.get("run"), str | None)
+    return content if is_ours else {}

@@ -160,7 +160,7 @@ def _pairs(
         VariantPair(**{**vars(pair), "corrected": float(p)})
         for pair, p in zip(tested, corrected, strict=True)
     ]
-    notes += _describe_power(tested)
+    notes += _describe_lack_of_seeds(tested)
     return tuple(sorted(pairs, key=lambda pair: (pair.corrected, pair.first, pair.second))), notes
 
 
@@ -180,8 +180,10 @@ def _describe_untested(
     ]
 
 
-def _describe_power(tested: Sequence[VariantPair]) -> list[str]:
-    """A sentence on pairs that are too many for their seeds; [] where a difference can show."""
+def _describe_lack_of_seeds(tested: Sequence[VariantPair]) -> list[str]:
+    """A sentence on pairs that are too many to be told apart by so few seeds; [] where they are
+    not.
+    """
     needed = seeds_needed(len(tested))
     if max((pair.seeds for pair in tested), default=needed) >= needed:
         return []

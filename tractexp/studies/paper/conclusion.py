@@ -23,7 +23,7 @@ def sentences(study: Study, claims: Sequence[Claim]) -> list[str]:
     }
     paragraphs = []
     if parts.keys() & {"table2", "table4", "table5"}:
-        paragraphs.append(_model(parts))
+        paragraphs.append(_describe_errors(parts))
     if "equations" in parts or "table3" in parts:
         paragraphs.append(_values())
     if "table3" in parts:
@@ -35,8 +35,10 @@ def sentences(study: Study, claims: Sequence[Claim]) -> list[str]:
     return paragraphs
 
 
-def _model(parts: Mapping[str, list[Claim]]) -> str:
-    """Whether the errors are acceptable, on the fitted dip and on others."""
+def _describe_errors(parts: Mapping[str, list[Claim]]) -> str:
+    """On which dips the identified model's errors are acceptable: the fitted one, a milder and a
+    deeper one.
+    """
     where = {"table2": ("the fitted", 2), "table4": ("the milder", 0), "table5": ("the deeper", 0)}
     verdicts = {dip: parts[part][k].verdict for part, (dip, k) in where.items() if part in parts}
     good = [dip for dip, verdict in verdicts.items() if verdict == CONFIRMED]

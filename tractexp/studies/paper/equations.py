@@ -44,8 +44,11 @@ class Consistency:
 
 
 def consistency() -> Consistency:
-    """Eq. (8) is epsilon_p² mean(P²) + epsilon_q² mean(Q²) by Eq. (20): three columns, two unknowns
-    of one record.
+    """The mean squares of P and Q by which errors and objectives of Table 3 agree best.
+
+    By Eq. (20) the objective of Eq. (8) is epsilon_p² mean(P²) + epsilon_q² mean(Q²). The means are
+    two unknowns of one record, and the table has three columns: each pair of columns gives both,
+    and all three are fitted by non-negative least squares of relative misses.
     """
     from scipy.optimize import nnls
 
