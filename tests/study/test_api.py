@@ -336,6 +336,9 @@ REFUSED = {
     "is both in records and in validate": lambda d: tractexp.investigate(d, validate=d),
     "nothing to read": lambda d: tractexp.read(),
     "nowhere.csv: there is no such file": lambda d: tractexp.read("nowhere.csv"),
+    "result.json is no record: where a run wrote it, 'tractexp again FOLDER'": lambda d: (
+        tractexp.read("result.json")
+    ),
     "no reader takes files ending in '.abc'": lambda d: tractexp.read("dip.abc"),
     "tibet_5pct is neither a file with an ending nor": lambda d: tractexp.read("tibet_5pct"),
     "has no setting 'voltages'": lambda d: tractexp.read("tibet_50pct", voltages=[1, 2, 3]),

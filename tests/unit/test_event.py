@@ -147,6 +147,19 @@ def test_no_dip_is_refused_with_the_largest_deviation():
         detect(dip(depth=0.02, sigma=0.0))
 
 
+@pytest.mark.parametrize("edge", [0.0, 0.06, 0.1])
+@pytest.mark.parametrize("rate", [50, 200, 1000])
+@pytest.mark.parametrize("drift", [-0.01, 0.01, -0.02, -0.05])
+def test_a_dip_begins_where_it_begins_and_not_where_a_drift_crosses_a_threshold(drift, rate, edge):
+    """The voltage drifts for a second, and on; the dip takes `edge` [s] to its depth."""
+    t = np.arange(round(4 * rate)) / rate
+    fall = np.clip((t - 2 + 1e-9) / max(edge, 1e-6), 0, 1) * (t < 2.3)
+    U = (1 + drift * np.clip(t - 1, 0, None)) * (1 - 0.3 * fall)
+    U += 5e-4 * np.random.default_rng(1).standard_normal(len(t))
+    (start, _), *_ = find_dips(t, U)
+    assert t[start] == pytest.approx(2, abs=max(2 / rate, 0.012))
+
+
 def test_a_swell_alone_is_refused_and_said():
     made = dip(depth=-0.1, sigma=0.0)
     with pytest.raises(UserError, match=r"it rises by 10 % at t = 0.3 s: a swell is not fitted"):
@@ -168,12 +181,23 @@ def test_too_few_samples_before_are_refused():
         detect(dip(start=0.008, sigma=0.0))
 
 
-def test_a_record_shorter_than_the_dip_is_refused():
+def test_a_record_that_ends_right_after_the_dip_began_is_refused():
     with pytest.raises(
         UserError,
         match=r"dip.csv: the record is shorter than the dip: it ends at t = 0.999 s with U = ",
     ):
-        detect(dip(start=0.9, duration=0.5))
+        detect(dip(start=0.901, duration=0.5))
+
+
+def test_a_record_that_ends_in_its_dip_is_an_event_to_its_end():
+    event = detect(dip(start=0.6, duration=5.0, sigma=0.0))
+    assert event.unfinished
+    assert (event.start, event.end, event.record.samples) == (600, 999, 1000)
+    assert event.depth == pytest.approx(0.5)
+    assert event.duration == pytest.approx(0.399)
+    [note] = event.record.notes
+    assert note == "the record ends at t = 0.999 s, 0.4 s into the dip: it is fitted to its end"
+    assert not detect(dip()).unfinished
 
 
 def test_lost_power_before_the_dip_is_refused():
@@ -355,8 +379,7 @@ class TestFuse:
 
     def test_a_fault_that_lasts_to_the_end_is_none(self):
         made = self.record(0.79, 0.21)
-        with pytest.raises(UserError, match="the record is shorter than the dip"):
-            detect(replace(made.part(slice(0, 1250)), name="short"))
+        assert detect(made.part(slice(0, 1250))).unfinished
 
     @pytest.mark.parametrize(("left", "U2"), [(2 / 3, 1 / 3), (1e-3, None)])
     def test_a_current_that_goes_with_the_voltage_is_none(self, left, U2):

@@ -139,6 +139,22 @@ def test_currents_of_two_tracks_are_two_halves_not_one_load(tmp_path):
     assert all("half" in load["name"] for load in loads)
 
 
+def test_two_unnamed_currents_of_one_angle_may_be_those_of_one_load(tmp_path):
+    """Two tracks, or a feeder's current that counts inward: how it is read as one load is said."""
+    V, I = single()
+    rows = [("U1", "kV", V), ("U2", "kV", -V), ("CH3", "kA", 0.6 * I), ("CH4", "kA", 0.4 * I)]
+    path = write(tmp_path, *rows)
+    loads, _, _ = loads_of(path)
+    assert len(loads) == 4  # each current at each of the opposite voltages
+    for load in loads:
+        assert "may be half" in load["name"]
+        [said] = [each for each in load["why"] if "counted the other way" in each]
+        assert "data.currents=[2,3] 'data.connection={name: autotransformer, feed" in said
+    connection = {"name": "autotransformer", "feeder": "inward"}
+    [dip] = tractexp.read(path, voltages=[0, 1], currents=[2, 3], connection=connection)
+    assert dip.P0 * dip.record.base.power == pytest.approx(12, rel=0.01)
+
+
 def test_one_current_at_the_voltage_between_both_conductors_may_be_half(tmp_path):
     V, I = single()
     [load], first, _ = loads_of(write(tmp_path, ("U T-F", "kV", 2 * V), ("I T", "kA", 0.6 * I)))
@@ -250,7 +266,7 @@ def test_a_fall_that_does_not_return_lasts_to_the_end(tmp_path):
     [event] = tractexp.look(write(tmp_path, *station(V, I)), progress=False).events
     assert event["kind"] == "dip"
     assert event["duration"] == pytest.approx(1.5, abs=0.05)
-    assert "the record ends before the voltage is back" in event["why"]
+    assert "what its end would tell stays open" in event["why"]
 
 
 def test_what_is_too_slow_for_waveforms_is_not_examined(tmp_path):

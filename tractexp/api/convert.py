@@ -217,6 +217,7 @@ class Convert(Task, call=convert, given=("sources", "folder", "settings")):
     """
 
     reads = ("data",)
+    leaves_alone = ("model",)
     instead = {"model": "a conversion has no model"}
 
     # parquet (where none is named), csv (both with a sidecar in JSON), comtrade (.cfg and .dat),

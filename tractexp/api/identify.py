@@ -705,10 +705,12 @@ def _conclude_identification(
     from tractexp.identification.advice import advise
     from tractexp.identification.agreement import compare_events
     from tractexp.identification.grade import grade_estimate, grade_model
+    from tractexp.identification.load_drift import with_load_drift
     from tractexp.identification.physical import find_free_optimum, say_ranges
     from tractexp.identification.profile import check_by_profiles
     from tractexp.identification.rivals import with_rivals
     from tractexp.identification.share import find_share_bound
+    from tractexp.identification.unfinished import with_unfinished
     from tractexp.identification.unrecorded import with_unrecorded
     from tractexp.identification.yardstick import yardstick
 
@@ -723,6 +725,7 @@ def _conclude_identification(
         )
         uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
     uncertainty = with_unrecorded(uncertainty, setup.frequency_swing)
+    uncertainty = with_unfinished(with_load_drift(uncertainty))
     uncertainty = say_ranges(uncertainty, setup.model.held)
     if not np.array_equal(uncertainty.values, graded.values):  # a profile led to a better optimum
         moved = replace(graded.estimation, uncertainty=uncertainty)

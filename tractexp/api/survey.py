@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.listed import Listed
+from tractexp.api.load_command import RACE
 from tractexp.api.surveying import (
     FEWEST_DIPS,
     complete_entries,
@@ -234,7 +235,8 @@ def survey(
     content["informative"] = files.plain(
         [{"event": c.name, "gain": c.gain, "half": c.half} for c in best]
     )
-    content["command"] = build_fit_command(str(folder), [c.name for c in best])
+    raced = propose_race(content["rows"], content["informative"]) if model is None else []
+    content["command"] = build_fit_command(str(folder), [c.name for c in best], *raced)
     return Surveyed(content)
 
 
@@ -242,6 +244,15 @@ def build_fit_command(folder: str, events: Sequence[str], *more: str) -> str:
     """The command that fits events of a folder together, with further settings."""
     reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
     return build_typed_command({"name": reader, "path": folder, "train": [*events]}, *more)
+
+
+def propose_race(
+    rows: Sequence[Mapping[str, Any]], chosen: Sequence[Mapping[str, Any]]
+) -> list[str]:
+    """The setting that races structures, where each of the chosen events' own commands has it."""
+    names = {each["event"] for each in chosen}
+    commands = [str(row["command"]).split() for row in rows if row.get("event") in names]
+    return [RACE] if all(RACE in words for words in commands) else []
 
 
 def _promise(row: Mapping[str, Any]) -> float:
@@ -303,6 +314,9 @@ class Survey(Task, call=survey, given=("folder", "keep")):
         model = [
             f"{key}={value}" for key, value in job.given.items() if key.partition(".")[0] == "model"
         ]
+        if "model" not in job.given:
+            chosen = propose_race(result.content["rows"], result.content["informative"])
+            model = [*chosen, *model]
         data = {"name": node["name"], "path": node["path"], "train": result.informative}
         return Surveyed({**result.content, "command": build_typed_command(data, *model)})
 

@@ -94,6 +94,8 @@ class Task(Plugin):
     resumes: ClassVar[bool] = False  # whether the same command goes on where it was stopped
     # what is chosen beside these is refused
     reads: ClassVar[tuple[str, ...]] = ("data", "model", *SEARCH)
+    # choices that a command may come with, of `look` for one, and that are left alone
+    leaves_alone: ClassVar[tuple[str, ...]] = ()
     # {setting it does not read: what to do, as the refusal's last words}
     instead: ClassVar[Mapping[str, str]] = {}
     function: ClassVar[Callable[..., Any] | None] = None

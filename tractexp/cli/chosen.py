@@ -28,7 +28,7 @@ def refuse_unread(task: Any, chosen: Mapping[str, str], needless: Collection[str
     does not read.
     """
     for key, value in chosen.items():
-        if not reads(task, key, needless):
+        if key not in task.leaves_alone and not reads(task, key, needless):
             instead = (
                 task.instead[part] for part in task.instead if _overlap(OF.get(key, key), part)
             )

@@ -335,8 +335,10 @@ def align_residuals(channels: np.ndarray, problem: Problem) -> np.ndarray:
         Of unit variance; n is the number of samples of the shortest event after its dip.
     """
     drive = problem.drive
+    finished = [e for e, event in enumerate(problem.events) if not event.unfinished]
     after = [
-        channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(problem.events)
+        channels[:, :, drive.part(e)][:, :, problem.events[e].end :]
+        for e in finished or range(len(problem.events))
     ]
     common = min(p.shape[2] for p in after)
     return sum(p[:, :, :common] for p in after) / np.sqrt(len(after))

@@ -30,7 +30,7 @@ class Event:
 
     Noise is the standard deviation about a straight line. `end` is the first sample after the dip,
     where the voltage has regained all but a fifth of the depth (or all but the threshold, if that
-    is more).
+    is more); the last sample of a record that is `unfinished`, as it ends in the dip.
     """
 
     domain: ClassVar[str] = "phasors"  # in which models are compared with it
@@ -48,6 +48,7 @@ class Event:
     steady: slice
     dips: int  # in the whole record
     swing: Swing | None = field(default=None, kw_only=True)  # of the load before the dip
+    unfinished: bool = field(default=False, kw_only=True)
 
     def __repr__(self) -> str:
         """The event in one sentence."""
@@ -150,8 +151,9 @@ def detect(record: Record) -> Event:
     Raises
     ------
     UserError
-        Where there is no dip, it does not end, or it comes too early. An interruption, an open pole
-        and a step are refused by their names, and so is a load that steps right before the dip.
+        Where there is no dip, the record ends right after its start, or it comes too early. An
+        interruption, an open pole and a step are refused by their names, and so is a load that
+        steps right before the dip.
     """
     dips, swells = falls(record.t, record.U)
     if not dips:
@@ -165,6 +167,7 @@ def detect(record: Record) -> Event:
         )
     if reason := no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {reason}")
+    unfinished, end = end == record.samples, min(end, record.samples - 1)
     usual = _steady(record, start, swells)
     before, notes = steady_part(record, usual, _least(record))
     if before.start > usual.start:  # what was before is another state, which is not fitted
@@ -181,6 +184,7 @@ def detect(record: Record) -> Event:
     U0, P0, Q0 = float(U.mean()), float(np.nanmean(P)), float(np.nanmean(Q))
     swing = find_swing(record, before)
     notes += [f"before the dip {swing}, which counts as noise"] if swing else []
+    notes += [_tell_unfinished(record, start)] if unfinished else []
     if notes := [*notes, *loss(record, end, complex(P0, Q0))]:
         record = replace(record, notes=tuple(dict.fromkeys([*record.notes, *notes])))
     record = until_change(record, start, end, complex(P0, Q0))
@@ -199,6 +203,15 @@ def detect(record: Record) -> Event:
         steady=before,
         dips=len(dips),
         swing=swing,
+        unfinished=unfinished,
+    )
+
+
+def _tell_unfinished(record: Record, start: int) -> str:
+    """That a record ends in its dip, whose recovery nothing can be told of."""
+    t, lasts = record.t, float(record.t[-1] - record.t[start])
+    return (
+        f"the record ends at t = {t[-1]:g} s, {lasts:.2g} s into the dip: it is fitted to its end"
     )
 
 

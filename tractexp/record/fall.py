@@ -124,8 +124,11 @@ def falls(
             sudden = find_sudden_change(U[start:end], within, margin * reference)
             if sudden is not None and start + sudden > slid:
                 slid = k = start + sudden
-                reference = measure_median(U[max(slid - within, start) : slid + 1])
+                reference = _follow_slide(U[start : slid + 1], within)
                 continue
+            if sudden is None and U[start:end].min() > (1 - 2 * margin) * reference:
+                k, reference = end, measure_median(U[max(end - within, start) : end + 1])
+                continue  # it slides on, and noise alone lifts it back over the threshold
         if dips and t[start] - t[dips[-1][1]] < MERGED:
             start = dips.pop()[0]
         dips.append((start, end))
@@ -134,6 +137,17 @@ def falls(
             reference = max(measure_median(U[end : end + n]) for n in (FEWEST_BEFORE, block))
         k = end
     return dips, swells
+
+
+def _follow_slide(U: np.ndarray, within: int) -> float:
+    """The level to which a voltage (N,) slid by its last sample, however little of a dip that takes
+    longer than `within` samples to begin it holds: by the course of what comes before.
+    """
+    parts = [U[max(len(U) - (k + 1) * within, 0) :][: within + 1] for k in (1, 2)]
+    if len(U) <= 2 * within:
+        return measure_median(U[-within - 1 :])
+    late, early = (measure_median(part) for part in parts)
+    return late + 1.5 * min(late - early, 0.0)
 
 
 def find_sudden_change(x: np.ndarray, within: int, least: float) -> int | None:

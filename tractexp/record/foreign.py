@@ -8,7 +8,13 @@ COMPANION = (
 ARCHIVE = "an archive: unpack it, or pack it as .zip, which is read as it is"
 DOCUMENT = "a document: give the record's data"
 RECORDER = "a recorder's own format: export it as COMTRADE or CSV with the recorder's software"
+RESULT = (
+    "no record: where a run wrote it, 'tractexp again FOLDER' runs it with other settings on top,"
+    " 'tractexp task=simulate task.parameters=FOLDER/result.json' plays its load, and in Python"
+    " tractexp.load('FOLDER') opens it"
+)
 FOREIGN = {
+    ".json": RESULT,
     ".hdr": COMPANION,
     ".inf": COMPANION,
     ".dmf": COMPANION,
@@ -57,4 +63,5 @@ def is_record(path: str | Path) -> bool:
     """Whether a foreign ending is that of a record, which somebody who gives its folder expects to
     be read.
     """
-    return FOREIGN.get(Path(path).suffix.lower(), COMPANION) not in (COMPANION, ARCHIVE, DOCUMENT)
+    no_record = COMPANION, ARCHIVE, DOCUMENT, RESULT
+    return FOREIGN.get(Path(path).suffix.lower(), COMPANION) not in no_record

@@ -14,6 +14,7 @@ UNCLEARED = 1.5  # s: back-up protection clears a fault within about a second
 SAME_CURRENT = 0.05
 LARGEST_TAP_STEP = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
 STEP_LASTS = 0.3  # s of a new level before it is one
+UNFINISHED = 0.1  # s: a record that ends sooner in a dip shows no answer of the load
 # Hz, samples: a dip of fewer samples at a lower rate shows no response
 COARSE, FEWEST_INSIDE = 20.0, 5
 
@@ -50,8 +51,8 @@ def no_such_dip(record: Record, start: int, end: int) -> str:
                 f" {np.count_nonzero(unbalanced) * record.step:.2g} s {when}, longer than a fault"
                 " lasts: one pole is open, which is no dip of all phases; choose another event"
             )
-    if end == len(U):
-        return _explain_unfinished_fall(record, start, before)
+    if end == len(U) and (reason := _explain_unfinished_fall(record, start, before)):
+        return reason
     if record.rate < COARSE and end - start < FEWEST_INSIDE:
         return (
             f"the dip {when} has {end - start} samples at {record.rate:.3g} Hz: too coarse to show"
@@ -89,7 +90,9 @@ def _current_stays(record: Record, start: int, end: int) -> bool:
 
 
 def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
-    """The reason against a fall that lasts to the record's end."""
+    """The reason against a fall that lasts to the record's end; "" where the load's answer in it is
+    recorded.
+    """
     t, U = record.t, record.U
     fall = 1 - float(np.median(U[start:])) / before
     level = np.abs(U[start:] / float(np.median(U[start:])) - 1) <= margin_of(U)
@@ -100,10 +103,12 @@ def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
             f" {lasts:.2g} s that remain: a step (a tap changer, or something switched), no dip;"
             " choose another event"
         )
+    if lasts >= UNFINISHED and len(U) - start >= FEWEST_BEFORE:
+        return ""
     return (
         f"the record is shorter than the dip: it ends at t = {t[-1]:g} s with U = {U[-1]:.3g} where"
-        f" it was {before:.3g} before the dip of t = {t[start]:g} s; give a record that shows the"
-        " recovery"
+        f" it was {before:.3g} before the dip of t = {t[start]:g} s; give a record that shows"
+        f" {1000 * UNFINISHED:g} ms of the dip, better its recovery"
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from tractexp.record.direction import direction
 from tractexp.record.fall import FEWEST_BEFORE, REFERENCE, SHALLOWEST
+from tractexp.record.no_dip import UNFINISHED
 from tractexp.recording.event_kind import CARRIES, find_clean_currents
 from tractexp.recording.excursion import DEAD_VOLTAGE_SHARE, LEAVES_PHASE, Excursion
 from tractexp.recording.trace import Trace
@@ -98,7 +99,8 @@ def judge_worth(
         return False, f"{size}, but only {1000 * lead:.0f} ms of steady state come before it"
     if not e.cleared:
         return False, f"{size}, but it ends in an open pole, not in the voltage before it"
-    if not e.returned:
+    lasts = (min(e.end, len(trace.t)) - e.start) * trace.step
+    if not e.returned and (e.end < len(trace.t) or lasts < UNFINISHED):
         return False, f"{size}, but the record ends before the voltage is back"
     if depth < SHALLOWEST:
         return False, f"{size}: too little to separate a load's answer from its noise"
@@ -109,6 +111,9 @@ def judge_worth(
         if lead < REFERENCE
         else ""
     )
+    if not e.returned:
+        until = f"{lead:.2g} s before it and {lasts:.2g} s of it are recorded, and no recovery"
+        return True, f"{size}, {until}: what its end would tell stays open{short}"
     return True, f"{size}, {lead:.2g} s before it and the recovery are recorded{short}"
 
 

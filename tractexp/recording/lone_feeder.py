@@ -23,6 +23,7 @@ from tractexp.recording.railway import (
     is_return,
     opposite_pairs,
     other_conductor,
+    unnamed_conductor,
 )
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots
@@ -144,8 +145,7 @@ def _part_of_railway(
     pure = [i for i in volts if i != voltage and phasors.pure(i)]
     opposite = next((i for i in pure if is_opposite(phasors, voltage, i)), None)
     if opposite is not None:
-        name = list_names(recording, [opposite])
-        return (f"{HALF}: no current goes with the other voltage, {name}",)
+        return (_half_at(recording, phasors, (voltage, opposite), current, amps),)
     other = other_conductor(recording, phasors, current, [i for i in amps if phasors.pure(i)])
     if other is not None:
         name = list_names(recording, [other])
@@ -156,6 +156,31 @@ def _part_of_railway(
             " and negative feeder of such ones, and the current of one is recorded",
         )
     return ()
+
+
+def _half_at(
+    recording: Recording,
+    phasors: Snapshots,
+    volts: tuple[int, int],
+    current: int,
+    amps: Sequence[int],
+) -> str:
+    """That a current is half of a load at two opposite voltages; where no name tells the conductors
+    of two currents of one angle, that it may be, and how both are read as one load.
+    """
+    lacks = f"no current goes with the other voltage, {list_names(recording, volts[1:])}"
+    pure = [i for i in amps if phasors.pure(i)]
+    other = unnamed_conductor(recording, phasors, current, pure)
+    connection = usual(2, 2)
+    if other is None or not isinstance(connection, str):
+        return f"{HALF}: {lacks}"
+    currents = sorted((current, other))
+    return (
+        f"{MAYBE_HALF}: {lacks}; if {list_names(recording, [other])} is that of the other"
+        " conductor, counted the other way, both are one load:"
+        f" data.voltages=[{volts[0]},{volts[1]}] data.currents=[{currents[0]},{currents[1]}]"
+        f" 'data.connection={{name: {connection}, feeder: inward}}'"
+    )
 
 
 def _part_of_phases(

@@ -137,6 +137,19 @@ def other_conductor(
     return None
 
 
+def unnamed_conductor(
+    recording: Recording, phasors: Snapshots, current: int, amps: Sequence[int]
+) -> int | None:
+    """The only other current, of the same angle, where no name tells their conductors; else
+    None.
+    """
+    names = " ".join(plain(recording.channels[i].name) for i in amps)
+    others = [i for i in amps if i != current]
+    if len(others) != 1 or FEED.search(names) or CONTACT.search(names):
+        return None
+    return others[0] if _opposite_angles(phasors, (current, others[0]), -1.0) else None
+
+
 def is_return(recording: Recording, number: int) -> bool:
     """Whether the name of a current says that it is that of a return conductor or of the rail.
 
