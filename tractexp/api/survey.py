@@ -251,8 +251,11 @@ def propose_race(
 ) -> list[str]:
     """The setting that races structures, where each of the chosen events' own commands has it."""
     names = {each["event"] for each in chosen}
-    commands = [str(row["command"]).split() for row in rows if row.get("event") in names]
-    return [RACE] if all(RACE in words for words in commands) else []
+    for row in rows:
+        words = str(row["command"]).split()
+        if row.get("event") in names and RACE not in words:
+            return []
+    return [RACE]
 
 
 def _promise(row: Mapping[str, Any]) -> float:

@@ -26,15 +26,19 @@ def with_unfinished(uncertainty: Uncertainty) -> Uncertainty:
     parameter that is not identified, and would be with it.
     """
     problem = uncertainty.likelihood.problem
-    if problem.per_event or not all(event.unfinished for event in problem.events):
+    all_end_inside = all(event.unfinished for event in problem.events)
+    if problem.per_event or not all_end_inside:
         return uncertainty
-    half = _forecast_recovery(uncertainty, max(problem.events, key=lambda event: event.depth))
+    deepest = max(problem.events, key=lambda event: event.depth)
+    halves = _forecast_recovery(uncertainty, deepest)
     verdicts = dict(uncertainty.verdicts)
     for j, name in enumerate(uncertainty.names):
-        value, bounds = uncertainty.values[j], (uncertainty.lower[j], uncertainty.upper[j])
-        known = half[j] <= IDENTIFIED_SHARE * size(value, *bounds)
-        if known and verdicts[name].word in (WEAK, UNIDENTIFIED):
-            told = format_half_width(value, half[j], *bounds)
+        value = uncertainty.values[j]
+        low = uncertainty.lower[j]
+        high = uncertainty.upper[j]
+        would_be_known = halves[j] <= IDENTIFIED_SHARE * size(value, low, high)
+        if would_be_known and verdicts[name].word in (WEAK, UNIDENTIFIED):
+            told = format_half_width(value, halves[j], low, high)
             why = f"the record ends in the dip: with the recovery it would be known to {told}"
             verdicts[name] = verdicts[name].add_objection(why)
     return replace(uncertainty, verdicts=verdicts)
@@ -44,8 +48,10 @@ def _forecast_recovery(uncertainty: Uncertainty, event: Event) -> np.ndarray:
     """Half intervals (d,) that the event would give if its recovery were recorded as well; inf
     where that cannot be planned.
     """
+    problem = uncertainty.likelihood.problem
     try:
         shape = DipShape.from_event(event)
-        return forecast(uncertainty.likelihood.problem, uncertainty.values, shape).half
+        planned = forecast(problem, uncertainty.values, shape)
+        return planned.half
     except UserError:  # this model or these values cannot be planned with
         return np.full(len(uncertainty.names), np.inf)

@@ -167,7 +167,8 @@ def detect(record: Record) -> Event:
         )
     if reason := no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {reason}")
-    unfinished, end = end == record.samples, min(end, record.samples - 1)
+    unfinished = end == record.samples
+    end = min(end, record.samples - 1)
     usual = _steady(record, start, swells)
     before, notes = steady_part(record, usual, _least(record))
     if before.start > usual.start:  # what was before is another state, which is not fitted
@@ -209,7 +210,8 @@ def detect(record: Record) -> Event:
 
 def _tell_unfinished(record: Record, start: int) -> str:
     """That a record ends in its dip, whose recovery nothing can be told of."""
-    t, lasts = record.t, float(record.t[-1] - record.t[start])
+    t = record.t
+    lasts = float(t[-1] - t[start])
     return (
         f"the record ends at t = {t[-1]:g} s, {lasts:.2g} s into the dip: it is fitted to its end"
     )

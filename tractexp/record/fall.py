@@ -126,9 +126,13 @@ def falls(
                 slid = k = start + sudden
                 reference = _follow_slide(U[start : slid + 1], within)
                 continue
-            if sudden is None and U[start:end].min() > (1 - 2 * margin) * reference:
-                k, reference = end, measure_median(U[max(end - within, start) : end + 1])
-                continue  # it slides on, and noise alone lifts it back over the threshold
+            # it slides on, and noise alone lifts it back over the threshold
+            deepest = (1 - 2 * margin) * reference
+            if sudden is None and U[start:end].min() > deepest:
+                late = max(end - within, start)
+                reference = measure_median(U[late : end + 1])
+                k = end
+                continue
         if dips and t[start] - t[dips[-1][1]] < MERGED:
             start = dips.pop()[0]
         dips.append((start, end))
@@ -143,11 +147,14 @@ def _follow_slide(U: np.ndarray, within: int) -> float:
     """The level to which a voltage (N,) slid by its last sample, however little of a dip that takes
     longer than `within` samples to begin it holds: by the course of what comes before.
     """
-    parts = [U[max(len(U) - (k + 1) * within, 0) :][: within + 1] for k in (1, 2)]
     if len(U) <= 2 * within:
         return measure_median(U[-within - 1 :])
-    late, early = (measure_median(part) for part in parts)
-    return late + 1.5 * min(late - early, 0.0)
+    stop = len(U) - within + 1
+    late = measure_median(U[max(stop - within - 1, 0) : stop])
+    stop -= within
+    early = measure_median(U[max(stop - within - 1, 0) : stop])
+    fall = min(late - early, 0.0)
+    return late + 1.5 * fall
 
 
 def find_sudden_change(x: np.ndarray, within: int, least: float) -> int | None:

@@ -99,8 +99,10 @@ def judge_worth(
         return False, f"{size}, but only {1000 * lead:.0f} ms of steady state come before it"
     if not e.cleared:
         return False, f"{size}, but it ends in an open pole, not in the voltage before it"
-    lasts = (min(e.end, len(trace.t)) - e.start) * trace.step
-    if not e.returned and (e.end < len(trace.t) or lasts < UNFINISHED):
+    stop = min(e.end, len(trace.t))
+    lasts = (stop - e.start) * trace.step
+    unfinished = stop == len(trace.t) and lasts >= UNFINISHED
+    if not (e.returned or unfinished):
         return False, f"{size}, but the record ends before the voltage is back"
     if depth < SHALLOWEST:
         return False, f"{size}: too little to separate a load's answer from its noise"

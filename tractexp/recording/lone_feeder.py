@@ -174,11 +174,12 @@ def _half_at(
     connection = usual(2, 2)
     if other is None or not isinstance(connection, str):
         return f"{HALF}: {lacks}"
-    currents = sorted((current, other))
+    first, second = sorted((current, other))
+    name = list_names(recording, [other])
     return (
-        f"{MAYBE_HALF}: {lacks}; if {list_names(recording, [other])} is that of the other"
+        f"{MAYBE_HALF}: {lacks}; if {name} is that of the other"
         " conductor, counted the other way, both are one load:"
-        f" data.voltages=[{volts[0]},{volts[1]}] data.currents=[{currents[0]},{currents[1]}]"
+        f" data.voltages=[{volts[0]},{volts[1]}] data.currents=[{first},{second}]"
         f" 'data.connection={{name: {connection}, feeder: inward}}'"
     )
 
