@@ -127,4 +127,4 @@ def test_a_row_of_csv_keeps_the_name_in_its_cell(name):
 )
 def test_a_word_for_both_shells_of_windows(word, quoted):
     """As the C runtime of Windows reads its command line: 2n backslashes before a quote are n."""
-    assert quoting.windows_shell("tractexp", word) == f"tractexp {quoted}"
+    assert quoting.quote_for_windows(word) == quoted

@@ -155,7 +155,7 @@ def comment(text: str) -> str:
 
 def shell(*words: str) -> str:
     """A command as a shell of this system takes it."""
-    quote = _quote_for_windows if os.name == "nt" else _quote_for_posix
+    quote = quote_for_windows if os.name == "nt" else _quote_for_posix
     return " ".join(map(quote, words))
 
 
@@ -164,17 +164,13 @@ def _quote_for_posix(word: str) -> str:
     return f'"{word}"' if "'" in word and not DOUBLE_UNSAFE.search(word) else shlex.quote(word)
 
 
-def windows_shell(*words: str) -> str:
-    """A command as cmd.exe and PowerShell take it, both: single quotes are letters to the one, and
-    a comma ends a word for the other.
+def quote_for_windows(word: str) -> str:
+    """A word as cmd.exe and PowerShell take it, both: single quotes are letters to the one, and a
+    comma ends a word for the other.
 
     A backslash is one but before a quote. What cmd.exe puts in for %NAME%, and PowerShell for
     $NAME, no quotes of both keep from that.
     """
-    return " ".join(map(_quote_for_windows, words))
-
-
-def _quote_for_windows(word: str) -> str:
     if WINDOWS_WORD.fullmatch(word):
         return word
     escaped = re.sub(r'(\\*)"', r'\1\1\\"', word)
