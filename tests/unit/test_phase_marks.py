@@ -10,7 +10,8 @@ import pytest
 
 import tractexp
 from tractexp.filetypes import comtrade
-from tractexp.filetypes.columns import order_of, role, split_unit
+from tractexp.filetypes.column_unit import split_unit
+from tractexp.filetypes.columns import order_of, role
 from tractexp.recording import Channel, Recording, Segment
 
 ORDERS = ["ABC", "RST", "RYB", "RWB", "UVW", ("L1", "L2", "L3"), "АВС"]

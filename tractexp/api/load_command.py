@@ -6,7 +6,8 @@ from typing import Any
 from tractexp.configuration import plugin
 from tractexp.configuration.overrides import build_typed_command
 from tractexp.record.wave_event import COARSEST, describe_smearing
-from tractexp.recording.overview import Sight, View
+from tractexp.recording.overview import View
+from tractexp.recording.sight import Sight
 
 RACE = "model=auto"  # what a load of the field is made of nobody knows: structures are raced
 # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves

@@ -19,7 +19,8 @@ from tractexp.errors import UserError
 from tractexp.outcome import Written
 from tractexp.record import Event, Record
 from tractexp.recording.event_views import join_event, propose_joining
-from tractexp.recording.overview import Sight, View, sight_of, view_of
+from tractexp.recording.overview import View, sight_of, view_of
+from tractexp.recording.sight import Sight
 from tractexp.storage import files, time_limit
 from tractexp.text.progress import Progress, tell_stages
 from tractexp.text.wording import count_noun

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from tractexp.api.load_command import build_load_command
-from tractexp.recording.overview import LoadEvent, Sight, View
+from tractexp.recording.overview import View
 from tractexp.recording.quality import describe_clipped
 from tractexp.recording.railway import DIRECT, describe_direct_beside, direct_voltage
 from tractexp.recording.recording import unit_of
+from tractexp.recording.sight import LoadEvent, Sight
 from tractexp.recording.unrecognized import can_be_named, explain_unrecognized
 
 NAME_THEM = "name the channels of one load: voltages=[...] currents=[...]"

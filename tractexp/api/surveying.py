@@ -17,7 +17,8 @@ from tractexp.errors import UserError
 from tractexp.process.workers import Workers
 from tractexp.recording import archive
 from tractexp.recording.event_views import list_within, propose_joining, shows_load
-from tractexp.recording.overview import LoadEvent, Sight, View
+from tractexp.recording.overview import View
+from tractexp.recording.sight import LoadEvent, Sight
 from tractexp.report.look import describe_dead_phases
 from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
 from tractexp.storage import files, time_limit

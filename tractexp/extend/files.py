@@ -5,9 +5,10 @@ a record.
 from tractexp.configuration.overrides import survey_of
 from tractexp.filetypes import cev, comtrade, pqdif, tidy
 from tractexp.filetypes.column_key import QUANTITIES
+from tractexp.filetypes.power_columns import Powers
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar
 from tractexp.filetypes.table import ENDINGS
-from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
+from tractexp.filetypes.tabulated import Tabular, kind_of, powers
 from tractexp.filetypes.tabulated_waves import recording
 from tractexp.filetypes.tidy import restore_recording
 from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, cut_dips, level, signs

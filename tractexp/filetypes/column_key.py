@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tractexp.errors import DATA, UserError, among, nearest, setting
-from tractexp.filetypes.columns import Role, fits, is_unit, role
+from tractexp.filetypes.column_unit import fits, is_unit
+from tractexp.filetypes.columns import Role, role
 from tractexp.filetypes.table import TableFile
 from tractexp.recording.unit import amount
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from tractexp.filetypes.clock import first_day, is_time
 from tractexp.filetypes.column_key import CONTRACT, PHASE_VOLTAGES, PHASES
-from tractexp.filetypes.columns import Role, meaning, order_of, role
+from tractexp.filetypes.column_unit import meaning
+from tractexp.filetypes.columns import Role, order_of, role
 from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.table import TableFile
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from tractexp.errors import DATA, UserError, nearest
 from tractexp.filetypes import timeline
-from tractexp.filetypes.comtrade_header import Analog, Header, parse
+from tractexp.filetypes.comtrade_header import parse
+from tractexp.filetypes.comtrade_lines import Analog, Header
 from tractexp.filetypes.comtrade_samples import NONE, ByteRange, Samples, read
 from tractexp.filetypes.comtrade_writer import write as write
 from tractexp.filetypes.remarks import Remarks

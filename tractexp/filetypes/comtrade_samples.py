@@ -14,7 +14,8 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_fields import number, quote_field
-from tractexp.filetypes.comtrade_header import VALUE, Header
+from tractexp.filetypes.comtrade_header import VALUE
+from tractexp.filetypes.comtrade_lines import Header
 from tractexp.filetypes.remarks import Remarks
 from tractexp.storage import files
 

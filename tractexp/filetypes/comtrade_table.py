@@ -9,8 +9,9 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.filetypes.columns import role, split_unit, unit_quantity
-from tractexp.filetypes.comtrade_header import Header
+from tractexp.filetypes.column_unit import split_unit, unit_quantity
+from tractexp.filetypes.columns import role
+from tractexp.filetypes.comtrade_lines import Header
 from tractexp.filetypes.table import Rows
 from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel
 

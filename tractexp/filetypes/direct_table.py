@@ -11,7 +11,8 @@ import numpy as np
 
 from tractexp.errors import DATA, UserError
 from tractexp.filetypes.column_key import PHASES
-from tractexp.filetypes.columns import Role, factor, role
+from tractexp.filetypes.column_unit import factor
+from tractexp.filetypes.columns import Role, role
 from tractexp.filetypes.mapping import map_times
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableFile

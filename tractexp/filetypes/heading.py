@@ -10,7 +10,7 @@ from typing import Any
 from tractexp.errors import UserError
 from tractexp.filetypes.cells import is_gap, is_grouped, is_plain_number
 from tractexp.filetypes.clock import is_date, is_time
-from tractexp.filetypes.columns import is_unit, split_unit
+from tractexp.filetypes.column_unit import is_unit, split_unit
 
 MOST_COLUMNS = 4096
 FEWEST_ALIKE_ROWS = 3  # rows of numbers of one length make sure that a table has begun

@@ -14,7 +14,7 @@ from tractexp.filetypes.column_key import (
     spell_key,
 )
 from tractexp.filetypes.column_options import MappedColumn, find_options, read_first_day
-from tractexp.filetypes.columns import fits, is_unit
+from tractexp.filetypes.column_unit import fits, is_unit
 from tractexp.filetypes.missing_column import describe_missing_columns
 from tractexp.filetypes.table import TableFile
 from tractexp.filetypes.table_kind import find_kind

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.errors import DATA, UserError
-from tractexp.filetypes.columns import factor
+from tractexp.filetypes.column_unit import factor
 from tractexp.filetypes.mapping import Mapped
 from tractexp.filetypes.table import TableColumn, TableFile
 

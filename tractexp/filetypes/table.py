@@ -15,7 +15,7 @@ import numpy as np
 from tractexp.errors import DATA, UserError, among, check_choice, nearest
 from tractexp.filetypes.cells import BadCell, find_group_mark, is_number, numbers
 from tractexp.filetypes.clock import is_time, times
-from tractexp.filetypes.columns import split_unit
+from tractexp.filetypes.column_unit import split_unit
 from tractexp.filetypes.heading import TableHeading, check_column_count, heading
 from tractexp.filetypes.reading_process import BadFile, ReadingProcess
 from tractexp.storage import files

@@ -24,7 +24,7 @@ from tractexp.filetypes.cells import (
     is_number,
 )
 from tractexp.filetypes.clock import is_time
-from tractexp.filetypes.columns import split_unit
+from tractexp.filetypes.column_unit import split_unit
 from tractexp.filetypes.heading import TableHeading, heading, is_value
 from tractexp.filetypes.table import TableColumn, TableFile, TableForm, column
 from tractexp.filetypes.text import MARKS, decode

@@ -7,8 +7,9 @@ from pathlib import Path
 from tractexp.errors import UserError, nearest
 from tractexp.record import Record
 from tractexp.recording.event_views import settings_of
-from tractexp.recording.overview import LoadEvent, Sight, View, view_of
+from tractexp.recording.overview import View, view_of
 from tractexp.recording.record_files import find_records
+from tractexp.recording.sight import LoadEvent, Sight
 from tractexp.storage import files, time_limit
 from tractexp.text.wording import count_noun
 

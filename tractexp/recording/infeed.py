@@ -13,7 +13,7 @@ from tractexp.recording.event_worth import NEGATIVE
 from tractexp.recording.kirchhoff import CLOSED_SUM
 
 if TYPE_CHECKING:
-    from tractexp.recording.overview import LoadEvent, Sight
+    from tractexp.recording.sight import LoadEvent, Sight
 
 # of what the others of a bus draw: what gives less may be a load, counted the other way
 LARGEST_LOAD_SHARE = 0.5

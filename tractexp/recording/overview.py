@@ -1,7 +1,7 @@
 """What a file holds, without any setting: its loads, the events of each, and what can be fitted."""
 
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
@@ -10,19 +10,21 @@ import numpy as np
 
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.record import Event, Record, detect, find_dips
+from tractexp.record import Record, find_dips
 from tractexp.record.dips import FileDip, check_load
 from tractexp.record.phasor import Phasors, join_phasors
 from tractexp.recording.arrangement import arrange_feeder
-from tractexp.recording.event_kind import OF_LOADS, find_dead_phases
+from tractexp.recording.event_kind import find_dead_phases
+from tractexp.recording.event_number import number_events
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.happening import FEWEST_HALF_CYCLES, Happening, happenings_in, happenings_of
+from tractexp.recording.happening import FEWEST_HALF_CYCLES, happenings_in, happenings_of
 from tractexp.recording.infeed import describe_directions
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.proposal import buses_alone, propose
 from tractexp.recording.quality import Quality, measure_stamp_jitter, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
+from tractexp.recording.sight import Sight
 from tractexp.recording.snapshot import network_frequency
 from tractexp.recording.trace import Trace, join_traces, of_waves
 from tractexp.recording.type_test import Course, TypeTest, find_type_test
@@ -31,7 +33,6 @@ from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
 TOO_SHORT = "fewer than four half cycles are measured: too few to tell what happened"
 LEAST_MEASURED_VOLTAGE = 0.5  # of the greatest voltage: at less the frequency is not measured
 LONGEST_UNSEEN = 0.1  # s of samples too slow for waveforms of which nothing is said
-LATEST_START = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
 
 
 @dataclass(frozen=True)
@@ -50,120 +51,6 @@ class _Bus:
         )
         first = self.phasors.setdefault(segment, measured)
         return replace(measured, t=first.t, V=first.V, f=first.f)
-
-
-@dataclass(frozen=True)
-class LoadEvent:
-    """One event of a load, and the record that a reader cuts out of it."""
-
-    what: Happening
-    dip: int | None = None  # its number in the reader
-    event: Event | None = None  # what would be fitted
-    why: str = ""  # what makes it (not) worth fitting, one sentence
-
-    @property
-    def worth(self) -> bool:
-        """Whether it is worth fitting, and a reader makes a record of it."""
-        return self.what.worth and self.event is not None
-
-
-def _select_before(changes: Sequence[Happening], phasors: Phasors) -> np.ndarray | slice:
-    """The phasors after the last change of a load before the first event that is none; the first
-    one where there are none.
-    """
-    loud = [what for what in changes if what.kind not in OF_LOADS]
-    stop = min((what.start for what in (loud or changes)[:1]), default=np.inf)
-    begin = max((what.end for what in changes if what.end < stop), default=-np.inf)
-    before = np.flatnonzero((phasors.t > begin) & (phasors.t < stop))
-    return before if len(before) else slice(0, 1)
-
-
-def _find_first_powers(record: Record) -> tuple[float, float, float]:
-    """Voltage [kV], P [MW] and Q [Mvar] at the beginning of a record; nan of what it has not."""
-    first = slice(0, max(1, record.samples // 20))
-    rows = (record.U[first], record.P[first], record.Q[first])
-    known = (row[np.isfinite(row)] for row in rows)
-    U, P, Q = (float(np.median(row)) if len(row) else float("nan") for row in known)
-    return U * record.base.voltage, P * record.base.power, Q * record.base.power
-
-
-@dataclass(frozen=True, eq=False)
-class Sight:
-    """One load that a file shows: its channels and their phasors by segment, or the record that the
-    file is.
-    """
-
-    name: str
-    events: tuple[LoadEvent, ...] = ()
-    feeder: Feeder | None = None
-    phasors: tuple[Phasors, ...] = ()
-    record: Record | None = None
-    # why nothing can be said of what happened to it, one sentence; "" where it was examined
-    unexamined: str = ""
-    dead_phases: str = ""  # of its voltages without any from first to last, in words
-    secondary: bool = False  # its values are secondary, of an unknown ratio: no kV, no MW
-    said: tuple[str, ...] = ()  # why parts of it could not be analysed, one sentence each
-    type_test: TypeTest | None = None  # what a motor's start or trip tells without a fit
-    # by which a reader reads it, without the dips
-    settings: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def is_loaded(self) -> bool:
-        """Whether it draws more than noise; a record does."""
-        return self.feeder is None or self.feeder.loaded
-
-    @property
-    def terminals(self) -> tuple[tuple[int, ...], Any] | None:
-        """The channels of its voltages and how they are connected; None of a record."""
-        return self.feeder and (self.feeder.voltages, self.feeder.connection)
-
-    @property
-    def has_powers(self) -> bool:
-        """Whether more than a voltage is known of it."""
-        if self.record is not None:
-            return bool(np.isfinite(self.record.P).any())
-        return self.feeder is not None and bool(self.feeder.currents)
-
-    @property
-    def dips(self) -> list[int]:
-        """The numbers of the dips that are worth fitting."""
-        return [s.dip for s in self.events if s.worth and s.dip is not None]
-
-    def choice(self) -> dict[str, Any] | None:
-        """The reader's settings that fit what is worth it, first dip first, others held out; None
-        where nothing is.
-        """
-        if not any(s.worth for s in self.events):
-            return None
-        return {
-            **self.settings,
-            **({"train": self.dips[:1], "validate": self.dips[1:]} if self.dips else {}),
-        }
-
-    @property
-    def per_unit(self) -> bool:
-        """Whether U, P and Q are per unit of an unknown base, not in kV, MW and Mvar."""
-        return self.record is not None and self.record.base.voltage == self.record.base.power == 1
-
-    def powers(self) -> tuple[float, float, float] | None:
-        """Voltage [kV], P [MW] and Q [Mvar] before the dip that is worth fitting, else before the
-        first event.
-
-        Of a load's own steps, what it draws after the last before that. None without measurements.
-        """
-        fitted = next((each.event for each in self.events if each.worth), None)
-        if fitted is not None:
-            base = fitted.record.base
-            return fitted.U0 * base.voltage, fitted.P0 * base.power, fitted.Q0 * base.power
-        if self.record is not None:
-            return _find_first_powers(self.record)
-        if not self.phasors:
-            return None
-        p = self.phasors[0]
-        before = _select_before([each.what for each in self.events], p)
-        if self.feeder is not None and not self.feeder.currents:
-            return float(np.median(p.U[before])), float("nan"), float("nan")
-        return tuple(float(np.median(v[before])) for v in (p.U, np.real(p.S), np.imag(p.S)))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True, eq=False)
@@ -395,7 +282,7 @@ def sight(
     dips, refused = [], ""
     if changes and feeder.currents:
         dips, refused = _cut_dips(reader, recording, feeder, phasors)
-    numbered = _number_events(changes, dips, reader.path, refused)
+    numbered = number_events(changes, dips, reader.path, refused)
     said += [TOO_SHORT] if brief and all(brief) else []
     unexamined = "; ".join(said) if not phasors or TOO_SHORT in said else ""
     if slow := _describe_slow_segments(recording) if events and phasors else "":
@@ -459,7 +346,7 @@ def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
         )
         for what in happenings_of(record)
     ]
-    numbered = list(_number_events(changes, _own(record) if dips is None else dips, record.source))
+    numbered = list(number_events(changes, _own(record) if dips is None else dips, record.source))
     if dips is None:
         numbered = [replace(each, dip=None) for each in numbered]
     course = Course.from_record(record)
@@ -482,63 +369,3 @@ def _own(record: Record) -> list[FileDip]:
         )
         for number, (a, b) in enumerate(find_dips(t, record.U), 1)
     ]
-
-
-def _number_events(
-    changes: Sequence[Happening], dips: Sequence[FileDip], source: str, refused: str = ""
-) -> Iterator[LoadEvent]:
-    """The events, each with the dip that the reader cuts out of it."""
-    results = {dip.number: dip.result for dip in dips}
-    for what, number in zip(changes, _numbers(changes, dips), strict=True):
-        event, why = _event(results.get(number) if number else None, refused)
-        if event is not None and abs(event.t_start - what.start) > LATEST_START:
-            why, event = _explain_start(event.t_start, what.start), None
-        yield LoadEvent(
-            what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: "))
-        )
-
-
-def _explain_start(start: float, fall: float) -> str:
-    """Why the dip that a reader cuts out [s] begins at another moment than the fall, one clause."""
-    when = "after" if start > fall else "before"
-    return (
-        f"what would be fitted begins {abs(start - fall):.2g} s {when} it: the voltage is not"
-        " steady before the dip, from which P0, Q0 and the depth are counted; choose another event"
-    )
-
-
-def _event(result: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
-    """The event of a record with what the detection noted of it, or why there is none."""
-    if not isinstance(result, Record):
-        return None, str(result or refused or "it is no dip")
-    try:
-        event = detect(result)
-        return event, "; ".join(note for note in event.record.notes if note not in result.notes)
-    except UserError as error:
-        return None, str(error)
-
-
-def _numbers(changes: Sequence[Happening], dips: Sequence[FileDip]) -> list[int | None]:
-    """For each happening the dip, counted from 1, that shares more of its time with it than with
-    any other.
-    """
-    numbers: list[int | None] = [None] * len(changes)
-    for dip in dips:
-        # a cycle more on either side, for windows blur both
-        shared = [min(what.end, dip.end) - max(what.start, dip.start) + 0.02 for what in changes]
-        if shared and max(shared) > 0 and numbers[int(np.argmax(shared))] is None:
-            numbers[int(np.argmax(shared))] = dip.number
-    return numbers
-
-
-def _why(what: Happening, event: Event | None, refused: str) -> str:
-    """The reason why an event is (not) worth fitting: itself, or that it gives no record; and what
-    the detection noted.
-    """
-    if not what.worth:
-        return what.why
-    return (
-        f"{what.why}; {refused}".removesuffix("; ")
-        if event is not None
-        else f"it gives no record: {refused}"
-    )

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.blocks import Report, Table
-from tractexp.recording.overview import Sight, View
+from tractexp.recording.overview import View
+from tractexp.recording.sight import Sight
 from tractexp.report import unfitted
 from tractexp.report.look_charts import add_unassigned_channels, charts
 from tractexp.text.wording import as_sentence, change, count_noun, degrees, figure, share

@@ -15,9 +15,10 @@ from tractexp.blocks.style import PHASES as COLORS
 from tractexp.record.phasor import BLOCK
 from tractexp.recording import Channel, Feeder, Recording, Segment
 from tractexp.recording.measure import FeederWaves
-from tractexp.recording.overview import Sight, View
+from tractexp.recording.overview import View
 from tractexp.recording.quality import spectrum
 from tractexp.recording.recording import unit_of
+from tractexp.recording.sight import Sight
 from tractexp.recording.trace import half_cycle_rms
 from tractexp.text.wording import count_noun
 
