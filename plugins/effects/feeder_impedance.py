@@ -126,7 +126,7 @@ def _before_all(eq, R_f, X_f):
     drop_0 = (R_f + R_p) * before - R_p * in_reactance_0
 
     source = eq.recorded_voltage + R_p * in_reactance
-    inside, J, rest = _linear(eq, drop_0)
+    inside, J, rest = _linearize_current(eq)
     bus = _solve_voltage(eq, R_f + R_p, J, rest, source)
     v = _compute_complex_step(eq, "behind_feeder", bus, eq.U0 - drop_0)
     drop = eq.recorded_voltage - eq.v
@@ -144,9 +144,14 @@ def _before_all(eq, R_f, X_f):
     eq.lose(*eq.parts(lost))
 
 
-def _linear(eq, drop_0):
-    """Of waveforms: the state behind a capacitor's slope or None, and the current as J (x, y) +
-    rest, v = x + j y.
+def _linearize_current(eq):
+    """The current of waveforms as J (x, y) + rest of the voltage v = x + j y at the same instant.
+
+    Returns
+    -------
+    (state or None, J (2, 2), rest (2,))
+        The state makes the slope of the voltage that a capacitor asks for. Raises `Unfit` where the
+        current is not linear.
     """
     import sympy
     from sympy import I
@@ -157,14 +162,10 @@ def _linear(eq, drop_0):
         inside, rate = eq.lag_vector("feeder_drop", "w"), eq[sites.bus_voltage_rate]
         drop = eq.recorded_voltage - values[eq.v]
         values[rate] = eq.expression(sites.bus_voltage_rate) - (drop - inside) / DAMPED
-    reads = set(values)  # and what is written in it
-    while more := {
-        s for s, e in eq.definitions.items() if s not in reads and e.free_symbols & reads
-    }:
-        reads |= more
-    whole = eq.expand(eq.expression(sites.current), lambda s: s in reads and s not in values)
+    dependent = _list_dependent_quantities(eq, values)
+    current = eq.expand(eq.expression(sites.current), lambda s: s in dependent)
     eq.define("feeder_drawn", eq.expression(sites.current), "i")
-    parts = eq.parts(whole.xreplace(values))
+    parts = eq.parts(current.xreplace(values))
     J = [[sympy.diff(part, axis) for axis in (x, y)] for part in parts]
     if any(row.has(x, y) for rows in J for row in rows):
         raise Unfit("its current is not linear in the voltage at an instant")
@@ -177,6 +178,16 @@ def _linear(eq, drop_0):
         for r, row in zip("dq", J, strict=True)
     ]
     return inside, J, [eq.compute(f"feeder_{r}", e) for r, e in zip("dq", rest, strict=True)]
+
+
+def _list_dependent_quantities(eq, symbols):
+    """The quantities whose definitions hold some of the symbols, by way of others too."""
+    reached = set(symbols)
+    while more := {
+        s for s, e in eq.definitions.items() if s not in reached and e.free_symbols & reached
+    }:
+        reached |= more
+    return reached - set(symbols)
 
 
 def _solve_voltage(eq, R, J, rest, source):

@@ -19,6 +19,7 @@ def share_arrays(plain: dict[str, Any]) -> dict[str, Any]:
     exact = set[int]()
 
     def share(trace: dict[str, Any], key: str) -> Any:
+        """A reference to a packed array in place of the array; other values as they are."""
         value = trace[key]
         if not (isinstance(value, dict) and "bdata" in value):
             return value

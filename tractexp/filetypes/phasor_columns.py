@@ -34,20 +34,21 @@ def read_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     )
     V1, V2 = _sequences(V, voltages)
     I1, _ = _sequences(_join_phasors(values, currents, scale), currents)
-    sort: list[str] = []
+    wiring: list[str] = []
     if absolute:
-        V1, sort = _to_ground(mapping.columns[voltages[0]], V1)
+        V1, wiring = _to_ground(mapping.columns[voltages[0]], V1)
     elif voltages[0][1:] in LINES:  # per unit of a line voltage
         V1 = np.sqrt(3) * V1
         V2 = None if V2 is None else np.sqrt(3) * V2
-    size, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
+    # to line-to-line voltage and power of three phases; per unit both are as they stand
+    line, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
     S = three * V1 * I1.conj()
-    columns = {"t": values["t"], "U": size * np.abs(V1), "P": S.real, "Q": S.imag}
+    columns = {"t": values["t"], "U": line * np.abs(V1), "P": S.real, "Q": S.imag}
     source = "U, P, Q from phasors"
     if V2 is not None:
-        columns["U2"] = size * np.abs(V2)
+        columns["U2"] = line * np.abs(V2)
         source += ", positive sequence"
-    notes = [*mapping.notes, *note, *angle_notes, *turned, *sort, source]
+    notes = [*mapping.notes, *note, *angle_notes, *turned, *wiring, source]
     columns["U_angle"] = unwrap_angle(np.angle(V1))
     if "f" in values:
         is_whole = np.nanmedian(values["f"]) > nominal / 2  # else the deviation from nominal

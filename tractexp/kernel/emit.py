@@ -249,14 +249,14 @@ class _Emitter:
             self._scatter(signals, "%signals", f.integer("sub", i, self.begin), 1, len(signals))
 
     def _scatter(
-        self, values: Sequence[str], array: str, place: str, apart: object, count: int
+        self, values: Sequence[str], array: str, place: str, stride: object, count: int
     ) -> None:
-        """Lanes of values written side by side: those of sample k at the row `place` + k `apart` of
-        `count` each.
+        """Write lanes of values side by side: those of sample k into the row `place` + k `stride`
+        of an array of `count` values a row.
         """
         f = self.f
         for k in range(self.width):
-            row = f.integer("add", place, f.integer("mul", apart, k)) if k else place
+            row = f.integer("add", place, f.integer("mul", stride, k)) if k else place
             address = f.offset_address(array, f.integer("mul", row, count))
             for j, value in enumerate(values):
                 lane = self.lanes.lane(value, k)

@@ -89,12 +89,10 @@ def estimator_of(setting: str | Mapping[str, object] | None = None) -> Estimator
     """The estimator of a setting: a name, a mapping of name and settings, or None for the usual
     one.
     """
-    usual = (
-        name
-        for name, cls in sorted(discover()[Estimator.group].items())
-        if getattr(cls, "usual", False)
-    )
-    return chosen(Estimator.group, next(usual) if setting is None else setting)
+    if setting is None:
+        estimators = discover()[Estimator.group].items()
+        setting = min(name for name, cls in estimators if getattr(cls, "usual", False))
+    return chosen(Estimator.group, setting)
 
 
 def estimators(nominal: float) -> list[Estimator]:
