@@ -1,6 +1,11 @@
-"""Derivatives and normal equations that fall apart by event, with every entry written out."""
+"""Derivatives and normal equations that fall apart by event, with every entry written out; and what
+the printed equations give, solved once in a process.
+"""
+
+from functools import cache
 
 import numpy as np
+import uncertainty as study
 
 from tractexp.inference.separable import NormalMatrix, Sensitivities
 
@@ -26,3 +31,11 @@ def dense_normal(matrix: NormalMatrix) -> np.ndarray:
         entries[:, mine[:, None], at] = matrix.cross[:, e]
         entries[:, at[:, None], mine] = np.swapaxes(matrix.cross[:, e], 1, 2)
     return entries
+
+
+@cache
+def printed_dip(depth: float, truth: tuple[float, ...], Q_s0: float, P0: float = 1.0) -> np.ndarray:
+    """P and Q (2, N) of Eqs. (1)-(7) in a dip of this depth; another solution takes a second."""
+    clean = study.printed(np.array(truth), *study.Shape(depth).voltage(), Q_s0, P0)
+    clean.flags.writeable = False
+    return clean

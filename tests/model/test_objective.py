@@ -158,10 +158,13 @@ def contactors():
     return tractexp.read(str(folder / "contactors_50pct.csv"))
 
 
-def test_what_collapses_behind_an_impedance_asks_for_no_shorter_steps():
+def test_what_collapses_behind_an_impedance_asks_for_no_shorter_steps(monkeypatch):
     """Of feeders beside a load that recovers a few in the box collapse, and 256 steps a sample do
     not calculate them: an investigation that ended with both was refused at its grade.
     """
+    # fewer, since the search up to them takes its time
+    for module in ("model.model", "inference.problem"):
+        monkeypatch.setattr(f"tractexp.{module}.MOST_SUBSTEPS", 32)
     base = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
     names = ("exponential_recovery", "feeder_impedance")
     model = compose(*base, [get("effect", name)() for name in names])

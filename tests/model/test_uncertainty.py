@@ -11,7 +11,7 @@ import uncertainty as study
 from scipy import stats
 from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
-from written_out import dense, dense_normal
+from written_out import dense, dense_normal, printed_dip
 
 import tractexp
 from tractexp.identification import advice, agreement
@@ -43,7 +43,7 @@ def records(depths, deviation, seed=1, truth=study.TYPICAL, correlation=0.0, Q_s
     made = []
     for k, depth in enumerate(depths):
         t, U = study.Shape(depth).voltage()
-        clean = study.printed(truth, t, U, Q_s0)
+        clean = printed_dip(depth, tuple(truth), Q_s0)
         made.append(
             study.event(
                 t, U, clean + study.noise(rng, len(t), deviation, correlation), f"dip {k + 1}"
@@ -244,7 +244,7 @@ def test_without_static_load_its_exponent_means_nothing(model):
     truth = study.TYPICAL.copy()
     t, U = study.Shape(0.5).voltage()
     rng = np.random.default_rng(4)
-    power = study.printed(truth, t, U, 0.35, P0=truth[4]) + study.noise(rng, len(t), 0.002, 0.0)
+    power = printed_dip(0.5, tuple(truth), 0.35, truth[4]) + study.noise(rng, len(t), 0.002, 0.0)
     known = check_by_profiles(
         study.judged(Problem(model, [study.event(t, U, power)]), truth).uncertainty
     )
@@ -282,9 +282,9 @@ def test_another_valley_is_found_where_the_search_missed_it(model):
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
-    """30 records under two kinds of noise; the full study is benchmarks/uncertainty.py."""
+    """16 records under two kinds of noise; the full study is benchmarks/uncertainty.py."""
     inside, off = [], []
-    for seed in range(15):
+    for seed in range(8):
         for row in study.coverage_record(seed, ("white 0.2 %", "AR(1) 0.2 %")).values():
             inside.append(row["inside"])
             off.append(row["likely"])
@@ -310,7 +310,7 @@ def test_an_interval_that_reaches_past_the_bounds_says_so():
 
 
 def test_stator_transients_the_model_lacks_are_noticed():
-    assert all(study.independent_record(seed)["warned"] for seed in range(3))
+    assert study.independent_record(0)["warned"]
 
 
 def test_each_event_is_credited_and_the_one_that_does_not_belong_is_named(model):

@@ -836,6 +836,7 @@ def test_the_detection_limit_is_proportional_to_the_noise_and_rises_with_its_col
     assert colored != pytest.approx(double, rel=0.05)
 
 
+@pytest.mark.long
 def test_a_pair_s_joint_limit_is_where_no_single_effect_of_the_catalogue_could_take_it():
     """Two effects that nothing else resembles need what each needs alone; two that resemble each
     other need more.
@@ -906,6 +907,7 @@ def test_the_suites_hide_what_they_say():
         assert trial.case.effect is None
 
 
+@pytest.mark.long
 def test_an_imperfect_load_misses_what_is_asked_once_the_base_model_is_fitted():
     exact = Case(events=2)
     case = cases.imperfect(exact, 3, 0.01)
@@ -922,6 +924,7 @@ def test_an_imperfect_load_misses_what_is_asked_once_the_base_model_is_fitted():
     assert truth(named, 3)["imperfections"][0]["name"] == next(iter(IMPERFECTIONS))
 
 
+@pytest.mark.long
 def test_data_sets_of_the_field_differ_in_recorder_noise_and_error():
     made = made_of(cases.in_the_field("shunt_capacitor", 4.0, events=1), 3)
     assert {t.case.effect for t in made} == {("shunt_capacitor",)}
@@ -933,6 +936,7 @@ def test_data_sets_of_the_field_differ_in_recorder_noise_and_error():
     assert len(three.case.effect) == 3
 
 
+@pytest.mark.long
 def test_a_loud_data_set_has_a_load_that_no_model_fits_to_twenty_times_its_noise():
     """The effect leaves four times as much as the load's own error, or as much as there is room
     for.

@@ -356,6 +356,7 @@ def test_a_view_that_cannot_be_stored_opens_on_the_list_of_experiments(monkeypat
     )
 
 
+@pytest.mark.long  # a browser and a server of MLflow
 @pytest.mark.skipif(os.name == "nt", reason="ends the server by a signal")
 def test_the_page_opened_shows_the_comparison(filled, tmp_path):
     """In a real browser: what is promised of `tractexp ui`. The screenshot stays in outputs/."""

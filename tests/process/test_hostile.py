@@ -23,6 +23,10 @@ SECONDS = 20  # of one command, at most
 PLAIN = ("tracking.enabled=false", "hydra.run.dir=run")
 QUICK = ("optimizer=random_search", "budget=10", *PLAIN)
 TABLES = (".csv", ".xlsx", ".xls", ".ods", ".parquet")
+# of those that `look` and `identify` are given all, by whom the same readers are asked again
+BOOKS = ("cut.parquet", "lists.parquet", "far_cell_of_a_table.xlsx", "empty_zip.xlsx")
+# of those that `simulate` is given all: not to be read, incomplete, not to be simulated
+RESULTS = ("deep.json", "missing.json", "outside.json", "list_model.json", "no_before.json")
 # {name: how the names of the files begin or end that it is for, the arguments for one}
 COMMANDS = {
     "look": (
@@ -30,9 +34,9 @@ COMMANDS = {
         lambda name: ("look", f"./{name}"),
     ),
     "identify": (TABLES, lambda name: ("data=csv", f"data.train=[{name}]", *QUICK)),
-    "path": ((".parquet", ".xlsx"), lambda name: ("data=csv", f"data.path={name}", *QUICK)),
+    "path": (BOOKS, lambda name: ("data=csv", f"data.path={name}", *QUICK)),
     "waveforms": (
-        ("waves_", ".parquet", ".xlsx"),
+        ("waves_", *BOOKS),
         lambda name: ("data=waveforms", f"data.path={name}", *QUICK),
     ),
     "comtrade": (
@@ -41,17 +45,17 @@ COMMANDS = {
     ),
     "sel": ((".cev", "r.cfg"), lambda name: ("data=sel", f"data.path={name}", *QUICK)),
     "archive": (
-        ("r.csv", ".xlsx"),
+        ("r.csv", *BOOKS),
         lambda name: ("data=archive", "data.path=.", f"data.train=[{name}]", *QUICK),
     ),
     "convert": (
-        ("waves_", ".cfg", ".xlsx"),
+        ("waves_", ".cfg", *BOOKS),
         lambda name: ("task=convert", f"data.path={name}", *PLAIN),
     ),
     "simulate": ((".json",), lambda name: ("task=simulate", f"task.parameters={name}", *PLAIN)),
-    "export": ((".json",), lambda name: ("task=export", f"task.parameters={name}", *PLAIN)),
-    "rivals": ((".json",), lambda name: ("task=plan", f"task.rivals={name}", *PLAIN)),
-    "values": ((".json",), lambda name: ("task=plan", f"task.values={name}", *PLAIN)),
+    "export": (RESULTS, lambda name: ("task=export", f"task.parameters={name}", *PLAIN)),
+    "rivals": (RESULTS, lambda name: ("task=plan", f"task.rivals={name}", *PLAIN)),
+    "values": (RESULTS, lambda name: ("task=plan", f"task.values={name}", *PLAIN)),
 }
 FOLDERS = {
     "survey": (

@@ -9,7 +9,7 @@ if os.name == "nt":
     pytest.skip("forks", allow_module_level=True)
 
 
-@pytest.mark.parametrize("task", ["discrepancy", "export"])
+@pytest.mark.parametrize("task", ["plan", "export"])
 def test_who_kills_a_command_leaves_the_earlier_files_or_the_new_ones(task, tmp_path, monkeypatch):
     import kills
 

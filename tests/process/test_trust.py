@@ -61,7 +61,7 @@ COMMAND, MODULE = (
     ("start", "arguments"),
     [
         (COMMAND, ("data=csv", "data.train=[dip.csv]", *QUICK)),
-        (MODULE, ("data=csv", "data.train=[dip.csv]", *QUICK)),
+        (MODULE, ("data=csv", "data.train=[dip.csv]", *QUICK, "tracking.enabled=false")),
         (COMMAND, ("task=survey", "data.path=.", "tracking.enabled=false")),
     ],
     ids=["a run that is logged", "the same by python -m", "workers of a survey"],

@@ -6,7 +6,6 @@ fits the model that the last one ended with, it gives the same grade.
 """
 
 import json
-import os
 import re
 import shlex
 import tempfile
@@ -143,7 +142,10 @@ def test_commands_are_read_as_a_shell_reads_them():
     [
         "tractexp task=discrepancy data=contactors"
         " 'task.effects=[undervoltage_trip,stator_resistance]'",
-        "tractexp task=discrepancy data=tibet 'task.effects=[stator_transients]'",
+        pytest.param(
+            "tractexp task=discrepancy data=tibet 'task.effects=[stator_transients]'",
+            marks=pytest.mark.long,
+        ),
     ],
     ids=["contactors", "tibet"],
 )
@@ -155,13 +157,9 @@ def test_the_chain_of_a_shipped_record_ends(command, tmp_path):
 
 
 NOT_SEEN = "this chain was not seen to its end yet: three faults of it were mended on the way"
-# ten minutes and more each: whoever changes what a task hands on runs them
-long = pytest.mark.skipif(
-    not os.environ.get("TRACTEXP_LONG_CHAINS"), reason="long: set TRACTEXP_LONG_CHAINS=1"
-)
 
 
-@long
+@pytest.mark.long  # ten minutes and more each: whoever changes what a task hands on runs them
 @pytest.mark.xfail(strict=False, reason=NOT_SEEN)
 @pytest.mark.parametrize("load", [1, 2])
 def test_the_chain_of_a_station_ends(load, shared_data, tmp_path):
@@ -174,7 +172,7 @@ def test_the_chain_of_a_station_ends(load, shared_data, tmp_path):
     check_grades(follow(command, tmp_path))
 
 
-@long
+@pytest.mark.long
 @pytest.mark.xfail(strict=False, reason=NOT_SEEN)
 def test_the_chain_of_another_simulator_ends(shared_data, tmp_path):
     cases = shared_data.parent / "cases" / "andes"

@@ -146,8 +146,13 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     ("hidden", "size", "seed", "member"),
     [
         ("ramped_return", 2.0, 820034, "ramped_current"),
-        ("thermostat_recovery", 2.0, 820061, "thermostatic_load"),
-        ("link_voltage_control", 1.0, 820070, "limited_link"),
+        *(
+            pytest.param(*case, marks=pytest.mark.long)
+            for case in (
+                ("thermostat_recovery", 2.0, 820061, "thermostatic_load"),
+                ("link_voltage_control", 1.0, 820070, "limited_link"),
+            )
+        ),
     ],
 )
 def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, seed, member):
@@ -160,6 +165,7 @@ def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, see
     assert made.validate.explained_share > 0.9
 
 
+@pytest.mark.long
 def test_a_bounded_flux_is_a_saturation_with_a_round_corner():
     """How well one held-out event is met by a curve drawn beyond the fitted ones is chance: 0.9
     here.
@@ -265,6 +271,7 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
     assert [row.fit.names for row in find_adequate(evidence, Criteria())] == [("chosen",)]
 
 
+@pytest.mark.long
 def test_a_knee_saturation_is_named_by_its_family_though_the_textbook_is_far_behind_a_compensator():
     # 4 detection limits
     made = events("knee_saturation", 0.46, 312360453, count=4, noise=LOUD, recorder=FAST)
@@ -274,6 +281,7 @@ def test_a_knee_saturation_is_named_by_its_family_though_the_textbook_is_far_beh
     assert told.verdict.sets == (("saturation_curve",),)
 
 
+@pytest.mark.long
 def test_a_place_that_the_textbooks_trip_imitates_is_named_where_the_held_out_dip_denies_that():
     """That of the whole load leaves nothing of the fitted dips; of the held-out one only that of
     the motors does.
@@ -438,6 +446,7 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
     assert len(turns) == 1 + fit_effort.MOST_TURNS
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("no_proposal")
 def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leaves_no_doubt(
     monkeypatch,

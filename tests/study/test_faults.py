@@ -25,14 +25,12 @@ def test_the_stored_run_lost_nothing():
 
 @pytest.fixture(scope="module")
 def some(tmp_path_factory):
-    """Faults of a search at its result and after it, and the first of its logging, other ones than
-    are stored.
-    """
+    """Faults of a search at its result and the first of its logging; others are stored."""
     faults.ready()
     work, chance = tmp_path_factory.mktemp("faults"), random.Random(7)
-    of_search = faults.jobs(faults.made(work / "jobs"), chance, (faults.RESULT, faults.RESULT + 1))
+    of_search = faults.jobs(faults.made(work / "jobs"), chance, (faults.RESULT,))
     of_logging = faults.logging(faults.made(work / "logging"), chance)
-    return {"jobs": [*islice(of_search, 4)], "logging": [*islice(of_logging, 2)]}
+    return {"jobs": [*islice(of_search, 2)], "logging": [next(of_logging)]}
 
 
 def test_a_search_loses_no_result_that_it_had_and_a_log_no_run(some):
@@ -40,8 +38,7 @@ def test_a_search_loses_no_result_that_it_had_and_a_log_no_run(some):
         "jobs": [],
         "logging": [],
     }
-    assert ["kill -9" in fault["fault"] for fault in some["jobs"]] == [True, True, False, False]
-    assert len(some["logging"]) == 2
+    assert ["kill -9" in fault["fault"] for fault in some["jobs"]] == [True, False]
 
 
 def test_a_loss_would_be_seen(tmp_path):

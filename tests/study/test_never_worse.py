@@ -37,13 +37,19 @@ def hold(task: Task, data: Data) -> None:
         assert not worse, sentence
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", [pytest.param(SHIPPED[0], marks=pytest.mark.long), SHIPPED[1]])
 def test_on_shipped_records(name):
     task = Task("record", name, EXPONENTIAL)
     hold(task, model_error.data_of(task))
 
 
-@pytest.mark.parametrize("name", AT_HAND)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name == "xtz T1 phasors" else pytest.param(name, marks=pytest.mark.long)
+        for name in AT_HAND
+    ],
+)
 def test_on_records_at_hand(name, shared_data):
     task = Task("record", name, EXPONENTIAL)
     try:
@@ -58,12 +64,15 @@ def test_on_records_at_hand(name, shared_data):
 
 
 @pytest.mark.parametrize(
-    ("name", "size", "seed"), HIDDEN, ids=lambda value: value if isinstance(value, str) else ""
+    ("name", "size", "seed"),
+    [HIDDEN[0], pytest.param(*HIDDEN[1], marks=pytest.mark.long)],
+    ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_where_an_effect_is_hidden(name, size, seed):
     case = Case(effect=name, size=size, events=model_error.EVENTS)
     hold(Task("effect", name, EXPONENTIAL), model_error.events_of(case, seed))
 
 
+@pytest.mark.long
 def test_where_nothing_is_missing():
     hold(Task("null", "", EXPONENTIAL), model_error.events_of(Case(events=model_error.EVENTS), 1))

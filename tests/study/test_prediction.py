@@ -380,6 +380,7 @@ def test_all_is_told_by_the_records_own_noise_and_the_base_model_as_it_is_identi
         assert abs(e.value - alone.result.parameters[e.parameter.name]) < errors[e.parameter.name]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("no_proposal")
 def test_where_nothing_predicts_the_base_model_and_the_nearest_are_told_by_least_squares():
     """The trip is not among the effects that are tried."""
@@ -472,6 +473,7 @@ def test_without_held_out_events_nothing_incomplete_is_named():
     assert (found.verdict.word, found.verdict.complete) == ("unexplained", False)
 
 
+@pytest.mark.long
 def test_a_pair_that_the_fitted_events_reject_does_not_keep_its_right_member_from_its_name():
     """Of an inexact load a second effect patches something up; which one does so of the held-out
     event is chance.

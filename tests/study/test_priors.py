@@ -53,7 +53,7 @@ def test_a_load_as_loads_are_is_not_told_of_machines():
 
 
 @pytest.mark.skipif(not STATION.is_file(), reason="../shared/data is not here")
-@pytest.mark.parametrize("load", LOADS)
+@pytest.mark.parametrize("load", ["first", pytest.param("second", marks=pytest.mark.long)])
 def test_no_motor_of_a_real_station_is_beyond_its_load(load):
     """Held neither by priors nor by physical ranges the motor draws about three times the load, and
     the static part generates.
@@ -116,6 +116,7 @@ def test_an_investigation_without_priors_or_motor_has_no_such_rows():
     assert context.prior == 0.0
 
 
+@pytest.mark.long
 def test_the_base_model_of_an_investigation_is_that_of_an_identification_with_priors(no_proposal):
     dips, model = contactors(fixed={"C": 0.9}, bounds={"T_m": (0.1, 0.8)})
     alone = tractexp.identify(dips[:2], model, **QUICK)

@@ -250,6 +250,7 @@ def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     assert any("proposed_size_P" in line or "k_P" in line for line in model.latex())
 
 
+@pytest.mark.long
 def test_a_transformer_whose_ratio_steps_is_found_in_the_voltage_that_the_load_sees():
     """The motors answer it by a decaying swing of Q, which a term in the power alone fits worse."""
     made = events("tap_changer_step", 0.5)
@@ -262,7 +263,9 @@ def test_a_transformer_whose_ratio_steps_is_found_in_the_voltage_that_the_load_s
     assert [t.name for t, _ in found.tried].index(power) > 0
 
 
-@pytest.mark.parametrize(("seed", "measured"), [(800001, 0.6), (800002, 4.0)])
+@pytest.mark.parametrize(
+    ("seed", "measured"), [pytest.param(800001, 0.6, marks=pytest.mark.long), (800002, 4.0)]
+)
 def test_what_a_right_term_explains_does_not_hang_on_the_level_of_the_noise(seed, measured):
     """Of the deviance in excess of the noise, `measured` on the held-out event, the same step gains
     too little once, and once four times what there is.

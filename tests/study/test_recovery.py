@@ -25,7 +25,20 @@ def identified(number):
     return recovery.identified(recovery.CASES[number - 1])
 
 
-@pytest.mark.parametrize("case", recovery.CASES, ids=lambda case: f"{case.number:04d}")
+QUICK = (3, 6)  # one of each simulator; the others are searched in all that is long
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(
+            case,
+            id=f"{case.number:04d}",
+            marks=[] if case.number in QUICK else pytest.mark.long,
+        )
+        for case in recovery.CASES
+    ],
+)
 def test_the_parameters_of_a_case_are_recovered(case):
     skip_without(case.simulator)
     errors = recovery.errors(case, identified(case.number))

@@ -93,15 +93,15 @@ def test_the_loudest_comes_first_and_each_is_taken_away_before_the_next(made):
 
 def test_noise_has_no_shape_white_or_colored(made):
     """At a false-alarm rate of 5 %, one in twelve at most in nearly all draws."""
-    assert sum(bool(found(made, noise_of(made, seed))) for seed in range(10, 16)) <= 1
+    assert sum(bool(found(made, noise_of(made, seed))) for seed in range(10, 13)) <= 1
     color = Autoregression(np.array([[0.0], [0.9]]), np.array([1.0, np.sqrt(1 - 0.81)]))
     colored = Noise(((color, color),))
     lengths = [event.record.samples for event in made]
     spoken = 0
-    for seed in range(6):
+    for seed in range(3):
         drawn = LEVEL * colored.draw(np.random.default_rng(seed), 1, lengths)[0]
         spoken += bool(found(made, drawn))
-    assert spoken <= 2
+    assert spoken <= 1
     assert (
         len(found(made, 20 * LEVEL * np.random.default_rng(5).standard_normal((2, sum(lengths)))))
         <= MOST_SHAPES

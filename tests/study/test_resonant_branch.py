@@ -67,6 +67,7 @@ def test_a_planted_branch_is_found():
     assert left[0] < 0.2 * left[1]
 
 
+@pytest.mark.long
 def test_where_nothing_rings_none_is_found():
     fit = tractexp.identify(beside(), tractexp.compose(**MODEL, **FINE), **QUICK)
     low, high = fit.parameters["resonant_susceptance"].interval

@@ -17,7 +17,14 @@ STORED = json.loads(scale.STORED.read_text(encoding="utf-8"))
 FASTEST = 1.15  # slope that is still called linear
 
 
-@pytest.mark.parametrize(("case", "size"), [("look", 6000), ("survey", 3), ("sweep", 2)])
+@pytest.mark.parametrize(
+    ("case", "size"),
+    [
+        ("look", 6000),
+        pytest.param("survey", 3, marks=pytest.mark.long),
+        pytest.param("sweep", 2, marks=pytest.mark.long),
+    ],
+)
 def test_a_case_runs_and_says_what_it_took(case, size):
     spent = scale.CASES[case].measure(size)
     assert spent.cpu > 0

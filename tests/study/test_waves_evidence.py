@@ -215,6 +215,7 @@ def test_parameters_lie_within_their_intervals_and_the_model_is_adequate(row):
     assert abs(row["off"]["X_prime"]) < 0.02
 
 
+@pytest.mark.long
 def test_without_noise_little_but_interpolation_is_left():
     case, _ = waves.drawn_events([1, 3])
     still = replace(case, sampler=replace(case.sampler, noise=0.0, bits=None, offsets=(0.0,) * 6))
@@ -245,6 +246,7 @@ def test_what_is_recorded_reaches_the_event_through_the_product():
     assert event.noise_U == pytest.approx(floor, rel=0.15)
 
 
+@pytest.mark.long
 def test_nothing_is_named_where_nothing_is_hidden():
     """That what is hidden is named stands in test_wave_discrepancy."""
     nothing = waves_hidden.HIDDEN[0]

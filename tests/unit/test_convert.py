@@ -160,7 +160,7 @@ class TestTables:
         np.testing.assert_array_equal(made.extra["stamps"], recording.extra["stamps"])
         assert made.extra["stamps"].dtype == "<u4"
 
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=8, deadline=None)
     @given(data=st.data())
     def test_whatever_the_numbers_and_names(self, tmp_path_factory, ending, data):
         n = data.draw(st.integers(2, 30))
