@@ -83,6 +83,7 @@ def test_a_second_package_is_in_the_help_and_checked_like_ours(acme, tmp_path):
     assert done.stderr == "tractexp: optimizer.tries=0 is out of range: it must be at least 1\n"
 
 
+@pytest.mark.long
 def test_a_second_package_keeps_the_contracts_by_one_line(acme, tmp_path):
     passed(acme / "test_acme.py", acme, tmp_path)
 

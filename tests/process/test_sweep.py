@@ -360,6 +360,7 @@ def test_another_sweeper_finds_a_folder_held_or_another_sweeps(launcher, tmp_pat
     from tractexp.storage.run_folder import hold
 
     others = ("hydra/sweeper=basic", f"hydra/launcher={launcher}", "tracking.enabled=false", HERE)
+    others += () if launcher == "basic" else (ONE,)
     held = tmp_path / "sweep" / ("0" if launcher == "basic" else "")
     with hold(held):
         done = run_command("-m", *QUICK, *others, "optimizer=pso", "seed=1", cwd=tmp_path)
@@ -379,7 +380,8 @@ def test_another_sweeper_finds_a_folder_held_or_another_sweeps(launcher, tmp_pat
 
 def test_failing_jobs_are_isolated_listed_and_change_the_exit_code(site, tmp_path, uri):
     seeds = (2, 1)
-    sweep = ("-m", "budget=200", PLAIN, "optimizer=stumbles,pso", "seed=2,1", HERE)
+    # one after the other: of workers side by side the test of a killed one tells it
+    sweep = ("-m", "budget=200", PLAIN, ONE, "optimizer=stumbles,pso", "seed=2,1", HERE)
     done = tractexp(*sweep, cwd=tmp_path, site=site)
     ends = statuses(tmp_path / "sweep")
     failed = {n for n, end in ends.items() if end["status"] == "failed"}
@@ -400,7 +402,7 @@ def test_failing_jobs_are_isolated_listed_and_change_the_exit_code(site, tmp_pat
     parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
     assert ask(tmp_path, f"select status from runs where run_uuid = '{parent}'") == [("FAILED",)]
 
-    again = tractexp(*sweep, ONE, cwd=tmp_path, site=site)
+    again = tractexp(*sweep, cwd=tmp_path, site=site)
     assert "3 of them are finished and kept" in again.stdout
     assert json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"] == parent
     assert len(ask(tmp_path, "select run_uuid from runs")) == 1 + 3

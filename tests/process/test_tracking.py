@@ -543,6 +543,7 @@ driven.Q.tolist()]))
 '''
 
 
+@pytest.mark.long
 def test_the_model_predicts_in_another_process_by_either_address(tmp_path, uri):
     (tmp_path / "result.json").write_text('{"share": 0.8}')
     run_id = tracking.log(TrackedRun("e", "r", model=tmp_path / "result.json"), uri)

@@ -305,7 +305,8 @@ def test_waveforms_are_rebased_with_their_record(tmp_path):
 def test_an_export_is_on_either_base(fits, form):
     fit, ratio = fits[5.04], fits[5.04].result.base.ratio
     own, file = (
-        tractexp.export(fit, form, base=base, power=SYSTEM, voltage=230) for base in ("own", "file")
+        tractexp.export(fit, form, base=base, power=SYSTEM, voltage=230, playback=False)
+        for base in ("own", "file")
     )
     assert f"per unit of {SYSTEM * ratio:.6g} MVA and 230 kV, the record's own base" in own.notes
     assert "per unit of 100 MVA and 230 kV, the base of the record's file" in file.notes
@@ -328,13 +329,21 @@ def test_an_export_says_which_base_it_takes(records, fits):
     known = tractexp.identify(
         scaled(records[0], 5.0, power=SYSTEM, voltage=230.0), **ASKED, budget=200
     )
-    assert "per unit of 230 kV and 583.111 MVA" in tractexp.export(known, "andes").notes[0]
     assert (
-        json.loads(tractexp.export(known, "andes", base="file").text)["Motor3"][0]["Sn"] == SYSTEM
+        "per unit of 230 kV and 583.111 MVA"
+        in tractexp.export(known, "andes", playback=False).notes[0]
     )
-    assert json.loads(tractexp.export(known, "andes").text)["Bus"][0]["Vn"] == 230.0
+    assert (
+        json.loads(tractexp.export(known, "andes", base="file", playback=False).text)["Motor3"][0][
+            "Sn"
+        ]
+        == SYSTEM
+    )
+    assert json.loads(tractexp.export(known, "andes", playback=False).text)["Bus"][0]["Vn"] == 230.0
     guessed = "1 pu of the file is taken for 100 MVA, for no power is given"
-    assert any(guessed in note for note in tractexp.export(fits[5.04], "andes").notes)
+    assert any(
+        guessed in note for note in tractexp.export(fits[5.04], "andes", playback=False).notes
+    )
     with pytest.raises(UserError, match=r"base=system is not one of machine, own, file"):
         tractexp.export(known, "andes", base="system")
     assert Identified(known.result).values == known.result.parameters

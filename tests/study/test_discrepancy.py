@@ -607,6 +607,7 @@ def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, aske
     assert ("parameters of each event" in made) == asked
 
 
+@pytest.mark.long
 def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_written(tmp_path):
     found = investigate(base(), events("load_step", size=2.0, count=3)[:2], (), {}, {}, only=FEW)
     assert found.verdict.word == "unexplained"
@@ -801,6 +802,7 @@ def test_an_effect_is_looked_for_from_all_over_the_base_model_s_box(monkeypatch)
     )
 
 
+@pytest.mark.long
 def test_a_relay_is_found_though_the_base_model_alone_fits_in_a_wrong_valley():
     """There it left a deviance of 2550 of 2000 values, a member of its family was named, or nothing
     at all.

@@ -64,6 +64,7 @@ def test_the_examples_of_the_python_page_run(resistive_dips, tmp_path, monkeypat
         assert f"tractexp.{name}" in page, name
 
 
+@pytest.mark.long
 def test_the_notebook_runs_and_ends_well():
     """Executed anew, its kernel in a process of its own; what its cells show is checked against
     what it says.

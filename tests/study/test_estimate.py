@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import uncertainty as study
-from written_out import dense
+from written_out import dense, printed_dip
 
 import tractexp
 from tractexp.blocks import Table
@@ -33,7 +33,7 @@ def recorded(deviation=0.004, seed=5, correlation=0.0, depth=0.5, spoil=None, na
     t.
     """
     t, U = study.Shape(depth).voltage()
-    power = study.printed(TRUTH, t, U, 0.35)
+    power = printed_dip(depth, tuple(TRUTH), 0.35)
     if spoil is not None:
         power = spoil(t, power)
     return study.event(

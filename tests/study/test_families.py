@@ -142,17 +142,13 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     assert len(there.split) == 2 * (len(at.base) - len(there.held) + 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("hidden", "size", "seed", "member"),
     [
         ("ramped_return", 2.0, 820034, "ramped_current"),
-        *(
-            pytest.param(*case, marks=pytest.mark.long)
-            for case in (
-                ("thermostat_recovery", 2.0, 820061, "thermostatic_load"),
-                ("link_voltage_control", 1.0, 820070, "limited_link"),
-            )
-        ),
+        ("thermostat_recovery", 2.0, 820061, "thermostatic_load"),
+        ("link_voltage_control", 1.0, 820070, "limited_link"),
     ],
 )
 def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, seed, member):

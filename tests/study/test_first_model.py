@@ -102,7 +102,7 @@ def test_a_load_with_a_path_to_earth_has_an_operating_point_and_an_export():
     point = fit.operating_point
     assert point is not None
     assert 0 < point.share < 1.2
-    assert "zero" not in tractexp.export(fit, "andes", doubtful=True).text
+    assert "zero" not in tractexp.export(fit, "andes", doubtful=True, playback=False).text
 
 
 @pytest.mark.skipif(not STATION.is_file(), reason="../shared/data is not here")

@@ -84,6 +84,7 @@ def test_the_base_model_has_one_error_one_grade_and_one_sentence(name):
     check_base_model(found, alone)
 
 
+@pytest.mark.long
 def test_what_is_printed_stored_loaded_and_logged_of_the_extended_model_is_one_grade(tmp_path):
     train, validate = shipped("contactors")[:2], shipped("contactors")[2:]
     found = tractexp.investigate(

@@ -14,6 +14,7 @@ import uncertainty as study
 from command_line import run_command
 from pages import charts, read, unpacked
 from screens import LINES, count_rows
+from written_out import printed_dip
 
 import tractexp as public
 from tractexp.configuration.plugin import get
@@ -41,7 +42,7 @@ SHAPE = DipShape(depth=0.4, duration=0.2, rate=500.0, noise_P=0.004, noise_Q=0.0
 
 def recorded(depth, deviation=0.004, seed=5, name="dip"):
     t, U = study.Shape(depth).voltage()
-    clean = study.printed(study.TYPICAL, t, U, 0.35)
+    clean = printed_dip(depth, tuple(study.TYPICAL), 0.35)
     return study.event(
         t, U, clean + study.noise(np.random.default_rng(seed), len(t), deviation, 0.0), name
     )

@@ -466,6 +466,7 @@ def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where
     assert "No set has a steady state and survives the held-out events." in page_of(lost)
 
 
+@pytest.mark.long
 def test_without_held_out_events_nothing_incomplete_is_named():
     only = ("undervoltage_trip", "stator_resistance")
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import uncertainty as study
 from pages import charts, read, unpacked
+from written_out import printed_dip
 
 from tractexp.errors import UserError
 from tractexp.identification.posterior import PosteriorSample
@@ -26,7 +27,7 @@ def events(depths, deviation, seed=1, Q_s0=0.35):
     rng, made = np.random.default_rng(seed), []
     for depth in depths:
         t, U = study.Shape(depth).voltage()
-        clean = study.printed(study.TYPICAL, t, U, Q_s0)
+        clean = printed_dip(depth, tuple(study.TYPICAL), Q_s0)
         made.append(study.event(t, U, clean + study.noise(rng, len(t), deviation, 0.0)))
     return made
 

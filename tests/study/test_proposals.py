@@ -263,9 +263,8 @@ def test_a_transformer_whose_ratio_steps_is_found_in_the_voltage_that_the_load_s
     assert [t.name for t, _ in found.tried].index(power) > 0
 
 
-@pytest.mark.parametrize(
-    ("seed", "measured"), [pytest.param(800001, 0.6, marks=pytest.mark.long), (800002, 4.0)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "measured"), [(800001, 0.6), (800002, 4.0)])
 def test_what_a_right_term_explains_does_not_hang_on_the_level_of_the_noise(seed, measured):
     """Of the deviance in excess of the noise, `measured` on the held-out event, the same step gains
     too little once, and once four times what there is.

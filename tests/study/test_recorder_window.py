@@ -173,6 +173,7 @@ def test_waveforms_have_no_window():
         tractexp.compose(domain="waves", window=0.02)
 
 
+@pytest.mark.long
 def test_the_extended_model_has_the_window_that_was_taken_into_account(tmp_path):
     """As a file and as a call's, so that the next step sees the records as the
     investigation did.

@@ -51,6 +51,7 @@ def beside(*devices):
     )
 
 
+@pytest.mark.long
 def test_a_planted_branch_is_found():
     b, f, T = 0.25, 190.0, 0.02
     square = (f / 50) ** 2

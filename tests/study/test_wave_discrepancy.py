@@ -150,6 +150,7 @@ def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_
     assert np.abs((drawn - with_it) * context.valid).max() < 0.1 * np.abs(without - with_it).max()
 
 
+@pytest.mark.long
 def test_an_event_that_would_decide_is_found_in_waveforms(planted):
     steps = planted.steps
     bench, noise, kept = steps.context, steps.evidence.noise, steps.evidence.rows[0].fit
