@@ -158,7 +158,7 @@ def play(of, excitation, parameters, names=("P_motor", "Q_motor"), rtol=1e-11):
 
 @pytest.mark.parametrize("motor", MOTORS)
 def test_the_kernel_agrees_with_dop853(motor):
-    of, excitation = model(motor, "none"), dip(length=0.4, swing=2.0)
+    of, excitation = model(motor, "none"), dip(start=0.05, duration=0.08, length=0.2, swing=2.0)
     response = of.simulate(Drive.from_events([excitation]), values(of), 16)
     _, (P, Q) = play(of, excitation, values(of))
     assert np.abs(response.P[0] - P).max() < 1e-8

@@ -26,7 +26,7 @@ def test_every_sound_file_is_read(sound):
     assert min(f[0] for f in powers) == 1
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 3))])
 def test_a_damaged_file_is_read_or_refused_with_a_sentence(sound, tmp_path, seed):
     rng = np.random.default_rng(seed)
     for k in range(150):
@@ -40,7 +40,9 @@ def test_a_damaged_file_is_read_or_refused_with_a_sentence(sound, tmp_path, seed
 SEEDS = (4, 6, 17, 2026)  # 400 files; a seed with a finding is added to them
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    "seed", [SEEDS[0], *(pytest.param(k, marks=pytest.mark.long) for k in SEEDS[1:])]
+)
 def test_a_file_of_a_damaged_structure_is_read_or_refused_with_a_sentence(sound, tmp_path, seed):
     rng = np.random.default_rng(seed)
     names = [name for name, paths in sound.items() if damage(paths[0], rng) is not None]

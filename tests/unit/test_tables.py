@@ -1059,7 +1059,7 @@ LEAKS = (
 )
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))  # of every format: study/test_mutated_files.py
 def test_a_mutated_file_is_read_or_refused_in_a_sentence(seed):
     rng = random.Random(seed)
     stamps = (f"2024-01-31 {_clock(3600 + t)},{U},{P},{Q}" for t, U, P, Q in dip().tolist())
