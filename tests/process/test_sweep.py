@@ -662,17 +662,16 @@ def test_an_experiment_is_a_sweep_by_itself_of_thirty_seeds(tmp_path):
     """No record is named, so that every job is composed, refused, and takes no time."""
     asked = ("experiment=ablation", "tracking.enabled=false", "data=csv", "budget=1000", ONE, HERE)
     told = run_command(*asked, "--cfg", "hydra", "-p", "hydra.sweeper.params", cwd=tmp_path)
-    of = dict(line.split(": ", 1) for line in told.stdout.splitlines() if ": " in line)
-    variants = of["optimizer"].split(",")
-    assert {"issa", "ssa"} <= {*variants}
-    assert len(variants) == 16
-    assert of["seed"] == "range(0,30)"
+    assert "seed: range(0,30)" in told.stdout.splitlines()
     done = run_command(*asked, "seed=7,29", cwd=tmp_path)
     assert done.returncode != 0
     ends = statuses(tmp_path / "sweep").values()
-    assert sorted((end["choices"]["optimizer"], end["seed"]) for end in ends) == sorted(
-        (variant, seed) for variant in variants for seed in (7, 29)
-    )
+    seeds = {}
+    for end in ends:
+        seeds.setdefault(end["choices"]["optimizer"], []).append(end["seed"])
+    assert {"issa", "ssa"} <= seeds.keys()
+    assert len(seeds) == 16
+    assert all(sorted(found) == [7, 29] for found in seeds.values())
     assert all("data.train" in end["message"] for end in ends)
 
 

@@ -178,17 +178,17 @@ def test_experiment_tags_carry_a_shared_view(uri):
     )
 
 
-def test_artifacts_lie_beside_the_database_wherever_the_process_runs(tmp_path, empty_store):
+def test_artifacts_lie_beside_the_database_wherever_the_process_runs(
+    tmp_path, empty_store, monkeypatch
+):
     home, elsewhere = tmp_path / "a home", tmp_path / "elsewhere"
     (home / "outputs").mkdir(parents=True)
     (home / "outputs" / "mlflow.db").write_bytes(empty_store.read_bytes())
     elsewhere.mkdir()
     (elsewhere / "note.txt").write_text("hello")
-    script = """
-import sys; from pathlib import Path; from tractexp import tracking
-run = tracking.TrackedRun("identify: tibet/50", "r", artifacts=[Path("note.txt")])
-print(tracking.log(run, tracking.default_uri(Path(sys.argv[1]))))"""
-    run_id = python(script, str(home), cwd=elsewhere, check=True).stdout.strip()
+    monkeypatch.chdir(elsewhere)
+    run = TrackedRun("identify: tibet/50", "r", artifacts=[Path("note.txt")])
+    run_id = tracking.log(run, tracking.default_uri(home))
     kept = (
         home / "outputs" / "mlartifacts" / "identify_tibet_50" / run_id / "artifacts" / "note.txt"
     )
@@ -235,12 +235,13 @@ def test_the_store_of_a_second_folder_needs_no_migrations_and_is_its_own(tmp_pat
     ] == [True] * 2
 
 
-def test_a_creation_that_was_killed_leaves_nothing_that_hinders_the_next(tmp_path):
-    script = """
-import os, sys; from pathlib import Path; from tractexp import tracking
-os.replace = lambda *_: os._exit(9)
-tracking.open_store(tracking.default_uri(Path(sys.argv[1])))"""
-    assert python(script, str(tmp_path)).returncode == 9
+@pytest.mark.skipif(os.name == "nt", reason="forks")
+def test_a_creation_that_was_killed_leaves_nothing_that_hinders_the_next(tmp_path, monkeypatch):
+    if not (child := os.fork()):
+        monkeypatch.setattr(os, "replace", lambda *_: os._exit(9))
+        tracking.open_store(tracking.default_uri(tmp_path))
+        os._exit(1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
     assert not (tmp_path / "outputs" / "mlflow.db").exists()
     tracking.open_store(tracking.default_uri(tmp_path))
     assert (tmp_path / "outputs" / "mlflow.db").is_file()
