@@ -7,6 +7,7 @@ import json
 import make_contactors
 import numpy as np
 import pytest
+from command_line import run_command
 from test_shipped_data import DATA
 
 import tractexp
@@ -247,3 +248,32 @@ def test_a_table_says_the_window_that_is_stated_of_it():
         "one_cycle",
         pytest.approx(0.02),
     )
+
+
+@pytest.mark.long  # the tutorial, followed in test_docs_run, tells the name and the gap
+def test_the_line_of_the_readme_names_the_stator_transients_and_closes_the_gap_on_the_deep_dip(
+    tmp_path,
+):
+    only = "task.effects=[stator_transients,stator_resistance,dc_link_lag]"
+    done = run_command(
+        "data=tibet",
+        "task=discrepancy",
+        only,
+        "tracking.enabled=false",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
+    assert made["verdict"] == "named", done.stdout
+    # and no skew that the recorder's window looks like
+    assert made["effects"] == ["stator_transients"]
+    assert (made["complete"], made["remainder"]) == (True, None)
+    assert made["phasor_window"] == pytest.approx(0.02)
+    truth = json.loads((DATA / "tibet_50pct.json").read_text())["truth"]
+    for name, at in made["parameters"].items():
+        if name in truth:
+            assert abs(at["value"] - truth[name]) < 2 * at["standard_error"], name
+    gap = made["gap"]["validate"]
+    assert gap["closed"] > 0.9
+    assert gap["after"]["epsilon_p"] < 0.5 * gap["before"]["epsilon_p"]
