@@ -14,12 +14,16 @@ TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p
 STEP, BEGIN = 5e-3, 1.5  # s: between samples, and when the dip begins
 
 
-def record(end, drift=0.0):
+def record(end, drift=0.0, earlier=None):
     """A dip of 35 % for 0.25 s, or to the record's end where that comes sooner [s]; P drifts by
-    this share within the second before it and stays there.
+    this share within the second before it and stays there. Another, of 50 % for 0.3 s, ends
+    `earlier` [s] before it.
     """
     t = np.arange(round(end / STEP)) * STEP
     U = np.where((t > BEGIN - STEP / 2) & (t < BEGIN + 0.25), 0.65, 1.0)
+    if earlier is not None:
+        stop = BEGIN - earlier - STEP / 2
+        U[(t > stop - 0.3) & (t < stop)] = 0.5
     still = np.ones(len(t))
     event = Excitation(STEP, U, still, still, 1.0, 1.0, 0.6)
     load = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
@@ -71,3 +75,38 @@ def test_what_a_drift_does_is_told_by_parameter():
     T_m = drifting.parameters["T_m"]
     assert abs(T_m.value - TRUTH["T_m"]) == pytest.approx(0.012, abs=0.002)
     assert not fit(3.0).result.uncertainty["notes"]
+
+
+def written(folder, earlier):
+    columns = record(4.0, earlier=earlier)
+    path = folder / "dips.csv"
+    rows = np.column_stack([columns[name] for name in "tUPQ"])
+    np.savetxt(path, rows, delimiter=",", header="t,U,P,Q", comments="")
+    return path
+
+
+def test_a_dip_while_machines_still_accelerate_is_fitted_with_the_one_before(tmp_path):
+    """As after a breaker that closes onto the fault: 0.25 s after the first dip Q is twice that at
+    rest.
+    """
+    path = written(tmp_path, 0.25)
+    [event] = tractexp.read(path)
+    assert (event.dips, event.record.t[-1]) == (2, pytest.approx(4.0, abs=0.01))
+    np.testing.assert_allclose(event.Q0, 0.6, rtol=0.01)
+    assert "dip 2: the load is not at rest before it: it is" in event.record.notes[-1]
+    found = tractexp.identify(
+        event,
+        "third_order_exponential",
+        fixed={"C": TRUTH["C"]},
+        optimizer="multistart_least_squares",
+        check_intervals=False,
+        progress=False,
+    )
+    for name in ("T_prime", "X_prime", "M", "T_m"):
+        assert found.parameters[name].value == pytest.approx(TRUTH[name], rel=0.01)
+
+
+def test_a_dip_before_which_the_load_has_come_to_rest_is_one_of_its_own(tmp_path):
+    first, second = tractexp.read(written(tmp_path, 1.0))
+    assert first.record.t[-1] < BEGIN
+    np.testing.assert_allclose(second.Q0, 0.6, rtol=0.03)

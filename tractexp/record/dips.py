@@ -2,6 +2,7 @@
 held out.
 """
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -37,32 +38,79 @@ def cut_dips(
     of each.
 
     `triggers` [s] are those of the recorder, one a record at most. A record never reaches into the
-    dip before or after it. It is checked for an event, and not yet for its units.
+    dip before it, nor into that after it, unless the load is not at rest in between: it does not
+    start anew there, and both are one record. It is checked for an event, and not yet for its
+    units.
     """
     file_dips: list[FileDip] = []
     for whole in wholes:
         t = whole.t
         trigger = next((moment for moment in triggers if t[0] <= moment <= t[-1]), None)
         dips = find_dips(t, whole.U, trigger)
-        firsts, stops = (
-            [0, *(end for _, end in dips)],
-            [*(start for start, _ in dips[1:]), whole.samples],
-        )
+        firsts = [0, *(end for _, end in dips)]
+        stops = [*(start for start, _ in dips[1:]), whole.samples]
+        head = None  # the dip before, whose record may go on
         for first, (start, end), stop in zip(firsts, dips, stops, strict=False):
             early, late = np.searchsorted(t, [t[start] - pre, t[start] + post]).tolist()
             window = slice(max(first, early), min(stop, late))
-            number = len(file_dips) + 1
-            name = f"{whole.name}_dip{number}"
-            source = f"{where} dip {number}"
-            result: Record | UserError = replace(whole.part(window), name=name, source=source)
-            try:
-                detect(result)
-            except UserError as error:
-                result = error
-            file_dips.append(
-                FileDip(number, float(t[start]), float(t[min(end, len(t) - 1)]), result)
-            )
+            one = _Cut(whole, window, where, len(file_dips) + 1)
+            joined = head.join(one) if head is not None and first > early else None
+            if head is not None and joined is not None:
+                before = file_dips[head.number - 1]
+                file_dips[head.number - 1] = replace(before, result=joined.result)
+                result: Record | UserError = head.refuse_next(one)
+                head = joined
+            else:
+                result = one.result
+                head = one if isinstance(result, Record) else None
+            end_time = float(t[min(end, len(t) - 1)])
+            file_dips.append(FileDip(one.number, float(t[start]), end_time, result))
     return file_dips
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A dip of a record, by its number and the samples about it."""
+
+    whole: Record
+    window: slice
+    where: str
+    number: int
+
+    @functools.cached_property
+    def result(self) -> Record | UserError:
+        """The samples as a record, or the error that says why it cannot be used."""
+        return self._event if isinstance(self._event, UserError) else self._record
+
+    @property
+    def _record(self) -> Record:
+        name = f"{self.whole.name}_dip{self.number}"
+        source = f"{self.where} dip {self.number}"
+        return replace(self.whole.part(self.window), name=name, source=source)
+
+    @functools.cached_property
+    def _event(self) -> Event | UserError:
+        try:
+            return detect(self._record)
+        except UserError as error:
+            return error
+
+    def join(self, following: "_Cut") -> "_Cut | None":
+        """Both dips as one; None where the load is at rest between them, or either cannot be
+        used.
+        """
+        event = following._event
+        if isinstance(event, UserError) or event.at_rest:
+            return None
+        both = replace(self, window=slice(self.window.start, following.window.stop))
+        return both if isinstance(both.result, Record) else None
+
+    def refuse_next(self, following: "_Cut") -> UserError:
+        """That the dip that follows is fitted as a part of this one."""
+        return UserError(
+            f"{self.where} dip {following.number}: the load is not at rest before it: it is fitted"
+            f" as a part of dip {self.number}, which goes on through it"
+        )
 
 
 def leave_out(record: Record, times: Sequence[float], reach: float) -> Record:

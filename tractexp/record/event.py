@@ -14,7 +14,7 @@ from tractexp.record.direction import direction
 from tractexp.record.fall import FEWEST_BEFORE, STEADY, falls
 from tractexp.record.no_dip import no_dip, no_such_dip
 from tractexp.record.record import Record
-from tractexp.record.steadiness import steady_part
+from tractexp.record.steadiness import is_at_rest, steady_part
 from tractexp.record.swing import Swing, find_swing
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ class Event:
 
     Noise is the standard deviation about a straight line. `end` is the first sample after the dip,
     where the voltage has regained all but a fifth of the depth (or all but the threshold, if that
-    is more); the last sample of a record that is `unfinished`, as it ends in the dip.
+    is more); the last sample of a record that is `unfinished`, as it ends in the dip. `at_rest`
+    tells whether the load is, before it.
     """
 
     domain: ClassVar[str] = "phasors"  # in which models are compared with it
@@ -49,6 +50,7 @@ class Event:
     dips: int  # in the whole record
     swing: Swing | None = field(default=None, kw_only=True)  # of the load before the dip
     unfinished: bool = field(default=False, kw_only=True)
+    at_rest: bool = field(default=True, kw_only=True)
 
     def __repr__(self) -> str:
         """The event in one sentence."""
@@ -183,6 +185,7 @@ def detect(record: Record) -> Event:
             " the steady state cannot be computed"
         )
     U0, P0, Q0 = float(U.mean()), float(np.nanmean(P)), float(np.nanmean(Q))
+    at_rest = is_at_rest(record, before)
     swing = find_swing(record, before)
     notes += [f"before the dip {swing}, which counts as noise"] if swing else []
     notes += [_tell_unfinished(record, start)] if unfinished else []
@@ -205,6 +208,7 @@ def detect(record: Record) -> Event:
         dips=len(dips),
         swing=swing,
         unfinished=unfinished,
+        at_rest=at_rest,
     )
 
 

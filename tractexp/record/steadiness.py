@@ -67,6 +67,11 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
     return _at_rest(record, slice(first, part.stop), least, notes)
 
 
+def is_at_rest(record: Record, part: slice) -> bool:
+    """Whether a load moves no more in samples before an event than noise does."""
+    return _course(record, part) is None
+
+
 def _early(change: Change, dip: int, cycle: float) -> bool:
     """Whether a small step right before a dip may be the dip itself, where P and Q are stamped
     earlier than U.
