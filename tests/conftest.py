@@ -11,39 +11,43 @@ import pytest
 
 import tractexp
 
-LONG = (
-    "process/test_tutorial.py",
+LONGEST_FILES = (
     "process/test_sweep.py",
-    "study/test_families.py",
-    "study/test_one_grade.py",
     "process/test_hostile.py",
-    "study/test_recovery.py",
-    "study/test_discrepancy.py",
-    "study/test_prediction.py",
-    "study/test_mutated_files.py",
-    "process/test_export.py",
-    "study/test_chain.py",
-    "process/test_lost.py",
     "process/test_tracking.py",
-    "study/test_docs_run.py",
+    "study/test_discrepancy.py",
+    "process/test_lost.py",
+    "process/test_export.py",
     "process/test_ten_minutes.py",
-    "study/test_never_worse.py",
-    "process/test_operating_point.py",
-    "study/test_priors.py",
-    "study/test_proposals.py",
-    "study/test_paper.py",
-    "study/test_orders.py",
     "process/test_commands.py",
-    "process/test_compare_tracking.py",
+    "study/test_prediction.py",
+    "study/test_docs_run.py",
+    "process/test_trust.py",
+    "study/test_paper.py",
+    "study/test_families.py",
+    "process/test_plugins.py",
+    "study/test_optimizers.py",
+    "study/test_wave_discrepancy.py",
+    "study/test_discrepancy_page.py",
+    "study/test_profile.py",
+    "study/test_api.py",
+    "study/test_remainder.py",
     "oracle/test_hidden_effects_generator.py",
-    "study/test_recorder_window.py",
-    "process/test_signals.py",
+    "process/test_output.py",
+    "study/test_proposals.py",
     "process/test_survey.py",
     "study/test_waves_evidence.py",
-    "study/test_discrepancy_page.py",
-    "study/test_faults.py",
+    "study/test_chain.py",
+    "process/test_new.py",
+    "process/test_workers.py",
+    "study/test_priors.py",
     "model/test_uncertainty.py",
+    "unit/test_convert.py",
+    "model/test_contracts.py",
     "process/test_cli.py",
+    "model/test_model.py",
+    "unit/test_tables.py",
+    "process/test_tutorial.py",
 )
 MOTOR = {
     "T_prime": 0.12,
@@ -69,8 +73,8 @@ def pytest_configure(config):
 
 def pytest_collection_modifyitems(items):
     """The files that take longest begin first, so that all workers end at about the same time."""
-    of = {name: k for k, name in enumerate(LONG)}
-    items.sort(key=lambda item: of.get("/".join(item.path.parts[-2:]), len(LONG)))
+    of = {name: k for k, name in enumerate(LONGEST_FILES)}
+    items.sort(key=lambda item: of.get("/".join(item.path.parts[-2:]), len(LONGEST_FILES)))
 
 
 @pytest.fixture

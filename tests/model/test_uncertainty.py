@@ -227,15 +227,14 @@ def test_the_papers_model_has_no_structural_symmetry(deep):
 def test_one_shallow_dip_leaves_c_weak_and_three_dips_identify_it(model):
     """Noise of 1 % throughout; what C trades against is said."""
     truth = study.TYPICAL
-    one = check_by_profiles(study.judged(Problem(model, records((0.15,), 0.01)), truth).uncertainty)
+    one = study.judged(Problem(model, records((0.15,), 0.01)), truth).uncertainty
     three = check_by_profiles(
         study.judged(Problem(model, records((0.15, 0.3, 0.5), 0.01)), truth).uncertainty
     )
-    # beyond a crest at 0.75 smaller values fit as well
-    assert one.verdicts["C"].word == UNIDENTIFIED
+    # that smaller values than 0.75 fit as well is told by profiles (test_profile)
+    assert one.verdicts["C"].word != IDENTIFIED
     assert "trades against" in one.verdicts["C"].detail
     assert "q_v (correlation -0.9" in one.verdicts["C"].detail
-    assert "open upwards" in one.verdicts["C"].detail
     assert three.verdicts["C"].word == IDENTIFIED
     assert three.half[2] < one.half[2] / 5
 

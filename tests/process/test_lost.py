@@ -888,6 +888,7 @@ def test_what_names_the_store_is_for_the_user_alone(tmp_path, uri):
     assert {p.stat().st_mode & 0o777 for p in (tmp_path / "sweep").glob("*.json")} == {0o600}
 
 
+@pytest.mark.long  # what MLflow does
 def test_a_server_is_given_the_password_of_the_environment_or_of_a_netrc(tmp_path):
     """What the refusal recommends: MLflow sends either."""
     script = """

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from command_line import run_command
@@ -378,11 +379,22 @@ def test_another_sweeper_finds_a_folder_held_or_another_sweeps(launcher, tmp_pat
         assert results(tmp_path / "sweep").items() > found.items()
 
 
+# a command, and the same again
+TWICE = """
+import json, sys
+from command_line import run_command
+print(json.dumps([vars(run_command(*sys.argv[1:], cwd=".")) for _ in range(2)]))"""
+
+
 def test_failing_jobs_are_isolated_listed_and_change_the_exit_code(site, tmp_path, uri):
     seeds = (2, 1)
     # one after the other: of workers side by side the test of a killed one tells it
     sweep = ("-m", "budget=200", PLAIN, ONE, "optimizer=stumbles,pso", "seed=2,1", HERE)
-    done = tractexp(*sweep, cwd=tmp_path, site=site)
+    there = os.environ | {"PYTHONPATH": os.pathsep.join([str(site), *sys.path])}
+    both = subprocess.run(
+        [sys.executable, "-c", TWICE, *sweep], cwd=tmp_path, env=there, capture_output=True
+    )
+    done, again = (SimpleNamespace(**told) for told in json.loads(both.stdout))
     ends = statuses(tmp_path / "sweep")
     failed = {n for n, end in ends.items() if end["status"] == "failed"}
     from numpy.random import default_rng
@@ -402,7 +414,6 @@ def test_failing_jobs_are_isolated_listed_and_change_the_exit_code(site, tmp_pat
     parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
     assert ask(tmp_path, f"select status from runs where run_uuid = '{parent}'") == [("FAILED",)]
 
-    again = tractexp(*sweep, cwd=tmp_path, site=site)
     assert "3 of them are finished and kept" in again.stdout
     assert json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"] == parent
     assert len(ask(tmp_path, "select run_uuid from runs")) == 1 + 3

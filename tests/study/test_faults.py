@@ -33,6 +33,7 @@ def some(tmp_path_factory):
     return {"jobs": [*islice(of_search, 2)], "logging": [next(of_logging)]}
 
 
+@pytest.mark.long  # of kills alone test_kills and unit/test_run_folder tell in less
 def test_a_search_loses_no_result_that_it_had_and_a_log_no_run(some):
     assert {part: [f for f in found if f["lost"]] for part, found in some.items()} == {
         "jobs": [],

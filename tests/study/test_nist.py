@@ -216,7 +216,7 @@ def digits(number: np.ndarray, certified: np.ndarray) -> float:
     return float(np.min(-np.log10(np.clip(error, 1e-11, None))))
 
 
-@pytest.mark.parametrize("start", [0, 1])
+@pytest.mark.parametrize("start", [0, pytest.param(1, marks=pytest.mark.long)])  # 1: the nearer
 @pytest.mark.parametrize("name", MODELS)
 def test_least_squares_have_the_certified_values_and_deviations(name, start):
     problem = Regression.read(name)
