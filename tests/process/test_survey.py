@@ -311,9 +311,9 @@ def test_the_events_that_tell_most_are_the_deep_ones_and_one_command_fits_them(p
     }
     assert content["command"] in done.stdout
     words = shlex.split(content["command"])
-    assert words[-1] == "model=auto"  # as each event's own command has it
+    assert words[1] == "model=auto"  # as each event's own command has it
     fit = run_command(
-        *words[1:-1],
+        *words[2:],
         "optimizer=multistart_least_squares",
         "optimizer.starts=2",
         "tracking.enabled=false",

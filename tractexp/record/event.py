@@ -262,7 +262,7 @@ def describe(event: Event) -> str:
     )
     odd = []
     if event.dips > 1:
-        odd.append(f"the record holds {event.dips} dips, and the first is used")
+        odd.append(f"the record holds {event.dips} dips, which are fitted as one event")
     if event.P0 <= 0:
         calm = np.zeros(record.samples, bool)
         calm[event.steady] = True
