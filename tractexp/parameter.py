@@ -199,7 +199,7 @@ class Box:
         return self.names.index(name)
 
 
-def even(n: int, d: int) -> np.ndarray:
+def spread_evenly(n: int, d: int) -> np.ndarray:
     """Points that fill the unit cube evenly, the same ones every time.
 
     Parameters

@@ -13,7 +13,7 @@ from tractexp.errors import UserError
 from tractexp.identification.search import search
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
-from tractexp.parameter import even
+from tractexp.parameter import spread_evenly
 
 
 def loss(name, **settings):
@@ -118,7 +118,7 @@ def test_a_parameter_per_event_is_found_for_each():
 
 
 def test_the_probes_of_the_step_fill_the_cube_evenly():
-    points = even(64, 7)
+    points = spread_evenly(64, 7)
     assert points.shape == (64, 7)
     assert ((points >= 0) & (points < 1)).all()
     for column in points.T:  # every eighth of every axis has its share

@@ -180,11 +180,11 @@ def kept(folder: Path) -> Path:
 
 def waiting(folder: Path) -> object:
     from tractexp.tracking import runfile
-    from tractexp.tracking.sync import _within, count_unsynced
+    from tractexp.tracking.sync import _keep_files_inside, count_unsynced
 
     count_unsynced(folder)
     one = runfile.read(folder)
-    return one and _within(one.run, folder, lambda line: None)
+    return one and _keep_files_inside(one.run, folder, lambda line: None)
 
 
 def records(folder: Path) -> Path:

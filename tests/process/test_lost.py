@@ -105,8 +105,8 @@ def test_a_run_whose_writer_lives_or_cannot_be_seen_is_left(uri):
 def test_whether_a_process_has_ended_is_told_only_where_it_is_known(told, gone):
     for word, known in zip(("HERE", "BOOT", "NS"), owner._machine(), strict=True):
         told = told.replace(word, known)
-    assert owner.gone(told) is gone
-    assert owner.gone(owner.signature()) is False
+    assert owner.has_ended(told) is gone
+    assert owner.has_ended(owner.signature()) is False
 
 
 # What is kept beside the results, and brought in

@@ -9,13 +9,13 @@ import tomllib
 
 import pytest
 
-from tractexp.cli.new import KINDS, new, written
+from tractexp.cli.new import KINDS, new, write_package
 from tractexp.errors import UserError
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_test_that_is_written_passes(kind, tmp_path):
-    place = written(kind, f"own_{kind}", tmp_path)
+    place = write_package(kind, f"own_{kind}", tmp_path)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
     done = subprocess.run(
         command, cwd=place, capture_output=True, text=True, env={**os.environ, "PYTEST_ADDOPTS": ""}
@@ -59,13 +59,13 @@ def test_it_says_how_to_test_install_and_choose(tmp_path, monkeypatch, capsys):
 )
 def test_a_name_that_cannot_be_is_refused(name, why, tmp_path):
     with pytest.raises(UserError, match=why):
-        written("effect", name, tmp_path)
+        write_package("effect", name, tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_nothing_is_overwritten(tmp_path):
-    place = written("static", "lamps", tmp_path)
+    place = write_package("static", "lamps", tmp_path)
     (place / "tractexp_lamps" / "lamps.py").write_text("# mine\n")
     with pytest.raises(UserError, match="tractexp_lamps is there already and is not overwritten"):
-        written("static", "lamps", tmp_path)
+        write_package("static", "lamps", tmp_path)
     assert (place / "tractexp_lamps" / "lamps.py").read_text() == "# mine\n"

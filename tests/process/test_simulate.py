@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from command_line import run_command
 
-from tractexp.api.simulate import chosen
+from tractexp.api.simulate import order_values
 from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
 from tractexp.identification.result import Result, load
@@ -200,9 +200,9 @@ def test_bad_input_gets_one_sentence_and_leaves_nothing_behind(arguments, senten
 
 
 def test_values_given_by_hand_replace_those_found():
-    assert chosen(("a", "b"), {"a": 1.0, "b": 2.0}, {"b": 3.0}).tolist() == [1.0, 3.0]
+    assert order_values(("a", "b"), {"a": 1.0, "b": 2.0}, {"b": 3.0}).tolist() == [1.0, 3.0]
     with pytest.raises(UserError, match="no value for b"):
-        chosen(("a", "b"), {"a": 1.0}, {})
+        order_values(("a", "b"), {"a": 1.0}, {})
 
 
 @pytest.mark.parametrize(("motor", "static"), PAIRS)

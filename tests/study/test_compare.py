@@ -139,7 +139,7 @@ def test_runs_are_of_the_problem_whose_objectives_they_have_within_a_hundredth(o
     problem = SimpleNamespace(
         objective=lambda ends: np.array([FLOOR, *(off * run.objective for run in runs[1:])])
     )
-    assert floor._same(problem, np.zeros((len(runs), 2)), runs) == same
+    assert floor._is_same_problem(problem, np.zeros((len(runs), 2)), runs) == same
 
 
 def test_runs_that_all_reach_the_floor_are_equal_whatever_is_left_of_rounding():

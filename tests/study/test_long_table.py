@@ -12,7 +12,7 @@ from tractexp.configuration.plugin import build, get
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
 from tractexp.record import Event, Record, detect
-from tractexp.record.dips import around
+from tractexp.record.dips import view_dip
 
 
 def test_a_million_rows_take_about_a_second_and_memory_like_the_file(tmp_path, monkeypatch):
@@ -48,7 +48,7 @@ def hour(rows: int) -> Record:
 @pytest.mark.parametrize("rows", [45_000, 90_000, 180_000])
 def test_an_event_of_a_long_table_is_the_part_about_its_dip(rows):
     whole = detect(hour(rows))
-    part = around(whole)
+    part = view_dip(whole)
     # whatever the table holds: a minute before, the dip, a minute after
     assert part.record.samples == 6_009
     assert (part.t_start, part.depth, part.P0, part.noise_P) == (
@@ -65,7 +65,7 @@ def test_an_event_of_a_long_table_is_the_part_about_its_dip(rows):
 
 def test_shorter_records_are_as_they_are():
     for event in tractexp.read("tibet_50pct"):
-        assert around(event) is event
+        assert view_dip(event) is event
 
 
 def test_the_step_of_a_long_record_is_that_of_its_dip():

@@ -35,7 +35,7 @@ JUDGING = {"targets": TARGETS, "ties": 1e-3, "floor": 1e-9, "reference": None}
 
 @pytest.fixture(autouse=True)
 def _plain(monkeypatch):
-    monkeypatch.setattr(judging, "plain", lambda: {"issa": "ssa", "ssa": ""})
+    monkeypatch.setattr(judging, "list_plain_optimizers", lambda: {"issa": "ssa", "ssa": ""})
 
 
 def moved(runs, data, factors=None, budget=None):
@@ -53,7 +53,7 @@ def moved(runs, data, factors=None, budget=None):
 
 
 def several(runs, **more):
-    return judging.several(
+    return judging.judge_problems(
         part_runs(runs, ["budget"]),
         "the test",
         JUDGING,

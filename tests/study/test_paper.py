@@ -713,7 +713,7 @@ def test_the_second_valley_is_at_the_bound_of_C_and_attracts_whatever_the_bound(
 
     assert static(right) > 0.2
     assert static(left) < -1.5
-    wide = valleys.within(problem, "C", 0.1, 0.99)
+    wide = valleys.with_bounds(problem, "C", 0.1, 0.99)
     grid = np.linspace(0.1, 0.9, 17)
     path = valleys.along(wide, np.array([right, left]), "C", grid, floor)
     assert path.values[:, C] == pytest.approx(grid)

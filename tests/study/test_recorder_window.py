@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from test_discrepancy import FAST, base, events
 
 import tractexp
-from tractexp.configuration.plugin import chosen
+from tractexp.configuration.plugin import build_chosen
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
 from tractexp.domain.excitation import phasors
@@ -75,7 +75,8 @@ def test_windows_are_whole_cycles_and_those_of_measurement_units_that_the_sampli
 def test_a_window_that_the_records_say_is_the_only_one_tried():
     (event,) = events(count=1)
     said = replace(
-        event, record=replace(event.record, window=chosen("estimator", "p_class").window(50.0))
+        event,
+        record=replace(event.record, window=build_chosen("estimator", "p_class").window(50.0)),
     )
     (window,) = windows_of([said, said])
     assert window.window == pytest.approx(0.04)
@@ -86,7 +87,7 @@ def test_a_window_that_the_records_say_is_the_only_one_tried():
 
 def test_what_a_triangle_did_is_undone():
     (event,) = events(count=1)
-    known = chosen("estimator", "p_class").window(50.0)
+    known = build_chosen("estimator", "p_class").window(50.0)
     recorder = RecorderWindow(known.length, known, said=True)
     weights = recorder.weights(event.record.step)
     U = np.convolve(np.pad(event.record.U, len(weights) // 2, "edge"), weights, "valid")
@@ -124,7 +125,7 @@ def test_a_model_set_to_a_window_is_looked_at_as_an_investigation_looks(window):
     """
     (event,) = events(count=1)
     load = tractexp.compose().model
-    shape = chosen("estimator", window).window(50.0) if isinstance(window, str) else None
+    shape = build_chosen("estimator", window).window(50.0) if isinstance(window, str) else None
     recorder = RecorderWindow(shape.length if shape else window, shape)
     assert recorder.setting == window
     behind = Drive.from_events(
@@ -142,7 +143,7 @@ def test_a_model_set_to_a_window_is_looked_at_as_an_investigation_looks(window):
 
 def test_a_window_that_the_records_say_is_theirs():
     (event,) = events(count=1)
-    shape = chosen("estimator", "p_class").window(50.0)
+    shape = build_chosen("estimator", "p_class").window(50.0)
     said = replace(event, record=replace(event.record, window=shape))
     model = tractexp.compose(window="recorded").model
     assert np.array_equal(

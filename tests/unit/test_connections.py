@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tractexp.api.read import record_from_dict, record_to_dict
-from tractexp.configuration.plugin import chosen
+from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import UserError
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording import Channel, Feeder, Recording, Segment
@@ -22,7 +22,7 @@ PAIRS = ["ab", "bc", "ca", "ba", "cb", "ac"]
 
 def arms(name, ratio=1.0, **settings):
     return [
-        chosen("connection", {"name": name, "arm": arm, "ratio": ratio, **settings})
+        build_chosen("connection", {"name": name, "arm": arm, "ratio": ratio, **settings})
         for arm in ("alpha", "beta")
     ]
 
@@ -135,10 +135,10 @@ def test_line_voltages_give_the_phase_voltages_but_for_a_zero_sequence(zero):
     V = no_zero_sequence(7)
     seen = V + zero
     lines = np.array([seen[0] - seen[1], seen[1] - seen[2], seen[2] - seen[0]])
-    assert chosen("connection", "line_voltages").voltage() @ lines == pytest.approx(V)
-    assert chosen("connection", "two_line_voltages").voltage() @ lines[:2] == pytest.approx(V)
+    assert build_chosen("connection", "line_voltages").voltage() @ lines == pytest.approx(V)
+    assert build_chosen("connection", "two_line_voltages").voltage() @ lines[:2] == pytest.approx(V)
     turned = {"name": "two_line_voltages", "pairs": ["cb", "ca"]}
-    assert chosen("connection", turned).voltage() @ np.array(
+    assert build_chosen("connection", turned).voltage() @ np.array(
         [-lines[1], lines[2]]
     ) == pytest.approx(V)
 
@@ -147,7 +147,7 @@ def test_line_voltages_give_the_phase_voltages_but_for_a_zero_sequence(zero):
 @pytest.mark.parametrize("name", ["aron", "two_line_voltages"])
 def test_two_current_transformers_give_all_currents_of_a_load_without_neutral(name, phases):
     I = no_zero_sequence(8)
-    made = chosen("connection", {"name": name, "phases": phases})
+    made = build_chosen("connection", {"name": name, "phases": phases})
     assert made.current() @ np.array([I["abc".index(p)] for p in phases]) == pytest.approx(I)
     assert made.currents == 2
 
@@ -155,7 +155,7 @@ def test_two_current_transformers_give_all_currents_of_a_load_without_neutral(na
 def test_two_wattmeters_read_the_power():
     """Blondel: V_ab I_a* + V_cb I_c* is the power of a three-wire load, whatever its symmetry."""
     V, I = no_zero_sequence(9), no_zero_sequence(10)
-    made = chosen(
+    made = build_chosen(
         "connection", {"name": "two_line_voltages", "pairs": ["ab", "cb"], "phases": "ac"}
     )
     lines = np.array([V[0] - V[1], V[2] - V[1]])
@@ -182,7 +182,7 @@ def test_two_wattmeters_read_the_power():
 )
 def test_wrong_settings_are_refused_in_a_sentence(connection, says):
     with pytest.raises(UserError, match=says):
-        chosen("connection", connection)
+        build_chosen("connection", connection)
 
 
 RATE = 4000.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_phasor import three_phase, waves
 
-from tractexp.configuration.plugin import chosen
+from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import UserError
 from tractexp.record import Window
 from tractexp.record.phasor import measure
@@ -16,7 +16,9 @@ EVERY = pytest.mark.parametrize("estimator", ESTIMATORS, ids=str)
 
 
 def measured(x, estimator, nominal=50.0, step=1e-3):
-    return measure(x, RATE, nominal, step=step, window=chosen("estimator", estimator).averager)
+    return measure(
+        x, RATE, nominal, step=step, window=build_chosen("estimator", estimator).averager
+    )
 
 
 def vector_error(made, truth):
@@ -108,7 +110,7 @@ def test_a_jump_passes_through_the_window_the_record_keeps(estimator):
     t = np.arange(8000) / RATE
     x = waves(np.concatenate([BALANCED, BALANCED]), 50.0, t) * np.where(t < 1.0, 1.0, 0.5)
     made = measured(x, estimator)
-    kept = chosen("estimator", estimator).window(50.0)
+    kept = build_chosen("estimator", estimator).window(50.0)
     assert kept.weights.sum() == pytest.approx(1)
     expected = [1 - 0.5 * kept.weights[kept.at + now >= 1.0].sum() for now in made.t]
     # a weight of the shortest window is a twentieth
@@ -118,7 +120,7 @@ def test_a_jump_passes_through_the_window_the_record_keeps(estimator):
 @EVERY
 @pytest.mark.parametrize("step", [1e-3, 2e-3, 0.7e-3, 0.02])
 def test_the_kept_window_averages_what_is_linear_between_samples(estimator, step):
-    window = chosen("estimator", estimator).window(50.0)
+    window = build_chosen("estimator", estimator).window(50.0)
     weights = window.compute_weights(step)
     k = np.arange(len(weights)) - len(weights) // 2
     assert weights.sum() == pytest.approx(1)
@@ -131,7 +133,7 @@ def test_the_kept_window_averages_what_is_linear_between_samples(estimator, step
 
 
 def test_a_window_is_plain_data_and_back():
-    window = chosen("estimator", "p_class").window(50.0)
+    window = build_chosen("estimator", "p_class").window(50.0)
     again = Window.from_content(window.to_dict())
     assert (again.name, again.at.tolist(), again.weights.tolist()) == (
         "p_class",
@@ -142,17 +144,17 @@ def test_a_window_is_plain_data_and_back():
 
 def test_the_m_class_knows_the_rates_of_the_standard_only():
     with pytest.raises(UserError, match="reporting=7 is none of the standard's rates: 10, 12"):
-        chosen("estimator", {"name": "m_class", "reporting": 7})
+        build_chosen("estimator", {"name": "m_class", "reporting": 7})
     with pytest.raises(
         UserError, match="no M-class filter for 60 phasors a second at 50 Hz: 10, 25, 50, 100"
     ):
-        chosen("estimator", {"name": "m_class", "reporting": 60}).window(50.0)
+        build_chosen("estimator", {"name": "m_class", "reporting": 60}).window(50.0)
     with pytest.raises(UserError, match=r"at 16.7 Hz; choose another estimator"):
-        chosen("estimator", "m_class").window(16.7)
+        build_chosen("estimator", "m_class").window(16.7)
 
 
 def test_an_estimator_is_chosen_by_name_or_by_name_and_settings():
     with pytest.raises(UserError, match=r"data\.estimator=3 must be a name"):
-        chosen("estimator", 3)
+        build_chosen("estimator", 3)
     with pytest.raises(UserError, match="no estimator 'pclass'"):
-        chosen("estimator", "pclass")
+        build_chosen("estimator", "pclass")

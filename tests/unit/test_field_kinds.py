@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.configuration.plugin import chosen
+from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.recording import Channel, Recording, Segment
@@ -187,7 +187,7 @@ class TestRailways:
         assert load["P"] == pytest.approx(12 * 15 / 27.5, rel=0.01)
 
     def test_of_opposite_voltages_it_is_the_sum_of_both_powers(self):
-        each = chosen("connection", "autotransformer")
+        each = build_chosen("connection", "autotransformer")
         V, I = np.array([27.5, -27.5]), np.array([0.3 - 0.1j, -0.2 + 0.05j])
         assert (each.voltage() @ V)[0] * np.conj(each.current() @ I)[0] == pytest.approx(
             V @ I.conj()

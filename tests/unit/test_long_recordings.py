@@ -12,7 +12,7 @@ from field_waves import KA, KV, load, noise, phases, recording, wave
 from tractexp.configuration.plugin import build
 from tractexp.filetypes import comtrade, comtrade_samples
 from tractexp.recording import Feeder
-from tractexp.recording.excursion import SLIDING, _inside
+from tractexp.recording.excursion import SLIDING, _count_samples_inside
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.overview import overview
 from tractexp.recording.quality import _variances, quality
@@ -117,7 +117,7 @@ def test_the_reference_slides_as_the_standard_says():
     rng, step = np.random.default_rng(3), 0.01
     levels = 1 + 0.01 * rng.standard_normal((2, 3000)).cumsum(axis=1) / 20
     reference, limits = np.array([1.0, 1.0]), np.array([0.03, 0.05])
-    count, reached = _inside(levels, limits, reference, step)
+    count, reached = _count_samples_inside(levels, limits, reference, step)
     share, k = 1 - np.exp(-step / SLIDING), 0
     while k < 3000 and (np.abs(levels[:, k] / reference - 1) <= limits).all():
         reference = reference + share * (levels[:, k] - reference)

@@ -99,7 +99,7 @@ def convert(
         raise UserError("nothing to read: give a file, or events as tractexp.read gives them")
     writer = writer_of(to)
     parts = [part for source in sources for part in _parts(source, writer, what, settings)]
-    return written(parts, writer, Path(folder))
+    return write_parts(parts, writer, Path(folder))
 
 
 def writer_of(to: str | None) -> Writer:
@@ -134,7 +134,7 @@ def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
     return [(one.name, one) for one in records]
 
 
-def written(parts: Sequence[Part], writer: Writer, folder: Path) -> Converted:
+def write_parts(parts: Sequence[Part], writer: Writer, folder: Path) -> Converted:
     """Write everything into a folder; raises `UserError` before anything is written over what was
     read.
     """
@@ -230,4 +230,4 @@ class Convert(Task, call=convert, given=("sources", "folder", "settings")):
         """Write the files into the run's folder, and print what each holds."""
         writer = writer_of(self.to)
         parts = parts_of(build("data", job.config["data"]), writer, self.what)
-        show(written(parts, writer, job.folder).summary(), console())
+        show(write_parts(parts, writer, job.folder).summary(), console())

@@ -32,7 +32,7 @@ def load(path: str | Path) -> Outcome:
     UserError
         Where the file is missing, damaged or of no kind known.
     """
-    if Path(path).is_dir() or _bare(path):
+    if Path(path).is_dir() or _is_bare_result(path):
         from tractexp.api.identify import Identification
         from tractexp.identification.result import load as read_result
 
@@ -47,7 +47,7 @@ def load(path: str | Path) -> Outcome:
     return kinds[content["kind"]].from_saved(content)
 
 
-def _bare(path: str | Path) -> bool:
+def _is_bare_result(path: str | Path) -> bool:
     """Whether a file is a result.json rather than a saved result."""
     try:
         content = files.read_json(path)

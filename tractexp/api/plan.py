@@ -28,7 +28,7 @@ from tractexp.noise import Noise
 from tractexp.outcome import Written
 from tractexp.record import Event
 from tractexp.report import plan as shown
-from tractexp.report.plan import DEPTH, DURATION, JUMP, RATE, UNBALANCE, Planned, rest
+from tractexp.report.plan import DEPTH, DURATION, JUMP, RATE, UNBALANCE, Planned, explain_rest
 from tractexp.storage import files
 from tractexp.text.progress import Progress
 
@@ -382,7 +382,7 @@ def _content(planned: Planned) -> dict[str, Any]:
             {"name": c.name, "gain": c.gain, "half": dict(zip(names, c.half, strict=True))}
             for c in planned.chosen
         ],
-        "other_events": rest(planned),
+        "other_events": explain_rest(planned),
     }
 
 

@@ -24,7 +24,7 @@ from tractexp.record import (
     read_records,
 )
 from tractexp.record.angle import unwrap_angle
-from tractexp.record.dips import around
+from tractexp.record.dips import view_dip
 from tractexp.recording.event_views import settings_of
 from tractexp.storage import files, time_limit
 from tractexp.text.wording import count_noun
@@ -195,7 +195,7 @@ def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
 def dips_together(records: Any, validate: Any) -> tuple[Dips, Dips]:
     """Events fitted and held out, as `dips_of`, all on the base of the load in the first one."""
     train, held = dips_of("records", records, least=1), dips_of("validate", validate)
-    events = on_own_base([around(event) for event in (*train, *held)])
+    events = on_own_base([view_dip(event) for event in (*train, *held)])
     return Dips(events[: len(train)]), Dips(events[len(train) :])
 
 
@@ -234,14 +234,14 @@ def _array(values: Any, where: str) -> np.ndarray:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise UserError(
-            f"{where} holds {_odd(values)}, which is no number; give numbers, nan for a gap"
+            f"{where} holds {_find_odd_value(values)}, which is no number; give numbers, nan for a gap"
         ) from error
     if array.ndim != 1:
         raise UserError(f"{where} has shape {array.shape}; one number per sample, (N,), is needed")
     return array
 
 
-def _odd(values: Any) -> str:
+def _find_odd_value(values: Any) -> str:
     """The first value that is no number, and where it stands."""
     for k, value in enumerate(values if isinstance(values, Iterable) else [values]):
         try:

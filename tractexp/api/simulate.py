@@ -220,7 +220,7 @@ def simulate(
         )
     fit = model if isinstance(model, Identification) else None
     load = fit.model if fit else model_of(model)
-    at = chosen(load.model.names, fit.result.parameters if fit else {}, values or {})
+    at = order_values(load.model.names, fit.result.parameters if fit else {}, values or {})
     events = dips_of("records", records)
     if bool(events) == (depth is not None):
         raise UserError("give either records to play, or the depth of a dip")
@@ -254,7 +254,7 @@ def smooth(x: np.ndarray) -> np.ndarray:
     return 0.5 - 0.5 * np.cos(np.pi * np.clip(x, 0.0, 1.0))
 
 
-def chosen(
+def order_values(
     names: Sequence[str], fitted: Mapping[str, float], given: Mapping[str, float]
 ) -> np.ndarray:
     """Values (d,) in the model's order. Raises `UserError` for unknown names and for what is

@@ -231,7 +231,9 @@ def survey(
     settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
     with tell_stages(progress) as stage:
         stage(f"choosing among {len(worth)} events")
-        best = _best(place, [row["event"] for row in worth], informative, model, values, settings)
+        best = _choose_most_telling(
+            place, [row["event"] for row in worth], informative, model, values, settings
+        )
     content["informative"] = files.plain(
         [{"event": c.name, "gain": c.gain, "half": c.half} for c in best]
     )
@@ -263,7 +265,7 @@ def _promise(row: Mapping[str, Any]) -> float:
     return measure_promise(row["depth"], row["noise"])
 
 
-def _best(
+def _choose_most_telling(
     folder: Path,
     names: Sequence[str],
     most: int,

@@ -126,10 +126,10 @@ def _without_events(view: View) -> dict[str, str]:
         len(unexamined) and all(shown.unexamined or not shown.is_loaded for shown in view.sights)
     ):
         return {"kind": UNEXAMINED, "why": "; ".join(unexamined) or UNRECOGNISED}
-    return {"kind": QUIET, "why": _quiet(view)}
+    return {"kind": QUIET, "why": _explain_no_event(view)}
 
 
-def _quiet(view: View) -> str:
+def _explain_no_event(view: View) -> str:
     """The reason why a file shows no event, a sentence."""
     said = [*(said for s in view.sights for said in s.said), *_find_dead_phases(view)]
     return "; ".join(dict.fromkeys(said)) or "the voltage stays as it is"
@@ -174,10 +174,10 @@ def _pictures(shown: Sight, event: LoadEvent) -> dict[str, list[float | None]]:
     first, stop = np.searchsorted(
         t, [what.start - AROUND[0], min(what.end, what.start + LONGEST_PICTURED_EVENT) + AROUND[1]]
     )
-    return {f"{name}_picture": _few(columns[name][first:stop]) for name in ("U", "P")}
+    return {f"{name}_picture": _thin_values(columns[name][first:stop]) for name in ("U", "P")}
 
 
-def _few(values: np.ndarray) -> list[float | None]:
+def _thin_values(values: np.ndarray) -> list[float | None]:
     """At most `POINTS` values (n,), the lowest and the highest of each stretch, as shares of the
     greatest size.
     """

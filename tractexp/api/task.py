@@ -201,7 +201,7 @@ def setting_of(parameter: inspect.Parameter) -> tuple[Any, Any]:
     for one in kinds:
         origin, inner = get_origin(one), get_args(one)
         if origin is not None and issubclass(origin, Mapping):
-            return dict[inner[0], _plain(inner[1])], field(default_factory=dict)
+            return dict[inner[0], _name_list_kind(inner[1])], field(default_factory=dict)
         if origin is not None and issubclass(origin, Sequence) and str not in kinds:
             return list[inner[0]], field(default_factory=list)
     if isinstance(default, tuple):
@@ -209,7 +209,7 @@ def setting_of(parameter: inspect.Parameter) -> tuple[Any, Any]:
     return kind, dataclasses.MISSING if default is parameter.empty else default
 
 
-def _plain(kind: Any) -> Any:
+def _name_list_kind(kind: Any) -> Any:
     """A list for a sequence, as the configuration's schema knows it."""
     return list[get_args(kind)[0]] if get_origin(kind) is not None else kind
 

@@ -297,7 +297,7 @@ class Report:
         return {
             "title": self.title,
             "lead": self.lead,
-            "blocks": [_plain(block) for block in self.blocks],
+            "blocks": [_describe_block(block) for block in self.blocks],
         }
 
     def save(self, path: Path | str) -> Path:
@@ -330,7 +330,7 @@ class Report:
         return frame(self)
 
 
-def _plain(block: Block) -> dict[str, Any]:
+def _describe_block(block: Block) -> dict[str, Any]:
     """A block as plain data, without what only draws it."""
     fields = {
         f.name: getattr(block, f.name)
@@ -339,7 +339,7 @@ def _plain(block: Block) -> dict[str, Any]:
     }
     for key in ("blocks", "charts"):
         if key in fields:
-            fields[key] = [_plain(inner) for inner in fields[key]]
+            fields[key] = [_describe_block(inner) for inner in fields[key]]
     if isinstance(block, Table):
         fields |= {"words": sorted(block.words), "detail": sorted(block.detail)}
     return files.plain({"block": type(block).__name__.lower(), **fields})

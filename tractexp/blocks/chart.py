@@ -203,7 +203,7 @@ class Chart:
         self.ticks(
             panel,
             [0.35 - row for row in range(len(courses))],
-            [_short(name) for name, *_ in courses],
+            [_shorten_name(name) for name, *_ in courses],
         )
         return self.limits(panel, 0.3 - len(courses), 1.0)
 
@@ -532,7 +532,7 @@ class Chart:
         return self
 
 
-def _short(name: str) -> str:
+def _shorten_name(name: str) -> str:
     """A name that fits a tick."""
     return name if len(name) <= TICK else f"{name[: TICK - 1]}…"
 

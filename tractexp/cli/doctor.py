@@ -249,7 +249,7 @@ def runs(uri: str) -> Iterator[Finding]:
         running = owner.list_running(client)
     if closed:
         yield HEALED, f"{len(closed)} runs whose process had ended are closed as KILLED"
-    unknown = [run for run in running if owner.gone(run.data.tags.get(owner.TAG, "")) is None]
+    unknown = [run for run in running if owner.has_ended(run.data.tags.get(owner.TAG, "")) is None]
     for run in unknown:
         where = run.data.tags.get(owner.TAG, "").partition("/")[0] or "a process that is not known"
         yield (

@@ -209,7 +209,7 @@ def _list_declared_plugins(module: str) -> Iterator[tuple[str, str]]:
     for node in _tree(module).body:
         if not (
             isinstance(node, ast.ClassDef)
-            and any(_last(d) == "plugin" for d in node.decorator_list)
+            and any(_name_last_part(d) == "plugin" for d in node.decorator_list)
         ):
             continue
         if group := _group(node, module, ()):
@@ -223,10 +223,10 @@ def _group(node: ast.ClassDef, module: str, passed: tuple[ast.ClassDef, ...]) ->
     for item in node.body:
         if isinstance(item, ast.AnnAssign | ast.Assign) and isinstance(item.value, ast.Constant):
             targets = item.targets if isinstance(item, ast.Assign) else [item.target]
-            if "group" in map(_last, targets):
+            if "group" in map(_name_last_part, targets):
                 return str(item.value.value)
     for base in node.bases:
-        met, there = _class(_last(base), module, {module})
+        met, there = _class(_name_last_part(base), module, {module})
         if (
             met is not None
             and met not in (node, *passed)
@@ -259,7 +259,7 @@ def _imported_module(node: ast.ImportFrom, module: str) -> str:
     return ".".join([*package, *([node.module] if node.module else [])])
 
 
-def _last(node: ast.expr) -> str:
+def _name_last_part(node: ast.expr) -> str:
     """`plugin` of `@plugin`, of `@extend.plugin` and of `@plugin()`."""
     if isinstance(node, ast.Call):
         node = node.func

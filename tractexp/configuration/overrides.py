@@ -67,7 +67,7 @@ def overrides(arguments: Iterable[str]) -> list[str]:
     for argument in map(_without_plus, _name_model_file(arguments)):
         group, _, value = argument.partition("=")
         if group == "model/motor" and "[" in value:
-            result += _several(group, value)
+            result += _expand_choices(group, value)
         else:
             _check(argument, group, value)
             result.append(override(argument))
@@ -198,7 +198,7 @@ def groups() -> tuple[str, ...]:
     return ("hydra", *own, "model/motor", "model/static")
 
 
-def _several(group: str, value: str) -> list[str]:
+def _expand_choices(group: str, value: str) -> list[str]:
     """The overrides that a list chosen in a group stands for."""
     from tractexp.configuration.plugin import of_several
 
@@ -265,19 +265,19 @@ def format_assignment(key: str, value: object) -> str:
     them.
     """
     if isinstance(value, list | tuple):
-        return f"{key}=[{','.join(map(_plain, value))}]"
-    return f"{key}={value if isinstance(value, str) and _bare(value) else _plain(value)}"
+        return f"{key}=[{','.join(map(_write_for_hydra, value))}]"
+    return f"{key}={value if isinstance(value, str) and _is_quoted_whole(value) else _write_for_hydra(value)}"
 
 
-def _bare(value: str) -> bool:
+def _is_quoted_whole(value: str) -> bool:
     """Whether `override` quotes a value by itself: brackets behind a space are no function."""
-    return _plain(re.sub(r"\B[()]|[()]\B", "", value))[:1] != "'"
+    return _write_for_hydra(re.sub(r"\B[()]|[()]\B", "", value))[:1] != "'"
 
 
-def _plain(value: object) -> str:
+def _write_for_hydra(value: object) -> str:
     """A value as Hydra reads it, with quotes where it needs some."""
     if isinstance(value, Mapping):
-        return f"{{{','.join(f'{key}:{_plain(inner)}' for key, inner in value.items())}}}"
+        return f"{{{','.join(f'{key}:{_write_for_hydra(inner)}' for key, inner in value.items())}}}"
     if isinstance(value, str):
         plain = WORD.search(value) and value == value.strip() and not NO_NAME.fullmatch(value)
         return value if plain and not set(value) & MARKS else quoting.hydra(value)

@@ -400,7 +400,7 @@ def of_several(group: str, given: Sequence[Any]) -> dict[str, Any]:
     raise UserError(f"{group}={list(given)} is a list; one name is chosen there")
 
 
-def chosen(group: str, given: Any) -> Any:
+def build_chosen(group: str, given: Any) -> Any:
     """The plugin of a setting that is a name, or a mapping of `name` and settings."""
     if isinstance(given, str):
         return build(group, {"name": given})

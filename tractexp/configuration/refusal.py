@@ -93,12 +93,12 @@ def _argument(error: BaseException | None) -> str | None:
     while error is not None:
         for frame, _ in reversed(list(traceback.walk_tb(error.__traceback__))):
             if line := getattr(frame.f_locals.get("override"), "input_line", None):
-                return _short(line)
+                return _shorten(line)
         error = error.__cause__ or error.__context__
     return None
 
 
-def _short(text: object) -> str:
+def _shorten(text: object) -> str:
     """A text on one line, cut where it is long."""
     text = " ".join(str(text).split())
     return text if len(text) <= LONGEST_REPEATED_VALUE else f"{text[:LONGEST_REPEATED_VALUE]}…"
@@ -110,7 +110,7 @@ def _describe_missing_choice(error: Any) -> str:
     group, _, choice = name.rpartition("/")
     options = [o for o in error.options or () if not o.startswith("_")]
     if not group or not options:
-        return _plain(error)
+        return _read_first_line(error)
     where = elsewhere(group, choice) or describe_available(group, choice, options)
     if extra := EXTRAS.get(f"{group}={choice}"):
         where = f" before it is installed: pip install 'tractexp[{extra}]'"
@@ -130,7 +130,7 @@ def _sentence(error: BaseException) -> str:
     if group and "No match in the defaults list" in str(error):
         groups = _groups()
         return f"there is no group '{group[1]}'{among(group[1], groups, 'Groups')}"
-    return _plain(error)
+    return _read_first_line(error)
 
 
 def _list_causes(error: BaseException) -> list[BaseException]:
@@ -153,7 +153,7 @@ def _wrong_value(key: str, text: str) -> str:
     if match := re.search(
         r"[Vv]alue '(.*)' of type '.*' could not be converted to (\w+)", text, re.DOTALL
     ):
-        return f"{key}={_short(match[1])} is not {KINDS.get(match[2], 'what this setting takes')}"
+        return f"{key}={_shorten(match[1])} is not {KINDS.get(match[2], 'what this setting takes')}"
     if "is not a ListConfig" in text:
         return f"{key} takes a list, such as {key}=[a,b]"
     return ""
@@ -188,22 +188,22 @@ SENTENCES = {
 }
 
 
-def _plain(error: BaseException) -> str:
+def _read_first_line(error: BaseException) -> str:
     """The first line of an exception where it is in plain words, else what can be said in its
     place.
     """
     text = first_line(error)
     for pattern, sentence in SENTENCES.items():
         if match := re.match(pattern, text):
-            return sentence.format(*map(_short, match.groups()))
+            return sentence.format(*map(_shorten, match.groups()))
     if match := re.match(r"LexerNoViableAltException: (.*)", text, re.DOTALL):
         return (
-            f"{_short(match[1])} cannot be read; an argument is KEY=VALUE, and other signs go in"
+            f"{_shorten(match[1])} cannot be read; an argument is KEY=VALUE, and other signs go in"
             " quotes: KEY='a \"b\"'"
         )
     if match := re.match(r"Error merging override (.*)", text, re.DOTALL):
         return (
-            f"{_short(match[1])} cannot be applied: every run may need that setting, or it holds no"
+            f"{_shorten(match[1])} cannot be applied: every run may need that setting, or it holds no"
             " such value"
         )
     return text if not PYTHON.search(text) else _unforeseen(error)

@@ -40,7 +40,7 @@ from tractexp.inference.fitting import (
 from tractexp.inference.multistart import DISTINCT
 from tractexp.inference.score_test import Score
 from tractexp.noise import Noise
-from tractexp.parameter import best_distinct, even
+from tractexp.parameter import best_distinct, spread_evenly
 
 MOST_STEPS = 6  # of adding and leaving out
 SHORTLIST = {1: 10, 2: 8, 3: 4}  # sets of each size that are refitted
@@ -322,7 +322,7 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
     right one. There a right effect may have no size at all.
     """
     at, candidate = context.coordinates, context.catalogue[fit.names[0]]
-    points = even(BOX_POINTS, len(at.base))
+    points = spread_evenly(BOX_POINTS, len(at.base))
     units = np.repeat(fit.unit[None], BOX_POINTS, axis=0)
     units[:, at.base] = points
     for p, column in zip(candidate.sizes, at.sizes(fit.names), strict=True):

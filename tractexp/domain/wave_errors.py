@@ -70,7 +70,9 @@ def _of_voltage(problem: "Problem", values: np.ndarray, event: int) -> np.ndarra
     drive, part = problem.drive, problem.drive.part(event)
     plain = problem.events[event]
     assert isinstance(plain, WaveEvent)
-    off = _differences(problem, values, event, [*_shift_voltage_offsets(plain), *_between(plain)])
+    off = _differences(
+        problem, values, event, [*_shift_voltage_offsets(plain), *_vary_between_samples(plain)]
+    )
     shapes = np.zeros((len(off), *drive.measurements.shape))
     shapes[:, :, part] = off * (drive.weights[:, part] > 0)
     return shapes
@@ -106,7 +108,7 @@ def _shift_voltage_offsets(event: WaveEvent) -> list[WaveEvent]:
     ]
 
 
-def _between(event: WaveEvent) -> list[WaveEvent]:
+def _vary_between_samples(event: WaveEvent) -> list[WaveEvent]:
     """The event with what its voltage may be besides between two samples, where it is least smooth.
 
     How far each sample lies off a cubic through its neighbors tells how far the cubic may be off

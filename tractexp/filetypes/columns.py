@@ -20,7 +20,7 @@ from tractexp.filetypes.column_words import (
     find_quantity,
     split_words,
 )
-from tractexp.recording.phase_mark import ORDERS, plain, spell_marks
+from tractexp.recording.phase_mark import ORDERS, normalize, spell_marks
 
 # line voltages that are the opposite of those of `data.columns`
 BACKWARD = {"ba": "ab", "cb": "bc", "ac": "ca"}
@@ -107,7 +107,7 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     if unmarked := _fraction(words, unit) or _other_role(words, unit, electrical):
         return unmarked
     spelled, ground = spell_marks(name, order)
-    if spelled != plain(name):
+    if spelled != normalize(name):
         words = split_words(spelled)
     said = find_marked_quantity(words, kind, ground, electrical)
     if said is None:

@@ -83,13 +83,13 @@ def read_header(path: Path, encoding: str | None = None) -> Header:
         place = parts["CFG"]
         first = parts["CFG"].line
     else:
-        place = _whole(_pair(path)[0])
+        place = _read_bytes(_pair(path)[0])
         first = 1
     text, _ = decode(_configuration(place), str(path), encoding)
     return parse(str(path), lines(text), Remarks(str(path)), first)
 
 
-def _whole(path: Path) -> ByteRange:
+def _read_bytes(path: Path) -> ByteRange:
     """All bytes of a file."""
     return ByteRange(path, 0, files.size(path))
 
@@ -100,8 +100,8 @@ def _read_pair(path: Path, encoding: str | None) -> Recording:
     remarks = Remarks(str(cfg))
     if note:
         remarks.add(note)
-    text, encoding = decode(_configuration(_whole(cfg)), str(cfg), encoding)
-    return _recording(cfg, text, _whole(dat), remarks, {"encoding": encoding})
+    text, encoding = decode(_configuration(_read_bytes(cfg)), str(cfg), encoding)
+    return _recording(cfg, text, _read_bytes(dat), remarks, {"encoding": encoding})
 
 
 def _read_combined(path: Path, encoding: str | None) -> Recording:

@@ -44,7 +44,7 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     names, units = map(list, zip(*parted, strict=True))
     beside = _units_beside(rows, named, first, any(units))
     if beside is not None:
-        own = _pad_texts(_bare(rows[beside]), len(units))
+        own = _pad_texts(_strip_brackets(rows[beside]), len(units))
         units = [unit or by_name for unit, by_name in zip(own, units, strict=False)]
     above = rows[: named - 1 if beside == named - 1 else named]
     for groups in above[-1:]:
@@ -114,7 +114,7 @@ def _find_name_row(rows: Sequence[Sequence[Any]], first: int) -> int | None:
         texts = [_text(cell) for cell in rows[i]]
         filled = [text for text in texts if text]
         enough = len(filled) >= 2 and 2 * len(filled) >= len(rows[first]) - 1
-        if enough and not (_are_units(_bare(rows[i])) and i > 0):
+        if enough and not (_are_units(_strip_brackets(rows[i])) and i > 0):
             return i
     return None
 
@@ -125,13 +125,13 @@ def _units_beside(
     """The row of units below the names, or above names without units of their own (one letter alone
     is a group's).
     """
-    if named + 1 < first and _are_units(_bare(rows[named + 1])):
+    if named + 1 < first and _are_units(_strip_brackets(rows[named + 1])):
         return named + 1
-    above = _bare(rows[named - 1]) if named and not with_units else []
+    above = _strip_brackets(rows[named - 1]) if named and not with_units else []
     return named - 1 if _are_units(above) and len({text for text in above if text}) > 1 else None
 
 
-def _bare(row: Sequence[Any]) -> list[str]:
+def _strip_brackets(row: Sequence[Any]) -> list[str]:
     """The texts of a row without brackets."""
     return [_text(cell).strip("[]() ") for cell in row]
 

@@ -147,7 +147,7 @@ def _columns(
     columns, names, notes = [], [], []
     for k, number, name, unit in every:
         alike = [one for one in every if one[0] != k and one[2].lower() == name.lower()]
-        if any(one[0] < k and _same(parts, one[:2], (k, number)) for one in alike):
+        if any(one[0] < k and _hold_same_cells(parts, one[:2], (k, number)) for one in alike):
             notes.append(f"column '{name}' of {parts[k].source} is that of an earlier file")
             continue
         columns.append((k, number))
@@ -155,7 +155,7 @@ def _columns(
     return columns, names, notes
 
 
-def _same(parts: Sequence[TableFile], one: Place, other: Place) -> bool:
+def _hold_same_cells(parts: Sequence[TableFile], one: Place, other: Place) -> bool:
     """Whether two columns hold the same cells, and not one value alone, as dead channels do."""
     (j, a), (k, b) = one, other
     if any(

@@ -45,7 +45,7 @@ def describe_missing_columns(
 
 def _suggest_columns(table: TableFile, options: Mapping[str, Any], missing: Sequence[str]) -> str:
     """The setting that says which columns the missing ones are, with those that may be meant."""
-    meant = {key: name for key in missing if (name := _meant(table, options, key))}
+    meant = {key: name for key in missing if (name := _find_meant_column(table, options, key))}
     said = ", ".join(f"{key}: '{meant[key]}'" if key in meant else f"{key}: ..." for key in missing)
     which = f"if {', '.join(meant.values())} is meant, say so" if meant else "say which is which"
     return f"{which}: {DATA.columns}={{{said}}}"
@@ -58,7 +58,9 @@ def _list_missing_powers(options: Mapping[str, Any]) -> list[str]:
     return [key for key, is_there in there.items() if not is_there]
 
 
-def _meant(table: TableFile, options: Mapping[str, list[MappedColumn]], key: str) -> str:
+def _find_meant_column(
+    table: TableFile, options: Mapping[str, list[MappedColumn]], key: str
+) -> str:
     """The one column that may be meant by a key that is missing: of its quantity by name, or that
     counts up as t does.
 

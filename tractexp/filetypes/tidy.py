@@ -45,7 +45,7 @@ def write_record(record: Record, path: Path) -> list[Path]:
         "more": list(record.more),
     }
     return [
-        _written({**record.channels, **record.more}, path),
+        _write_columns({**record.channels, **record.more}, path),
         files.write_json(path.with_suffix(".json"), content),
     ]
 
@@ -63,7 +63,7 @@ def write_recording(recording: Recording, path: Path) -> list[Path]:
         *map(_read_raw_values, recording.channels),
         *(s.values() for s in recording.status),
     ]
-    table = _written(dict(zip(named, values, strict=True)), path)
+    table = _write_columns(dict(zip(named, values, strict=True)), path)
     content = {"source": recording.source, "recording": _content(recording)}
     return [table, files.write_json(path.with_suffix(".json"), content)]
 
@@ -234,7 +234,7 @@ def _channel(content: Mapping[str, Any], values: np.ndarray) -> Channel:
     return Channel(raw=raw.astype(kind), limits=limits and (limits[0], limits[1]), **fields)
 
 
-def _written(columns: Mapping[str, np.ndarray], path: Path) -> Path:
+def _write_columns(columns: Mapping[str, np.ndarray], path: Path) -> Path:
     """Write columns of numbers; the digits of CSV are those that give the same bits."""
     import pyarrow
     from pyarrow import csv as arrow

@@ -180,11 +180,11 @@ def nearest(raw: np.ndarray, stretches: Sequence[Stretch]) -> np.ndarray:
     parts = []
     for s in stretches:
         own = raw[s.first : s.stop]
-        parts.append(own if s.t is None else own[_closest(s.t, _even(s))])
+        parts.append(own if s.t is None else own[_closest(s.t, _spread_times(s))])
     return np.concatenate(parts)
 
 
-def _even(s: Stretch) -> np.ndarray:
+def _spread_times(s: Stretch) -> np.ndarray:
     """The even times [s] of a stretch."""
     return s.segment.start + np.arange(s.stop - s.first) / s.segment.rate
 
@@ -207,7 +207,9 @@ def _interpolate_stretch(raw: np.ndarray, s: Stretch, missing: float | None) -> 
     if lacking.any():
         values[lacking] = np.interp(s.t[lacking], s.t[~lacking], values[~lacking])
     even = (
-        CubicSpline(s.t, values)(_even(s)) if len(values) > 3 else np.interp(_even(s), s.t, values)
+        CubicSpline(s.t, values)(_spread_times(s))
+        if len(values) > 3
+        else np.interp(_spread_times(s), s.t, values)
     )
-    even[lacking[_closest(s.t, _even(s))]] = np.nan
+    even[lacking[_closest(s.t, _spread_times(s))]] = np.nan
     return even

@@ -24,7 +24,7 @@ from tractexp.identification.verdict import (
 )
 from tractexp.inference.model_error import model_error
 from tractexp.inference.problem import Problem
-from tractexp.parameter import even
+from tractexp.parameter import spread_evenly
 from tractexp.record import Event
 
 FREE_STARTS = 4  # of the free fit, beside the estimate
@@ -110,7 +110,7 @@ def find_free_optimum(
         return None
     likelihood = replace(uncertainty.likelihood, problem=free)
     known = free.space.to_unit(uncertainty.values)
-    starts = np.vstack([known, even(FREE_STARTS, len(known))])
+    starts = np.vstack([known, spread_evenly(FREE_STARTS, len(known))])
     coordinates = likelihood.place_parameters(np.clip(starts, 0.0, 1.0))
     if uncertainty.exact:
         coordinates[:, likelihood.free :] = uncertainty.unit[uncertainty.likelihood.free :]

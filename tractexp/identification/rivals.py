@@ -20,7 +20,7 @@ from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import IDENTIFIED, IDENTIFIED_SHARE, ParameterVerdict, size
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
-from tractexp.parameter import even
+from tractexp.parameter import spread_evenly
 from tractexp.text.progress import Counting, make_silent_counter
 
 STARTS = 5  # of the parameters that the rival alone has
@@ -172,5 +172,5 @@ def _starts(uncertainty: Uncertainty, other: Problem) -> np.ndarray:
     alone = [k for k, n in enumerate(names) if n not in shared]
     usual = np.array([shared.get(n, parameters[n.partition("[")[0]].default) for n in names])
     start = np.tile(other.space.to_unit(usual), (STARTS + 1, 1))
-    start[1:, alone] = even(STARTS, max(len(alone), 1))[:, : len(alone)]
+    start[1:, alone] = spread_evenly(STARTS, max(len(alone), 1))[:, : len(alone)]
     return np.clip(start, 0.0, 1.0)

@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
-from tractexp.parameter import best_distinct, even
+from tractexp.parameter import best_distinct, spread_evenly
 
 SCREENED = 4096  # points of the box that are simulated
 STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
@@ -36,7 +36,7 @@ def screen_points(problem: Problem) -> tuple[np.ndarray, float]:
     float [pu²]
         The least objective of all points.
     """
-    points = even(SCREENED, problem.space.dimension)
+    points = spread_evenly(SCREENED, problem.space.dimension)
     objective = problem.objective(problem.space.from_unit(points))
     return points[best_distinct(points, objective, APART, STARTS, norm=2)], float(objective.min())
 

@@ -16,7 +16,7 @@ from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import COMPARED, Effect
 from tractexp.noise.quiet import quiet_stretches
 from tractexp.noise.random_walk import Load
-from tractexp.parameter import Box, Parameter, even
+from tractexp.parameter import Box, Parameter, spread_evenly
 from tractexp.record import Event
 from tractexp.record.own_base import SMALLEST_BASE
 
@@ -540,7 +540,7 @@ class Problem:
         """
         fine, probes = (
             self.domain.finest,
-            self.candidates(self.space.from_unit(even(PROBES, self.space.dimension))),
+            self.candidates(self.space.from_unit(spread_evenly(PROBES, self.space.dimension))),
         )
         chosen, error = self.model.substeps(self.drive, probes, fine, share, self._until)
         # Stiff circuits of the box may diverge, and are refused.

@@ -65,7 +65,7 @@ class Workers:
         """
         from joblib import delayed, effective_n_jobs
 
-        with self._chosen(), _quiet():
+        with self._chosen(), _silence_joblib():
             n = min(self.n_jobs if self.n_jobs > 0 else effective_n_jobs(self.n_jobs), count)
             parallel = _make_parallel(max(n, 1 + self.apart), ahead=n)
             calls = (delayed(_number_result)(function, k, item) for k, item in enumerate(items))
@@ -77,7 +77,7 @@ class Workers:
                     yield from (result for result in results if result is not None)
                 finally:
                     # anew: a thread that ends its own `catch_warnings` takes these filters back
-                    with _quiet():
+                    with _silence_joblib():
                         if not isinstance(results, list):
                             results.close()
 
@@ -193,7 +193,7 @@ def _note_items(
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def _silence_joblib() -> Iterator[None]:
     """Without two warnings of joblib's.
 
     A worker that has grown by 300 MB ends between two calls, and another takes its place. Joblib

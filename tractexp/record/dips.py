@@ -132,7 +132,7 @@ def leave_out(record: Record, times: Sequence[float], reach: float) -> Record:
     return replace(record, P=P, Q=Q)
 
 
-def around(event: Event) -> Event:
+def view_dip(event: Event) -> Event:
     """The event in the part of its record about its dip; itself where the record is hardly longer.
 
     Every simulation goes through all of it, and a load has answered long before an hour is over.

@@ -172,7 +172,7 @@ def detect(record: Record) -> Event:
     unfinished = end == record.samples
     end = min(end, record.samples - 1)
     usual = _steady(record, start, swells)
-    before, notes = steady_part(record, usual, _least(record))
+    before, notes = steady_part(record, usual, _count_least_samples(record))
     if before.start > usual.start:  # what was before is another state, which is not fitted
         first = before.start
         start, end, before = start - first, end - first, slice(0, before.stop - first)
@@ -229,10 +229,10 @@ def steady(record: Record) -> slice:
     start = dips[0][0] if dips else 0
     if start < FEWEST_BEFORE:
         return slice(0, record.samples)
-    return steady_part(record, _steady(record, start, swells), _least(record))[0]
+    return steady_part(record, _steady(record, start, swells), _count_least_samples(record))[0]
 
 
-def _least(record: Record) -> int:
+def _count_least_samples(record: Record) -> int:
     """Samples that a steady state has at least."""
     return max(FEWEST_BEFORE, round(0.1 * record.rate))
 
@@ -240,7 +240,7 @@ def _least(record: Record) -> int:
 def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
     """The last second before the dip, or before a swell that leaves too little room behind it."""
     most = max(FEWEST_BEFORE, round(STEADY * record.rate))
-    least = _least(record)
+    least = _count_least_samples(record)
     stop, first = start, max(0, start - most)
     for begin, end in reversed([swell for swell in swells if swell[0] < start]):
         if end <= first:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.configuration.plugin import chosen
+from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import UserError, setting
 from tractexp.record.direction import direction
 from tractexp.record.phasor import sequences
@@ -85,7 +85,7 @@ def _arrange_order(recording: Recording, feeder: Feeder) -> Feeder:
     """As `arrange_feeder`; raises `OtherOrder` with an order that nobody has tried yet."""
     _residuals(recording, feeder)
     feeder = take_lines_by_label(recording, feeder)
-    connection = chosen("connection", feeder.connection)
+    connection = build_chosen("connection", feeder.connection)
     live = measure_live_phasors(recording, feeder)
     if live is None:
         check_labels(recording, feeder, None)

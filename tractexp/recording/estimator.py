@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tractexp.configuration.plugin import Plugin, chosen, discover
+from tractexp.configuration.plugin import Plugin, build_chosen, discover
 from tractexp.errors import UserError
 from tractexp.record.phasor import Averager, make_weighted_averager
 from tractexp.record.window import Window
@@ -92,7 +92,7 @@ def estimator_of(setting: str | Mapping[str, object] | None = None) -> Estimator
     if setting is None:
         estimators = discover()[Estimator.group].items()
         setting = min(name for name, cls in estimators if getattr(cls, "usual", False))
-    return chosen(Estimator.group, setting)
+    return build_chosen(Estimator.group, setting)
 
 
 def estimators(nominal: float) -> list[Estimator]:

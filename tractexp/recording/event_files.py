@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, check_distinct, setting
-from tractexp.recording.phase_mark import plain, spell_marks
+from tractexp.recording.phase_mark import normalize, spell_marks
 from tractexp.recording.record_files import find_packed
 from tractexp.storage import files
 from tractexp.text.quoting import shell
@@ -55,7 +55,7 @@ def name_one_event(paths: Sequence[str]) -> bool:
     """Whether names say that files are of one event: they differ in a phase alone, or in what is
     measured.
     """
-    told = [plain(one) for one in tell_apart(paths)]
+    told = [normalize(one) for one in tell_apart(paths)]
     known = all(_names_phase(one) or QUANTITY.fullmatch(one) for one in told)
     return 1 < len(paths) <= MOST_FILES and known and len(set(told)) == len(told)
 

@@ -78,7 +78,7 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
     reference = starting_level(trace.t[k:], levels[:, k:], limits, count, trigger)
     reference = np.maximum(reference, DEAD_VOLTAGE_SHARE * levels.max(axis=1))
     while k < len(trace.t):
-        inside, reference = _inside(
+        inside, reference = _count_samples_inside(
             levels[:, k : k + HALF_CYCLES_AT_ONCE], limits, reference, trace.step
         )
         if inside:
@@ -117,7 +117,7 @@ def _find_slide(trace: Trace, event: Excursion, k: int, count: int) -> Excursion
     return replace(event, end=end, worst=worst, returned=False, new_level=True, sudden=False)
 
 
-def _inside(
+def _count_samples_inside(
     levels: np.ndarray, limits: np.ndarray, reference: np.ndarray, step: float
 ) -> tuple[int, np.ndarray]:
     """How many samples of the levels (K, M) stay within the limits of the reference, which slides,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.configuration.plugin import chosen
+from tractexp.configuration.plugin import build_chosen
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.channel_group import list_names
 from tractexp.recording.connection import usual
@@ -74,7 +74,7 @@ def _size_of(recording: Recording, phasors: Snapshots, feeder: Feeder) -> str:
     """Voltage and powers of a feeder while it is alive, in words."""
     if any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
         return "units in doubt"
-    connection = chosen("connection", feeder.connection)
+    connection = build_chosen("connection", feeder.connection)
     V = connection.voltage() @ phasors.select_channels(feeder.voltages)
     I = connection.current() @ phasors.select_channels(feeder.currents)
     size = np.nan_to_num(np.linalg.norm(V, axis=0))

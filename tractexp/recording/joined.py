@@ -125,7 +125,7 @@ def _name_channels(recordings: Sequence[Recording]) -> tuple[list[Channel], list
     notes: list[str] = []
     for k, recording in enumerate(recordings):
         for channel in recording.channels:
-            if any(j < k and _same(channel, one) for j, one in kept):
+            if any(j < k and _hold_same_samples(channel, one) for j, one in kept):
                 name = channel.name.strip()
                 source = Path(recording.source).name
                 notes.append(f"channel '{name}' of {source} is that of an earlier file")
@@ -138,7 +138,7 @@ def _name_channels(recordings: Sequence[Recording]) -> tuple[list[Channel], list
     ], notes
 
 
-def _same(one: Channel, other: Channel) -> bool:
+def _hold_same_samples(one: Channel, other: Channel) -> bool:
     """Whether two files hold the same samples under the same name, and not one value alone, as
     dead channels do.
     """

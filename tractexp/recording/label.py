@@ -20,8 +20,8 @@ from tractexp.recording.phase_mark import (
     MOST_KNOWN_NAMES,
     ORDERS,
     QUANTITY,
+    normalize,
     pairs,
-    plain,
     quantity_before,
     spell_marks,
 )
@@ -105,7 +105,7 @@ class Group:
 
 def residual(channel: Channel) -> bool:
     """Whether the name or the phase says that this is a neutral or zero-sequence quantity."""
-    return bool(RESIDUAL.search(plain(channel.name))) or plain(channel.phase) in (
+    return bool(RESIDUAL.search(normalize(channel.name))) or normalize(channel.phase) in (
         "n",
         "g",
         "e",
@@ -118,11 +118,11 @@ def find_residuals(channels: Sequence[Channel]) -> list[int]:
     """Places in a list of the channels that are residual; U0 beside U4 and U8 is the phase at that
     hour of a clock.
     """
-    names = {plain(channel.name) for channel in channels}
+    names = {normalize(channel.name) for channel in channels}
     return [
         k
         for k, channel in enumerate(channels)
-        if residual(channel) and not _is_hour(plain(channel.name), names)
+        if residual(channel) and not _is_hour(normalize(channel.name), names)
     ]
 
 
@@ -146,16 +146,17 @@ def kind(channel: Channel) -> str:
     """voltage or current, by unit, else by the letter that starts a word of its name; "" for what
     is no wave.
     """
-    if NO_WAVE.search(plain(channel.name)):
+    if NO_WAVE.search(normalize(channel.name)):
         return ""
     if channel.quantity:
         return channel.quantity if channel.quantity in ("voltage", "current") else ""
     if channel.unit.strip().lower() in OTHER_UNITS:
         return ""
-    if plain(channel.name) in ("u", "v", "i", "udc", "vdc", "idc"):
-        return "current" if plain(channel.name)[0] == "i" else "voltage"
+    if normalize(channel.name) in ("u", "v", "i", "udc", "vdc", "idc"):
+        return "current" if normalize(channel.name)[0] == "i" else "voltage"
     letter = re.search(
-        r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwyn]{1,2})(?![a-z]))", plain(channel.name)
+        r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwyn]{1,2})(?![a-z]))",
+        normalize(channel.name),
     )
     return "" if letter is None else "current" if letter[1] == "i" else "voltage"
 
@@ -176,7 +177,7 @@ def phase(channel: Channel, orders: Sequence[str] = ORDERS) -> str:
 @functools.lru_cache(maxsize=MOST_KNOWN_NAMES)
 def _read_phase(label: str, orders: tuple[str, ...]) -> str:
     """The phases of a label, by one of these orders of letters; "" where it names none."""
-    label = re.sub(r"phasen?|phase|fase|фaзa|[-_/ 相]", "", plain(label))
+    label = re.sub(r"phasen?|phase|fase|фaзa|[-_/ 相]", "", normalize(label))
     label = re.sub(r"(?<=.)(?:n|g|e|pe|gnd)$", "", label)  # to ground, as a phase by itself is
     for text in (label, label.removeprefix("l"), label[1:] if label[:1] in QUANTITY else ""):
         marks = [*text.replace("l", "")]
@@ -231,7 +232,7 @@ def _order_by_phases(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool
 
 def _order_by_names(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
     """The same by marks at one place of all names, as they stand, else without counting numbers."""
-    names = [plain(c.name) for c in channels]
+    names = [normalize(c.name) for c in channels]
     for texts in (names, [COUNTER.sub("", name) for name in names]):
         read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]
         if len(channels) == 2:  # of which one may count down: AB and CB
@@ -249,7 +250,9 @@ def _order_by_names(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool]
 
 def backward(channels: Sequence[Channel]) -> bool:
     """Whether the names of line-to-line voltages count down: U21, BA."""
-    return all(any(key.endswith("-") for key, *_ in _marks(plain(f"{c.name}"))) for c in channels)
+    return all(
+        any(key.endswith("-") for key, *_ in _marks(normalize(f"{c.name}"))) for c in channels
+    )
 
 
 def _compare_phase(channel: Channel, letters: str, place: int) -> int:
@@ -269,10 +272,10 @@ def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: b
     )
     worth: dict[tuple[str, str, bool], float] = defaultdict(float)
     for i, channel in channels.items():
-        text = plain(channel.name)
+        text = normalize(channel.name)
         text = text if counters else COUNTER.sub("", text)
         for key, letters, two, place, score in _marks(text):
-            label = (f"{key} {plain(channel.circuit)}" if full else key, letters, two)
+            label = (f"{key} {normalize(channel.circuit)}" if full else key, letters, two)
             buckets[label][place].append(i)
             agreement = _compare_phase(channel, letters, place)
             worth[label] = max(worth[label], score + 4 * agreement)
@@ -354,7 +357,7 @@ def _by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Group]:
     buckets: dict[tuple[str, str], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
     down: dict[tuple[str, str], set[int]] = defaultdict(set)
     for i, channel in channels.items():
-        for key, letters, two, place, _ in _marks(plain(channel.name)):
+        for key, letters, two, place, _ in _marks(normalize(channel.name)):
             if two:
                 label = key.removesuffix("-"), letters
                 buckets[label][place].append(i)
@@ -384,7 +387,7 @@ def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
             mark = phase(channel, (letters,))
             if mark and i not in used:
                 place = "abc".index(mark) if len(mark) == 1 else PLACE[mark]
-                rows[plain(channel.circuit), len(mark) == 2][place].append(i)
+                rows[normalize(channel.circuit), len(mark) == 2][place].append(i)
         for (_, two), places in rows.items():
             for have, missing in _sets(places, size):
                 shared = shared_name([channels[n] for n in have])
@@ -419,7 +422,7 @@ def shared_name(channels: list[Channel]) -> str:
     tail = _find_common_start([rest[::-1] for rest in rests])[::-1]
     if len({*map(len, names)}) == 1:  # the mark may stand in several places
         tail = "".join(letters[0] for letters in zip(*rests, strict=True) if len({*letters}) == 1)
-    counters = [COUNTER.match(plain(n)) for n in names]
+    counters = [COUNTER.match(normalize(n)) for n in names]
     head = "" if counters[0] and len({counter and counter[0] for counter in counters}) > 1 else head
     head = re.sub(r"(?i)(?:^|(?<=[^a-z]))[uvi]l?$", "", head)
     name = " ".join(f"{head} {tail}".split()).strip(" _-.:")
@@ -433,7 +436,7 @@ def words(text: str) -> set[str]:
     """The parts of a name, to be compared with another: words, numbers, single
     Chinese characters.
     """
-    text = plain(text)
+    text = normalize(text)
     parts: set[str] = set(re.findall(r"[a-z]+|\d+|[^\W\d_a-z\u2e80-\u9fff]+|[\u2e80-\u9fff]", text))
     # "2СШ", "T1"
     parts |= set(re.findall(r"\d+[^\W\d_\u2e80-\u9fff]+|[^\W\d_\u2e80-\u9fff]+\d+", text))

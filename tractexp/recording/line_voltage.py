@@ -7,7 +7,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from tractexp.configuration.plugin import chosen
+from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import DATA, UserError
 from tractexp.record.phasor import sequences
 from tractexp.recording.connection import usual
@@ -66,7 +66,7 @@ def name_line_connection(feeder: Feeder) -> Any:
 
 def check_lines(recording: Recording, feeder: Feeder) -> None:
     """Refuse phase voltages where the connection needs line-to-line ones."""
-    connection = chosen("connection", feeder.connection)
+    connection = build_chosen("connection", feeder.connection)
     labels = order([recording.channels[i] for i in feeder.voltages])
     if not connection.lines or labels is None or labels[1]:
         return

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.configuration.plugin import chosen
+from tractexp.configuration.plugin import build_chosen
 from tractexp.record.direction import at_level
 from tractexp.record.phasor import sequences
 from tractexp.recording.feeder import Feeder
@@ -39,7 +39,7 @@ def measure_live_phasors(recording: Recording, feeder: Feeder) -> LivePhasors | 
     windows = snapshots(recording, numbers, frequency_of(recording, feeder.voltages))
     if windows is None or not any(windows.pure(i) for i in feeder.voltages):
         return None  # noise has no order
-    connection = chosen("connection", feeder.connection)
+    connection = build_chosen("connection", feeder.connection)
     V = connection.voltage() @ windows.select_channels(feeder.voltages)
     I = (
         connection.current()
@@ -97,7 +97,7 @@ def find_answer(live: LivePhasors, permutation: tuple[int, ...] = (0, 1, 2)) -> 
     """
     V2, I2 = sequences(live.V)[1], sequences(live.I[[*permutation]])[1]
     V1 = np.abs(sequences(live.V)[0])
-    V2, I2 = V2 * _still(live), I2 * _still(live)
+    V2, I2 = V2 * _find_turns(live), I2 * _find_turns(live)
     dV, dI = V2 - np.median(V2[live.calm]), I2 - np.median(I2[live.calm])
     changed = np.abs(dV) > ADDED * np.median(V1)
     most = np.abs(live.I).max(axis=0)
@@ -110,7 +110,7 @@ def find_answer(live: LivePhasors, permutation: tuple[int, ...] = (0, 1, 2)) -> 
     return -1 if low <= measure_angle(-Y) <= high else 0
 
 
-def _still(live: LivePhasors) -> np.ndarray:
+def _find_turns(live: LivePhasors) -> np.ndarray:
     """The factors (M,) that turn phasors so that V1 has angle zero: windows far apart can then be
     compared.
     """

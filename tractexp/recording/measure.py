@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.configuration.plugin import chosen
+from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import DATA, UserError
 from tractexp.record.phasor import Phasors, measure
 from tractexp.recording.bridge import find_bridged
@@ -36,7 +36,7 @@ class FeederWaves:
         """Voltages and currents of a feeder in one segment, as its connection adds up the
         channels.
         """
-        connection = chosen("connection", feeder.connection)
+        connection = build_chosen("connection", feeder.connection)
         V, I = (
             connection.voltage(),
             (-1.0 if feeder.reverse_current else 1.0) * connection.current(),

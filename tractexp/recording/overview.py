@@ -346,7 +346,9 @@ def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
         )
         for what in happenings_of(record)
     ]
-    numbered = list(number_events(changes, _own(record) if dips is None else dips, record.source))
+    numbered = list(
+        number_events(changes, _list_own_dips(record) if dips is None else dips, record.source)
+    )
     if dips is None:
         numbered = [replace(each, dip=None) for each in numbered]
     course = Course.from_record(record)
@@ -354,7 +356,7 @@ def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
     return Sight(record.name, tuple(numbered), record=record, type_test=tested)
 
 
-def _own(record: Record) -> list[FileDip]:
+def _list_own_dips(record: Record) -> list[FileDip]:
     """The dips of a record that is fitted as it is: its first is the one that is meant."""
     later, t = (
         UserError("another dip of the record comes first, and is the one that is fitted"),

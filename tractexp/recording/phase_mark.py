@@ -74,7 +74,7 @@ class PhaseMark:
 
 
 @functools.lru_cache(maxsize=MOST_KNOWN_NAMES)
-def plain(text: str) -> str:
+def normalize(text: str) -> str:
     """A text in lower case, with full-width, Roman and look-alike Cyrillic letters as Latin ones.
 
     Examples

@@ -24,7 +24,7 @@ def is_swing_of_slip(trace: Trace, e: Excursion, slip: Excursion) -> bool:
 def _find_even_end(trace: Trace, lows: Sequence[int], first: int) -> int:
     """The number of the low after the last that follows the `first` at even distances."""
     last = first + 1
-    while last < len(lows) and _even(trace.t[lows[first : last + 1]]):
+    while last < len(lows) and _are_even(trace.t[lows[first : last + 1]]):
         last += 1
     return last
 
@@ -83,7 +83,7 @@ def _smooth(u: np.ndarray, k: int, trace: Trace) -> bool:
     return True
 
 
-def _even(t: np.ndarray) -> bool:
+def _are_even(t: np.ndarray) -> bool:
     """Whether times (n,) [s] follow one another as those of a swing do."""
     steps = np.diff(t)
     low, high = SWING_PERIOD

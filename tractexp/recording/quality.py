@@ -77,7 +77,7 @@ def quality(
     step, span = _step(channel, x if valid.all() else x[valid])
     f = _frequency(recording, number, segment, network)
     clipped = _measure_clipped_share(channel, x, segment, f or recording.frequency, step)
-    offset, level, noise, lag, count, thd = _quiet(
+    offset, level, noise, lag, count, thd = _measure_quiet_part(
         x, segment.rate, f, AT_WORK.get(channel.quantity, IDLE)
     )
     colour = _colour(lag, count, noise, step)
@@ -200,7 +200,7 @@ def _frequency(
     return f if f is not None and nearest_nominal(f) is not None else recording.frequency
 
 
-def _quiet(
+def _measure_quiet_part(
     x: np.ndarray, rate: float, f: float | None, at_work: float
 ) -> tuple[float, float, float, float, int, float]:
     """(mean, fundamental, noise, lag-1 correlation, samples, THD) in the quietest ten cycles of a

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.recording.label import kind, plain
+from tractexp.recording.label import kind, normalize
 from tractexp.recording.phase_mark import CYRILLIC
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots
@@ -90,7 +90,7 @@ def conductor_pairs(
     if len(volts) == 1 and not is_between_conductors(phasors, volts[0]):
         return []
     names = {
-        i: plain(f"{recording.channels[i].name} {recording.channels[i].circuit}") for i in amps
+        i: normalize(f"{recording.channels[i].name} {recording.channels[i].circuit}") for i in amps
     }
     feeds = [i for i in amps if FEED.search(names[i]) and not RETURN.search(names[i])]
     contacts = [i for i in amps if i not in feeds and not RETURN.search(names[i])]
@@ -124,9 +124,9 @@ def other_conductor(
     """The current of the other conductor of an autotransformer feeder, by name and angle; None
     where there is none.
     """
-    name = plain(recording.channels[current].name)
+    name = normalize(recording.channels[current].name)
     for other in amps:
-        names = name, plain(recording.channels[other].name)
+        names = name, normalize(recording.channels[other].name)
         feeds, contacts = (
             [bool(FEED.search(n)) for n in names],
             [bool(CONTACT.search(n)) for n in names],
@@ -143,7 +143,7 @@ def unnamed_conductor(
     """The only other current, of the same angle, where no name tells their conductors; else
     None.
     """
-    names = " ".join(plain(recording.channels[i].name) for i in amps)
+    names = " ".join(normalize(recording.channels[i].name) for i in amps)
     others = [i for i in amps if i != current]
     if len(others) != 1 or FEED.search(names) or CONTACT.search(names):
         return None
@@ -156,10 +156,10 @@ def is_return(recording: Recording, number: int) -> bool:
     "I_R" is, where no voltage is called R, as that of a phase is.
     """
     channel = recording.channels[number]
-    if RETURN.search(plain(f"{channel.name} {channel.circuit}")):
+    if RETURN.search(normalize(f"{channel.name} {channel.circuit}")):
         return True
-    name = plain(channel.name)
-    voltages = (plain(c.name) for c in recording.channels if kind(c) == "voltage")
+    name = normalize(channel.name)
+    voltages = (normalize(c.name) for c in recording.channels if kind(c) == "voltage")
     return name in ("ir", "i_r", "i r") and not any(
         re.search(r"(?<![a-z])(?:[uve][_ ]?)?r(?![a-z])", one) for one in voltages
     )
@@ -167,7 +167,7 @@ def is_return(recording: Recording, number: int) -> bool:
 
 def contact_first(recording: Recording, pair: tuple[int, int]) -> tuple[int, int]:
     """Two voltages, that of the contact line first, as far as their names tell."""
-    first, second = (plain(recording.channels[i].name) for i in pair)
+    first, second = (normalize(recording.channels[i].name) for i in pair)
     swapped = FEED.search(first) and CONTACT.search(second) and not FEED.search(second)
     return (pair[1], pair[0]) if swapped else pair
 

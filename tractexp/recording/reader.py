@@ -200,7 +200,7 @@ class WaveformReader(Reader):
             U2=phasors.U2 if len(phasors.V) == 3 else None,
             base=Base(frequency=frequency),
             source=self.path,
-            notes=plugin.chosen("connection", feeder.connection).notes,
+            notes=plugin.build_chosen("connection", feeder.connection).notes,
             window=window,
             more=phasors.more,
             waves=waves[0] if len(waves) == 1 else None,
@@ -240,7 +240,7 @@ class WaveformReader(Reader):
         if not (self.voltages or self.currents):
             return self._only(recording)
         name = self.connection or self._usual(recording)
-        connection = plugin.chosen("connection", name)
+        connection = plugin.build_chosen("connection", name)
         feeder = Feeder(
             self._numbers(recording, "voltages", connection.name, connection.voltages),
             self._numbers(recording, "currents", connection.name, connection.currents),

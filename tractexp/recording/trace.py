@@ -145,10 +145,10 @@ def _blocks(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[slice, tuple[in
 def _means(x: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Means (K, M) of x (K, N) from `low` to `high` (M,), sample k lying between k and k + 1."""
     total = np.concatenate([np.zeros((len(x), 1), x.dtype), np.cumsum(x, axis=1)], axis=1)
-    return (_between(total, high) - _between(total, low)) / (high - low)
+    return (_interpolate(total, high) - _interpolate(total, low)) / (high - low)
 
 
-def _between(values: np.ndarray, at: np.ndarray) -> np.ndarray:
+def _interpolate(values: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Values (K, N) at fractions of samples `at` (M,), by straight lines."""
     k = np.minimum(at.astype(int), values.shape[1] - 2)
     left = values.take(k, axis=1)

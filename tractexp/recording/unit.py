@@ -80,7 +80,7 @@ def _find_bare(
     stated = {channels[i].unit for i in numbers if not in_doubt(channels[i])}
     bare = [i for i in numbers if not channels[i].unit.strip()]
     size = max((_size(channels[i]) for i in bare), default=0.0)
-    return bare if bare and _plain(letter, size, stated, voltage) else []
+    return bare if bare and _is_plainly_volts(letter, size, stated, voltage) else []
 
 
 def in_units(
@@ -209,7 +209,7 @@ def _of_unit(channel: Channel, quantity: str, unit: str, number: float = 1.0) ->
     return replace(channel, unit=unit, quantity=quantity, gain=gain, offset=offset, side="")
 
 
-def _plain(letter: str, size: float, stated: set[str], voltage: str) -> bool:
+def _is_plainly_volts(letter: str, size: float, stated: set[str], voltage: str) -> bool:
     """Whether numbers without a unit, of that RMS, can be nothing but volts or amperes."""
     if size > GREATEST[letter]:
         return True

@@ -201,7 +201,7 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
     if entry["events"]:
         page.add(events(entry))
     else:
-        page.text(as_sentence(quiet(entry)))
+        page.text(as_sentence(explain_no_event(entry)))
     with page.fold_blocks(f"Charts of {entry['name']}") if folded else nullcontext():
         charts(page, view, shown)
 
@@ -225,7 +225,7 @@ def _describe_entry(entry: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def quiet(entry: Mapping[str, Any]) -> str:
+def explain_no_event(entry: Mapping[str, Any]) -> str:
     """The sentence on a load without events."""
     if entry.get("unexamined"):
         return f"{NOT_EXAMINED}: {entry['unexamined']}"

@@ -93,7 +93,7 @@ def _draw_unassigned(
         for k, channel in enumerate(group):
             color = PALETTE[k % len(PALETTE)]
             for segment in segments:
-                read = functools.partial(_read, channel, segment)
+                read = functools.partial(_read_values, channel, segment)
                 y = _thin_wave(read, segment.stop - segment.first, every)
                 step = every / segment.rate
                 chart.samples(channel.name, segment.start, step, y, color, panel)
@@ -293,7 +293,7 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> N
         chart.samples(name, float(t[0]), step * every, drawn, color, panel)
 
 
-def _read(channel: Channel, segment: Segment, a: int, b: int) -> np.ndarray:
+def _read_values(channel: Channel, segment: Segment, a: int, b: int) -> np.ndarray:
     """A channel's values within a part of a segment."""
     return channel.values(segment.first + a, segment.first + b)
 

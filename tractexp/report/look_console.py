@@ -20,10 +20,10 @@ from tractexp.report.look import (
     channels,
     describe_dead_phases,
     events,
+    explain_no_event,
     explain_unnamed,
     frequency,
     is_unexamined,
-    quiet,
     size,
     starts,
 )
@@ -121,7 +121,7 @@ def build_full_report(content: Entry) -> Report:
             if feeder["events"]:
                 page.add(events(feeder))
             else:
-                page.items([quiet(feeder)])
+                page.items([explain_no_event(feeder)])
             if feeder["command"]:
                 page.text("  to fit it:").code(feeder["command"])
         if not entry["feeders"]:
@@ -162,7 +162,7 @@ def _refuse(files: Sequence[Entry]) -> str:
     """Why nothing is worth fitting."""
     feeders = [feeder for entry in files for feeder in entry["feeders"]]
     happened = [(feeder, event) for feeder in feeders for event in feeder["events"]]
-    unexamined = [quiet(feeder) for feeder in feeders if feeder.get("unexamined")]
+    unexamined = [explain_no_event(feeder) for feeder in feeders if feeder.get("unexamined")]
     if not happened and unexamined:
         return unexamined[0]
     if not feeders and all(is_unexamined(entry) for entry in files):
@@ -170,7 +170,7 @@ def _refuse(files: Sequence[Entry]) -> str:
     if not happened:
         return (
             "nothing is worth fitting:"
-            f" {next(iter((*map(quiet, feeders), *map(explain_unnamed, files))), '')}"
+            f" {next(iter((*map(explain_no_event, feeders), *map(explain_unnamed, files))), '')}"
         )
     feeder, event = max(happened, key=lambda each: _measure_answer(each[1]))
     return f"nothing is worth fitting; {_event(event)} of {feeder['name']}: {event['why']}"
@@ -236,7 +236,7 @@ def _buses(feeders: Sequence[Entry]) -> list[list[Entry]]:
     return list(buses.values())
 
 
-def _same(event: Entry) -> tuple[Any, ...]:
+def _list_shared_facts(event: Entry) -> tuple[Any, ...]:
     """The facts of an event that two loads' views of it share."""
     return event["kind"], event["start"], event["end"]
 
@@ -246,8 +246,8 @@ def _common(bus: Sequence[Entry]) -> list[Entry]:
     each = [feeder["events"] for feeder in bus if feeder["loaded"]] or [
         feeder["events"] for feeder in bus
     ]
-    shared = set.intersection(*({_same(event) for event in events} for events in each))
-    return [event for event in each[0] if _same(event) in shared]
+    shared = set.intersection(*({_list_shared_facts(event) for event in events} for events in each))
+    return [event for event in each[0] if _list_shared_facts(event) in shared]
 
 
 def _of_voltage(bus: Sequence[Entry]) -> list[Entry]:
@@ -299,7 +299,9 @@ def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     if len(happened) > MOST_LINE_EVENTS:
         told.append(f"{len(happened) - MOST_LINE_EVENTS} more")
     events = join_words(told) or (
-        quiet(bus[0]) if any(feeder["loaded"] or not feeder["currents"] for feeder in bus) else ""
+        explain_no_event(bus[0])
+        if any(feeder["loaded"] or not feeder["currents"] for feeder in bus)
+        else ""
     )
     dead = "" if not happened else describe_dead_phases(bus[0].get("dead_phases"))
     parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), dead, events])
@@ -315,7 +317,7 @@ def _loads(entry: Entry, buses: Sequence[Sequence[Entry]]) -> Table:
             number,
             ", ".join(map(str, feeder["currents"])),
             *(figure(feeder[key]) for key in "PQ"),
-            _own(feeder, _common(bus)),
+            _describe_own_events(feeder, _common(bus)),
             _fit(feeder),
         ]
         for number, bus in enumerate(buses, 1)
@@ -328,10 +330,10 @@ def _loads(entry: Entry, buses: Sequence[Sequence[Entry]]) -> Table:
     return Table(columns, rows, words=(2, 5, 6), detail=empty)
 
 
-def _own(feeder: Entry, common: Sequence[Entry]) -> str:
+def _describe_own_events(feeder: Entry, common: Sequence[Entry]) -> str:
     """The events of a load that its bus did not have, in words."""
-    shared = {_same(event) for event in common}
-    own = (event for event in feeder["events"] if _same(event) not in shared)
+    shared = {_list_shared_facts(event) for event in common}
+    own = (event for event in feeder["events"] if _list_shared_facts(event) not in shared)
     return ", ".join(f"{_label(event)} at {starts(event, ' s')}" for event in own)
 
 
@@ -344,4 +346,8 @@ def _fit(feeder: Entry) -> str:
     if feeder["events"]:
         event = max(feeder["events"], key=_measure_answer)
         return f"no: {_clause(event['why'], ', but ') if event['kind'] == 'dip' else event['kind']}"
-    return f"no: {_clause(quiet(feeder), ', but ')}" if feeder["U"] is not None else "no: see below"
+    return (
+        f"no: {_clause(explain_no_event(feeder), ', but ')}"
+        if feeder["U"] is not None
+        else "no: see below"
+    )

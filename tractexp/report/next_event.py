@@ -38,7 +38,7 @@ def section(page: Report, choice: NextEvent) -> None:
     page.heading("What each kind of event would do", 3)
     page.table(
         ["event", "probability [%]"],
-        [_row(t) for kind in KINDS for t in _best(choice, kind)],
+        [_row(t) for kind in KINDS for t in _select_surest_events(choice, kind)],
         "Probability that all rivals but the true one are rejected, the least over all of them as"
         " the truth. The best events of each kind.",
         words=(0,),
@@ -104,7 +104,7 @@ def _kind(tried: EventTrial) -> str:
     return KINDS[2] if event.jump else KINDS[0]
 
 
-def _best(choice: NextEvent, kind: str) -> list[EventTrial]:
+def _select_surest_events(choice: NextEvent, kind: str) -> list[EventTrial]:
     """The surest events of a kind."""
     ranked = sorted(
         (t for t in choice.tried if _kind(t) == kind),

@@ -65,7 +65,7 @@ def chart(overlay: Overlay) -> Chart:
         overlay.event,
         curves,
         deviation=overlay.deviation,
-        around=_best(overlay),
+        around=_compute_best_curves(overlay),
         places=overlay.places,
         driving=overlay.driving,
     )
@@ -75,7 +75,11 @@ def currents(event: WaveEvent, overlay: Overlay) -> Chart:
     """The currents of the phases, in which the noise band is that of the best of the models."""
     curves = [Drawn(*model) for model in _models(overlay)]
     return wave_chart(
-        event, curves, deviation=overlay.deviation, around=_best(overlay), places=overlay.places
+        event,
+        curves,
+        deviation=overlay.deviation,
+        around=_compute_best_curves(overlay),
+        places=overlay.places,
     )
 
 
@@ -108,6 +112,6 @@ def _models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:
     ]
 
 
-def _best(overlay: Overlay) -> np.ndarray:
+def _compute_best_curves(overlay: Overlay) -> np.ndarray:
     """The curves of the best model."""
     return overlay.before if overlay.after is None else overlay.after

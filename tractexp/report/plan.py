@@ -249,11 +249,11 @@ def _events(page: Report, planned: Planned) -> None:
         " percent of the value.",
         words=(1,),
     )
-    if left_out := rest(planned):
+    if left_out := explain_rest(planned):
         page.text(f"{left_out}.")
 
 
-def rest(planned: Planned) -> str:
+def explain_rest(planned: Planned) -> str:
     """Why events of the archive are not among the chosen, "" where all are."""
     recorded = len(planned.problem.events)
     if not planned.chosen or len(planned.chosen) == recorded:

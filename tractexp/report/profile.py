@@ -47,7 +47,11 @@ def report(scan: Profiles, grade: str = "") -> Report:
         "One parameter is held at value after value, all others are fitted again each time.",
     )
     says = {profile.name: meaning(scan, profile) for profile in scan.profiles}
-    sentences = [*([SCATTER] if not uncertainty.exact else []), *_where(says), *_poor(verdicts)]
+    sentences = [
+        *([SCATTER] if not uncertainty.exact else []),
+        *_where(says),
+        *_list_unidentified(verdicts),
+    ]
     graded = [as_sentence(grade)] if grade else []
     page.verdict(
         *graded,
@@ -172,7 +176,7 @@ def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
     )
 
 
-def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
+def _list_unidentified(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
     """The parameters that are not identified, in words."""
     poor = [
         f"{name} is {verdict.word}"

@@ -52,7 +52,7 @@ def _exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
         exponents = {
             name: log(event[f"{power}_after"] / event[f"{power}_before"]) / log(ratio)
             for name, power in (("p_v", "P"), ("q_v", "Q"))
-            if _alike(event[f"{power}_before"], event[f"{power}_after"])
+            if _flows_alike(event[f"{power}_before"], event[f"{power}_after"])
         }
         if "p_v" not in exponents:
             continue
@@ -66,6 +66,6 @@ def _exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _alike(before: float | None, after: float | None) -> bool:
+def _flows_alike(before: float | None, after: float | None) -> bool:
     """Whether a power is known before and after, and flows the same way."""
     return before is not None and after is not None and before * after > 0

@@ -48,7 +48,7 @@ class Composer:
         for text in values:
             override = self._parsed(text)
             OmegaConf.update(task, override.key_or_group, override.value(), merge=True)
-        return Composed(_plain(task), dict(whole.hydra.runtime.choices))
+        return Composed(_resolve(task), dict(whole.hydra.runtime.choices))
 
     def _as_hydra_composes(self, overrides: tuple[str, ...], number: int) -> Composed:
         """The job whole, where its folder's name or somebody's callback may ask for
@@ -59,7 +59,7 @@ class Composer:
         subdir = "" if self._subdir == BY_NUMBER else str(whole.hydra.sweep.subdir)
         hydra = whole if self._reads_hydra else None
         return Composed(
-            _plain(_without_hydra(whole)), dict(whole.hydra.runtime.choices), subdir, hydra
+            _resolve(_without_hydra(whole)), dict(whole.hydra.runtime.choices), subdir, hydra
         )
 
     def _is_value(self, text: str) -> bool:
@@ -96,7 +96,7 @@ def _without_hydra(whole: DictConfig) -> DictConfig:
     return task
 
 
-def _plain(task: DictConfig) -> dict[str, Any]:
+def _resolve(task: DictConfig) -> dict[str, Any]:
     """A configuration as plain data, interpolations resolved."""
     plain: Any = OmegaConf.to_container(task, resolve=True)
     return plain

@@ -173,7 +173,7 @@ def _work_there(job: SweepJob, place: RunFolder, logs: bool) -> Status:
     output = files.Transcript(job.folder / OUTPUT)
     measured: dict[str, float] = {}
     with output, printing_to(output), surround_job(job) as conclude:
-        message = _run(job, place, measured, logs)
+        message = _run_task(job, place, measured, logs)
         seconds = time.perf_counter() - started
         ended = replace(
             job.status,
@@ -215,7 +215,7 @@ def run_job(config: Any) -> float | list[float] | None:
     return job.select_returned(end)
 
 
-def _run(job: SweepJob, place: RunFolder, measured: dict[str, float], logs: bool) -> str:
+def _run_task(job: SweepJob, place: RunFolder, measured: dict[str, float], logs: bool) -> str:
     """Run the task, which notes what it measures; returns what went wrong, in one line, or ""."""
     from tractexp.cli.run import perform
 

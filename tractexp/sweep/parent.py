@@ -41,7 +41,7 @@ def parent_run(
     uri, run = tracking.address(node["uri"]), _describe_sweep(folder, jobs, overrides)
     content = {"uri": uri, "jobs": len(jobs), "overrides": overrides}
     with ThreadPoolExecutor(1) as thread:
-        recorder = Recorder(folder, thread.submit(_begun, folder, run, uri, afresh, content))
+        recorder = Recorder(folder, thread.submit(_open_run, folder, run, uri, afresh, content))
         status = "FAILED"
         try:
             yield recorder
@@ -58,7 +58,7 @@ def parent_run(
                 _send(folder, uri)
 
 
-def _begun(
+def _open_run(
     folder: Path, run: Any, uri: str, afresh: bool, content: Mapping[str, Any]
 ) -> str | None:
     """Open the run and note its id, by which jobs find it; None where the store cannot be used."""

@@ -27,7 +27,11 @@ def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
     placed = []
     for job in jobs:
         if job.configuration not in folders:
-            there = _own(folder, job, taken, above) if job.subdir else folder / str(next(free))
+            there = (
+                _find_own_folder(folder, job, taken, above)
+                if job.subdir
+                else folder / str(next(free))
+            )
             taken.add(there)
             above.update(there.parents)
             folders[job.configuration] = there
@@ -38,7 +42,7 @@ def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
     return placed
 
 
-def _own(folder: Path, job: SweepJob, taken: set[Path], above: set[Path]) -> Path:
+def _find_own_folder(folder: Path, job: SweepJob, taken: set[Path], above: set[Path]) -> Path:
     """The folder that `hydra.sweep.subdir` names, where it is the job's alone.
 
     `taken` are the other jobs' folders, `above` those that hold them.

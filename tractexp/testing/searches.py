@@ -52,7 +52,7 @@ def says_what_it_is(cls: type[Optimizer]) -> None:
 
 def gives_the_same_bits_for_the_same_seed(cls: type[Optimizer]) -> None:
     """All randomness comes from `rng`: one seed, one history."""
-    one, two = _run(cls, Bowl(), 7), _run(cls, Bowl(), 7)
+    one, two = _search(cls, Bowl(), 7), _search(cls, Bowl(), 7)
     for name in ("simulations", "objective", "values"):
         same = np.array_equal(getattr(one.history, name), getattr(two.history, name))
         assert same, f"'{cls.name}' gives another history of {name} for the same seed"
@@ -61,7 +61,7 @@ def gives_the_same_bits_for_the_same_seed(cls: type[Optimizer]) -> None:
 def stays_in_the_box_and_ends_at_the_budget(cls: type[Optimizer]) -> None:
     """All evaluated points lie in the bounds, no more of them than the budget says."""
     problem = Noted()
-    result = _run(cls, problem, 3)
+    result = _search(cls, problem, 3)
     points = np.concatenate(problem.batches)
     assert len(points) == result.simulations <= BUDGET, (
         f"'{cls.name}' spent {len(points)} of {BUDGET} simulations"
@@ -104,14 +104,14 @@ def finds_the_bottom_of_a_bowl(cls: type[Optimizer]) -> None:
     """After the budget it is well below the best of its first batch, in either space."""
     for space in ("unit", "raw"):
         problem = Noted()
-        result = _run(cls, problem, 11, space)
+        result = _search(cls, problem, 11, space)
         first = Bowl().objective(problem.batches[0]).min()
         assert result.objective <= LEAST_SEARCH_GAIN * first, (
             f"'{cls.name}' ends at {result.objective:.3g} after a start of {first:.3g}"
         )
 
 
-def _run(cls: type[Optimizer], problem: Bowl, seed: int, space: str = "unit") -> SearchResult:
+def _search(cls: type[Optimizer], problem: Bowl, seed: int, space: str = "unit") -> SearchResult:
     """The result of an optimizer within the tests' budget."""
     return search(problem, cls(space=space), seed, Limits(BUDGET))
 

@@ -28,7 +28,9 @@ def writes_a_record_that_is_read_again(cls: type[Writer]) -> None:
     back.
     """
     with tempfile.TemporaryDirectory() as folder:
-        files = _written(cls, lambda: cls().record(RECORD, Path(folder, f"dip{cls.endings[0]}")))
+        files = _write_files(
+            cls, lambda: cls().record(RECORD, Path(folder, f"dip{cls.endings[0]}"))
+        )
         if not files or files[0].suffix not in endings():
             return
         reader = reader_of(str(files[0]))
@@ -63,7 +65,9 @@ def writes_a_recording_that_is_read_again(cls: type[Writer]) -> None:
     ]
     whole = Recording("test", channels, [Segment(0, len(t), 4000.0, 0.0)])
     with tempfile.TemporaryDirectory() as folder:
-        files = _written(cls, lambda: cls().recording(whole, Path(folder, f"all{cls.endings[0]}")))
+        files = _write_files(
+            cls, lambda: cls().recording(whole, Path(folder, f"all{cls.endings[0]}"))
+        )
         if not files or files[0].suffix not in endings():
             return
         reader = reader_of(str(files[0]))
@@ -81,7 +85,7 @@ def writes_a_recording_that_is_read_again(cls: type[Writer]) -> None:
             assert off < 1e-9, f"'{cls.name}' writes channel {one.name} that is read {off:.2g} off"
 
 
-def _written(cls: type[Writer], write: Callable[[], list[Path]]) -> list[Path]:
+def _write_files(cls: type[Writer], write: Callable[[], list[Path]]) -> list[Path]:
     """The files written, there and of its endings; [] where it refuses."""
     assert cls.endings, f"'{cls.name}' names no endings"
     try:

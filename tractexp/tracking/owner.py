@@ -20,7 +20,8 @@ def _machine() -> tuple[str, str, str]:
     does not say.
     """
     number, boot = (
-        _read(Path(path))[:12] for path in ("/etc/machine-id", "/proc/sys/kernel/random/boot_id")
+        _read_system_file(Path(path))[:12]
+        for path in ("/etc/machine-id", "/proc/sys/kernel/random/boot_id")
     )
     try:
         namespace = os.readlink("/proc/self/ns/pid")
@@ -29,7 +30,7 @@ def _machine() -> tuple[str, str, str]:
     return f"{socket.gethostname()}/{number}".replace(" ", "_"), boot, namespace
 
 
-def _read(path: Path) -> str:
+def _read_system_file(path: Path) -> str:
     """The text of a file of the system; "-" where it is not there."""
     try:
         return path.read_text().strip() or "-"
@@ -37,7 +38,7 @@ def _read(path: Path) -> str:
         return "-"
 
 
-def _begun(pid: int) -> str:
+def _read_start(pid: int) -> str:
     """When a process began, in the system's own count; "" where there is none, "-" where the system
     does not say.
     """
@@ -49,7 +50,7 @@ def _begun(pid: int) -> str:
         return ""
     except OSError:
         return "-"
-    status = _read(Path(f"/proc/{pid}/stat")).rpartition(")")[2].split()
+    status = _read_system_file(Path(f"/proc/{pid}/stat")).rpartition(")")[2].split()
     if status and status[0] in "ZX":
         return ""
     return status[19] if len(status) > 19 else "-"
@@ -57,10 +58,10 @@ def _begun(pid: int) -> str:
 
 def signature() -> str:
     """This process, as a tag of the runs that it writes."""
-    return " ".join([*_machine(), str(os.getpid()), _begun(os.getpid())])
+    return " ".join([*_machine(), str(os.getpid()), _read_start(os.getpid())])
 
 
-def gone(tag: str) -> bool | None:
+def has_ended(tag: str) -> bool | None:
     """Whether the process of a signature has ended; None where this computer cannot decide."""
     parts = tag.split()
     if len(parts) != 5 or parts[0] != _machine()[0]:
@@ -69,13 +70,15 @@ def gone(tag: str) -> bool | None:
         return True  # the computer has been started anew
     if parts[2] != _machine()[2] or not parts[3].isdecimal():
         return None
-    begun = _begun(int(parts[3]))
+    begun = _read_start(int(parts[3]))
     return not begun or (begun != parts[4] and "-" not in (begun, parts[4]))
 
 
 def close_stale(client: Any) -> list[str]:
     """Close runs as KILLED whose process has ended without a word, and return their ids."""
-    stale = [run.info.run_id for run in list_running(client) if gone(run.data.tags.get(TAG, ""))]
+    stale = [
+        run.info.run_id for run in list_running(client) if has_ended(run.data.tags.get(TAG, ""))
+    ]
     for run_id in stale:
         client.set_terminated(run_id, "KILLED")
     return stale

@@ -70,7 +70,7 @@ class RunFile:
             "uri": self.uri,
             "run_id": self.run_id,
             "sweep": self.sweep,
-            "run": _plain(self.run, self.folder),
+            "run": _describe_run(self.run, self.folder),
         }
         files.write(
             (place or self.folder) / FILE,
@@ -102,7 +102,9 @@ def read(folder: Path) -> RunFile | None:
     try:
         content = files.read_json(path)
         uri, run_id = _texts(content, "uri", "run_id")
-        return RunFile(folder, _run(content["run"], folder), uri, run_id, bool(content["sweep"]))
+        return RunFile(
+            folder, _read_run(content["run"], folder), uri, run_id, bool(content["sweep"])
+        )
     except FileNotFoundError:
         return None
     except UserError as error:
@@ -121,7 +123,7 @@ def below(root: Path) -> list[Path]:
     return sorted(found, key=lambda folder: (len(folder.parts), folder))
 
 
-def _plain(run: TrackedRun, folder: Path) -> dict[str, Any]:
+def _describe_run(run: TrackedRun, folder: Path) -> dict[str, Any]:
     """A run as JSON knows it; paths within the folder are relative, so that it may be moved."""
     content: dict[str, Any] = {field.name: getattr(run, field.name) for field in fields(TrackedRun)}
     content["parameters"] = flatten(run.parameters)
@@ -131,7 +133,7 @@ def _plain(run: TrackedRun, folder: Path) -> dict[str, Any]:
     content["model_metrics"] = list(run.model_metrics)
     content["model"] = None if run.model is None else _relative(run.model, folder)
     content["records"] = [dict(record) for record in run.records]
-    content["children"] = [_plain(child, folder) for child in run.children]
+    content["children"] = [_describe_run(child, folder) for child in run.children]
     return content
 
 
@@ -159,7 +161,7 @@ def _texts(content: Mapping[str, Any], *names: str) -> list[str]:
     return [content[name] for name in names]
 
 
-def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
+def _read_run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
     """The run that a file holds. Raises ValueError for what no run has."""
     content = {"model_metrics": [], **content}  # which earlier versions did not write
     key, *_ = _texts(content, "key", "experiment", "name", "status", "description")
@@ -174,7 +176,7 @@ def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
         "artifacts": [folder / path for path in content["artifacts"]],
         "model": None if content["model"] is None else folder / content["model"],
         "curves": {name: (steps, values) for name, (steps, values) in content["curves"].items()},
-        "children": [_run(child, folder) for child in content["children"]],
+        "children": [_read_run(child, folder) for child in content["children"]],
     }
     return TrackedRun(**{**content, **there})
 

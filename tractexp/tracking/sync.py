@@ -79,7 +79,9 @@ def sync(
                 )
             if where in broken:
                 raise UserError(broken[where])
-            counts[_sent(replace(one, run=_within(one.run, one.folder, tell)), where)] += 1
+            counts[
+                _send(replace(one, run=_keep_files_inside(one.run, one.folder, tell)), where)
+            ] += 1
         except UserError as error:
             counts[NOT] += 1
             if str(error) not in said:
@@ -95,7 +97,7 @@ def _describe_store(uri: str) -> str:
     return f"where it is yours, {quoting.shell('tractexp', 'sync', '--uri', uri)} sends it there"
 
 
-def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> TrackedRun:
+def _keep_files_inside(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> TrackedRun:
     """The run with those of its files, and of the runs below it, that are there and lie in its
     folder.
 
@@ -110,7 +112,7 @@ def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> Track
         run,
         artifacts=artifacts,
         model=model,
-        children=[_within(child, folder, tell) for child in run.children],
+        children=[_keep_files_inside(child, folder, tell) for child in run.children],
         tags={name: text for name, text in run.tags.items() if not name.startswith(RESERVED)},
         description=quoting.markdown_again(run.description),
     )
@@ -146,13 +148,13 @@ def _can_be_loaded(path: Path, tell: Callable[[str], None]) -> bool:
     return True
 
 
-def _sent(one: RunFile, uri: str) -> str:
+def _send(one: RunFile, uri: str) -> str:
     """Send one run; what became of it."""
     client = open_store(uri)
     parent = None if one.sweep else parent_of(folder_of(one.folder))
     one = replace(one, run=replace(one.run, parent=parent or one.run.parent))
     run_there = run_of(client, uri, one.run_id)
-    if run_there is not None and not _same(one, run_there):
+    if run_there is not None and not _is_same_run(one, run_there):
         run_there = None
     if run_there is not None and run_there.info.lifecycle_stage == "deleted":
         return DELETED
@@ -165,7 +167,7 @@ def _sent(one: RunFile, uri: str) -> str:
     return BROUGHT
 
 
-def _same(one: RunFile, run_there: Any) -> bool:
+def _is_same_run(one: RunFile, run_there: Any) -> bool:
     """Whether a run in the store is that of the file, whose id may be anybody's."""
     tags = run_there.data.tags
     if one.sweep:

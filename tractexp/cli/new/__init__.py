@@ -59,7 +59,7 @@ def new(arguments: list[str]) -> int:
         "--from", dest="source", type=Path, metavar="FILE", help="an effect proposed by tractexp"
     )
     options = parser.parse_args(arguments)
-    package = written(options.kind, options.name, Path(), options.source)
+    package = write_package(options.kind, options.name, Path(), options.source)
     put = "read it before you use it" if options.source else "put your equations into it"
     print(f"wrote {package}: the plugin is {package / package.name / options.name}.py; {put}")
     print(f"  cd {package} && python -m pytest        tests whether it is a sound plugin")
@@ -68,7 +68,7 @@ def new(arguments: list[str]) -> int:
     return 0
 
 
-def written(kind: str, name: str, folder: Path, source: Path | None = None) -> Path:
+def write_package(kind: str, name: str, folder: Path, source: Path | None = None) -> Path:
     """Write the package of a plugin into `folder`; its own folder. Raises `UserError` as `new`.
 
     The plugin is our example of that kind, or what stands in the file `source` of a proposed term.

@@ -331,7 +331,7 @@ def _compare_gathered_runs(
     together.
     """
     from tractexp.studies.comparison import runs as gathering
-    from tractexp.studies.comparison.judging import compare_runs, several
+    from tractexp.studies.comparison.judging import compare_runs, judge_problems
 
     problem = searches and searches.setup.problem
     runs, source = _runs(searches, sweep, filter, uri, experiment)
@@ -345,7 +345,7 @@ def _compare_gathered_runs(
             f"{TASK.floor}={judging['floor']:g} is the floor of one problem, and {source} has"
             f" {len(groups)}; leave it out, or choose one by {TASK.data}"
         )
-    return source, several(
+    return source, judge_problems(
         groups, source, judging, Path(sweep) if sweep else None, bbob, cores, progress, problem
     )
 

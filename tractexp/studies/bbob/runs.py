@@ -141,7 +141,7 @@ def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: BbobP
     )
 
 
-def _run(job: tuple[str, Optimizer, tuple[int, int, int], BbobPlan]) -> BbobRun:
+def _run_case(job: tuple[str, Optimizer, tuple[int, int, int], BbobPlan]) -> BbobRun:
     """One run of an optimizer on a case of a plan."""
     return run(*job)
 
@@ -161,7 +161,7 @@ def perform(
     }
     jobs = [(name, it, case, plan) for case in plan.cases for name, it in optimizers.items()]
     runs = {}
-    for _, r in Workers(cores or -1).run_items(_run, jobs, len(jobs)):
+    for _, r in Workers(cores or -1).run_items(_run_case, jobs, len(jobs)):
         count()
         runs[r.optimizer, r.dimension, r.function, r.instance] = r
     ordered = [

@@ -13,7 +13,7 @@ import numpy as np
 from tractexp.identification.search import REFUSED
 from tractexp.inference.least_squares import MOST_NUMBERS, descend
 from tractexp.inference.problem import Problem
-from tractexp.parameter import best_distinct, even
+from tractexp.parameter import best_distinct, spread_evenly
 from tractexp.studies.comparison.runs import SearchRun
 from tractexp.text.wording import count_noun
 
@@ -71,7 +71,7 @@ def polish(
     ends = np.array([[run.parameters[name] for name in space.names] for run in complete]).reshape(
         -1, space.dimension
     )
-    if not problem.per_event and not _same(problem, ends, complete):
+    if not problem.per_event and not _is_same_problem(problem, ends, complete):
         return None
     units = np.concatenate([space.to_unit(ends), _spread(problem)])
     best = max(min(run.objective for run in runs if run.is_finished), TINY)
@@ -121,7 +121,7 @@ def floor_of(
     return Floor(best.objective, f"the best of all runs compared, by {best.optimizer}{because}")
 
 
-def _same(problem: Problem, ends: np.ndarray, runs: Sequence[SearchRun]) -> bool:
+def _is_same_problem(problem: Problem, ends: np.ndarray, runs: Sequence[SearchRun]) -> bool:
     """Whether a problem gives the objectives that runs recorded at their ends."""
     recorded = np.array([run.objective for run in runs])
     return (
@@ -135,7 +135,7 @@ def _spread(problem: Problem) -> np.ndarray:
     """The best of points that fill the unit cube evenly, but denser near its walls, where times are
     short; (k, d).
     """
-    unit = np.sin(np.pi * even(SCATTER, problem.space.dimension) / 2) ** 2
+    unit = np.sin(np.pi * spread_evenly(SCATTER, problem.space.dimension) / 2) ** 2
     objectives = problem.objective(problem.space.from_unit(unit))
     able = objectives < REFUSED
     return unit[able][best_distinct(unit[able], objectives[able], APART, STARTS)]

@@ -38,10 +38,12 @@ def compare_runs(
     Without the `problem` it is put again from the configuration of the runs.
     """
     polished, why_not = _polish_described_problem(gathered, progress, problem)
-    return compare(gathered, plain=plain(), polished=polished, why_not=why_not, **judging)
+    return compare(
+        gathered, plain=list_plain_optimizers(), polished=polished, why_not=why_not, **judging
+    )
 
 
-def several(
+def judge_problems(
     groups: Mapping[tuple[str, ...], Sequence[SearchRun]],
     source: str,
     judging: Mapping[str, Any],
@@ -60,7 +62,7 @@ def several(
         gathered = gather(runs, f"{source} on {label}")
         comparisons[label] = compare_runs(gathered, progress, judging, problem)
         by_terms.setdefault(terms, {})[label] = comparisons[label]
-    without = plain()
+    without = list_plain_optimizers()
     overall = [on_records(terms, comparisons, without) for terms, comparisons in by_terms.items()]
     notes = _collect_notes(comparisons)
     if bbob:
@@ -115,7 +117,7 @@ def _on_bbob(
         result = unwrap(benchmark)(optimizers, **chosen, cores=cores, progress=progress)
         if folder:
             files.write_json(folder / BBOB, {"of": settings, "made": result.to_dict()})
-    return on_functions(result.bbob, family(variants, plain()))
+    return on_functions(result.bbob, family(variants, list_plain_optimizers()))
 
 
 def _load_stored_runs(folder: Path, settings: Mapping[str, Any]) -> BenchmarkResult | None:
@@ -167,6 +169,6 @@ def _problem(run: SearchRun) -> Problem:
     return Setup.from_arguments(train, config["model"], objective=config.get("objective")).problem
 
 
-def plain() -> dict[str, str]:
+def list_plain_optimizers() -> dict[str, str]:
     """For each optimizer the one that it is with all its switches off, "" where there is none."""
     return {name: get("optimizer", name).plain for name in discover()["optimizer"]}

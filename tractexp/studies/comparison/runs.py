@@ -234,7 +234,7 @@ def _names(runs: Sequence[SearchRun]) -> dict[Settings, str]:
         differing -= set.intersection(*(set(settings) for _, settings in several))
         for one in several:
             parts = [
-                f"{k.removeprefix('optimizer.')}={_plain(v)}"
+                f"{k.removeprefix('optimizer.')}={_write_as_typed(v)}"
                 for k, v in one[1]
                 if (k, v) in differing
             ]
@@ -255,7 +255,7 @@ def _variants(runs: list[SearchRun], names: Mapping[Settings, str]) -> tuple[Var
     return tuple(sorted(variants, key=lambda variant: variant.name))
 
 
-def _plain(value: str) -> str:
+def _write_as_typed(value: str) -> str:
     """A value as the command line writes it."""
     return {"None": "null", "True": "true", "False": "false"}.get(value, value.strip("'"))
 
@@ -280,7 +280,7 @@ def _check_same_problem(runs: Sequence[SearchRun], source: str) -> None:
 
     for part in PROBLEM:
         for key in sorted(key for key in keys if key.partition(".")[0] == part):
-            values = sorted({_plain(repr(run.config.get(key))) for run in runs})
+            values = sorted({_write_as_typed(repr(run.config.get(key))) for run in runs})
             if len(values) > 1:
                 raise UserError(
                     f"{source} holds runs that differ in {key} ({', '.join(values)}), so their"

@@ -90,11 +90,11 @@ def running_time(variant: Variant, target: float, cost: str) -> float:
     """ERT of a variant to an objective, in simulations or seconds."""
     spent = np.array([run.spent(target, cost) for run in variant.runs])
     reached = np.isfinite(spent)
-    whole = np.array([_whole(variant, run, cost) for run in variant.runs])
+    whole = np.array([_measure_whole_cost(variant, run, cost) for run in variant.runs])
     return expected_running_time(np.where(reached, spent, whole), reached)
 
 
-def _whole(variant: Variant, run: SearchRun, cost: str) -> float:
+def _measure_whole_cost(variant: Variant, run: SearchRun, cost: str) -> float:
     """All that a run spent; a run that failed spent its budget, or what the others of its variant
     did.
     """

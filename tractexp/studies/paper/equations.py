@@ -239,7 +239,7 @@ def _rankings() -> list[Check]:
         "Obj.E": printed.OBJECTIVE,
     }
     for said, table in tables.items():
-        results.append(_lowest("Table 3", said, table))
+        results.append(_check_lowest("Table 3", said, table))
     P = printed.EPSILON_P
     results.append(
         Check(
@@ -252,12 +252,14 @@ def _rankings() -> list[Check]:
     for where, rows in (("Table 4", printed.INTERPOLATION), ("Table 5", printed.EXTRAPOLATION)):
         for c, channel in enumerate("PQ"):
             results.append(
-                _lowest(where, f"residual of {channel}", {n: pair[c] for n, pair in rows.items()})
+                _check_lowest(
+                    where, f"residual of {channel}", {n: pair[c] for n, pair in rows.items()}
+                )
             )
     return results
 
 
-def _lowest(where: str, what: str, table: Mapping[str, float]) -> Check:
+def _check_lowest(where: str, what: str, table: Mapping[str, float]) -> Check:
     """Whether ISSA has the lowest value of a table."""
     best = min(table, key=lambda name: table[name])
     return Check(

@@ -59,7 +59,7 @@ def draw_uniform_points(problem: Problem, n: int, seed: int) -> np.ndarray:
     return points[:n]
 
 
-def within(problem: Problem, name: str, low: float, high: float) -> Problem:
+def with_bounds(problem: Problem, name: str, low: float, high: float) -> Problem:
     """The same problem with other bounds of one parameter, and the same Runge-Kutta step."""
     bounds = {p.name: p.bounds for p in problem.parameters} | {name: (low, high)}
     step = int(problem.step.substeps.max())
