@@ -89,7 +89,7 @@ class Stopped(KeyboardInterrupt):
 
     @classmethod
     def from_interrupt(cls, stop: KeyboardInterrupt, **more: Any) -> "Stopped":
-        """The same end with more of its fields."""
+        """The end of an interrupted command, with more of its fields."""
         fields = {name: getattr(stop, name, None) for name in ("state", "result")}
         return cls(str(stop), getattr(stop, "code", 130), **{**fields, **more})
 

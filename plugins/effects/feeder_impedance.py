@@ -117,7 +117,9 @@ class FeederImpedance(Effect):
 
 
 def _before_all(eq, R_f, X_f):
-    """Of waveforms: every part sees the voltage behind R_f and the reactance with its R_p."""
+    """Put the impedance before all parts of waveforms: every part sees the voltage behind R_f and
+    the reactance with its R_p.
+    """
     from sympy import I
 
     R_p, before = X_f / (eq.omega_n * DAMPED), (eq.P0 - I * eq.Q0) / eq.U0

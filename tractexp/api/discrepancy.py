@@ -236,7 +236,7 @@ class Investigation(Written):
 
     @property
     def sizes_of_nearest(self) -> list[str]:
-        """The same of the candidates that come nearest where nothing explains the disagreement."""
+        """The sizes of the candidates that come nearest where nothing explains the disagreement."""
         near = self.content["nearest"]
         return self._sizes(near["effects"], near["parameters"]) if near else []
 

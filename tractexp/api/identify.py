@@ -339,7 +339,7 @@ class Identification(Written):
 
     @functools.cached_property
     def model_error_held_out(self) -> ModelError | None:
-        """The same of the held-out dips; None where there are none."""
+        """The model error on the held-out dips; None where there are none."""
         held_out = self.result.model_error.get("held_out")
         return held_out and self._error(held_out)
 

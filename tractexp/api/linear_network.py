@@ -183,7 +183,7 @@ def _play(box: "BlackBox", event: Event, role: str) -> "Fit":
 
 
 def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
-    """The same for every event, those fitted first."""
+    """The response of a network to every event, those fitted first."""
     from tractexp.identification.result import TRAIN, VALIDATE
 
     return [

@@ -168,7 +168,7 @@ class Look(Written):
         return look_console.summary(self.content)
 
     def screen(self) -> Report:
-        """The same with as many loads as one screen has room for."""
+        """The summary with as many loads as one screen has room for."""
         from tractexp.report import look_console
 
         return look_console.screen(self.content)

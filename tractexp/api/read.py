@@ -234,7 +234,8 @@ def _array(values: Any, where: str) -> np.ndarray:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise UserError(
-            f"{where} holds {_find_odd_value(values)}, which is no number; give numbers, nan for a gap"
+            f"{where} holds {_find_odd_value(values)}, which is no number; give numbers, nan for a"
+            " gap"
         ) from error
     if array.ndim != 1:
         raise UserError(f"{where} has shape {array.shape}; one number per sample, (N,), is needed")

@@ -373,9 +373,7 @@ class Job:
         return is_everything_asked() or self.in_sweep
 
     def tell_beside(self, line: str) -> None:
-        """As `tell`, of what was read and begun: no part of the first screen, which is the
-        answer.
-        """
+        """Print a line on what was read and begun, which is no part of the first screen."""
         self.prepare_log()
         if self.tells_everything:
             say(line)

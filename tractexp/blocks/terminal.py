@@ -72,7 +72,7 @@ def _lines(block: Any) -> Sequence[str]:
 
 
 def plain(report: Report) -> str:
-    """The same as text."""
+    """The report as text."""
     from rich.console import Console
 
     text = io.StringIO()

@@ -27,7 +27,9 @@ def share() -> None:
 
 
 def store_later(group: str, name: str, schema: Callable[[], type]) -> None:
-    """As `ConfigStore.store`, with the schema that `schema` gives when the node is read."""
+    """Store the schema that `schema` gives when the node is read, as `ConfigStore.store` does at
+    once.
+    """
     level = ConfigStore.instance().repo
     for part in group.split("/"):
         level = level.setdefault(part, {})

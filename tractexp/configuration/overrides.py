@@ -266,7 +266,8 @@ def format_assignment(key: str, value: object) -> str:
     """
     if isinstance(value, list | tuple):
         return f"{key}=[{','.join(map(_write_for_hydra, value))}]"
-    return f"{key}={value if isinstance(value, str) and _is_quoted_whole(value) else _write_for_hydra(value)}"
+    is_quoted = isinstance(value, str) and _is_quoted_whole(value)
+    return f"{key}={value if is_quoted else _write_for_hydra(value)}"
 
 
 def _is_quoted_whole(value: str) -> bool:

@@ -203,8 +203,8 @@ def _read_first_line(error: BaseException) -> str:
         )
     if match := re.match(r"Error merging override (.*)", text, re.DOTALL):
         return (
-            f"{_shorten(match[1])} cannot be applied: every run may need that setting, or it holds no"
-            " such value"
+            f"{_shorten(match[1])} cannot be applied: every run may need that setting, or it holds"
+            " no such value"
         )
     return text if not PYTHON.search(text) else _unforeseen(error)
 

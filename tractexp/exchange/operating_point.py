@@ -108,7 +108,8 @@ class OperatingPoint:
 
 
 def doubts(result: Result, point: OperatingPoint | None) -> list[str]:
-    """The reasons why an identified load is no physical one, a clause each.
+    """The reasons why an identified load is no physical one, a clause each: its division, and
+    parameters that a bound alone holds.
 
     A machine at the end of what machines have is one: what that costs is told beside the fit.
     """

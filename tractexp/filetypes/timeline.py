@@ -206,10 +206,7 @@ def _interpolate_stretch(raw: np.ndarray, s: Stretch, missing: float | None) -> 
         return values
     if lacking.any():
         values[lacking] = np.interp(s.t[lacking], s.t[~lacking], values[~lacking])
-    even = (
-        CubicSpline(s.t, values)(_spread_times(s))
-        if len(values) > 3
-        else np.interp(_spread_times(s), s.t, values)
-    )
-    even[lacking[_closest(s.t, _spread_times(s))]] = np.nan
+    times = _spread_times(s)
+    even = CubicSpline(s.t, values)(times) if len(values) > 3 else np.interp(times, s.t, values)
+    even[lacking[_closest(s.t, times)]] = np.nan
     return even

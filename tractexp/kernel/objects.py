@@ -58,7 +58,7 @@ def machine_code(text: str, machine: Any = None) -> bytes:
 
 
 def assembly(text: str) -> str:
-    """The same as assembly, for people and benchmarks to read."""
+    """The machine code as assembly, for people and benchmarks to read."""
     with _one_at_a_time:
         return target.machine().emit_assembly(_ready(text, target.machine()))
 

@@ -22,7 +22,7 @@ class Apart:
     """
 
     def __init__(self, eq: "Equations", suffix: str):
-        """The same equations, for a motor group whose words end in `suffix`."""
+        """The equations of the model, for a motor group whose words end in `suffix`."""
         self._eq, self._suffix = eq, suffix
 
     def __getattr__(self, name: str) -> Any:

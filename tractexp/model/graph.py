@@ -25,8 +25,8 @@ def replace_symbols(expression: sympy.Expr, substitutes: Mapping[Symbol, sympy.E
 
 
 def _rebuilt(part: Basic, args: Sequence[Basic]) -> Any:
-    """The same function of other arguments. SymPy compares those of a maximum with each other,
-    which takes seconds.
+    """A function with other arguments. SymPy compares those of a maximum with each other, which
+    takes seconds.
     """
     if isinstance(part, sympy.Max | sympy.Min) and not all(a.is_number for a in args):
         return part.func(*args, evaluate=False)

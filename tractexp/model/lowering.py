@@ -81,7 +81,7 @@ class _Hoister:
         return self._rewrites[e]
 
     def _rewritten(self, e: sympy.Expr) -> sympy.Expr:
-        """The same of an expression that was not met before."""
+        """The rewritten form of an expression that was not met before."""
         if not isinstance(e, sympy.Expr):  # pyright: ignore[reportUnnecessaryIsInstance] # a piece, or its condition
             return e.func(*map(self, arguments(e)))
         if self.is_constant(e):

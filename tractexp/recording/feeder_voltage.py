@@ -50,7 +50,7 @@ def list_feeders(
 
 
 def add_question(recording: Recording, phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
-    """The same, and where they are several that exclude each other, the question which it is in
+    """The feeders, and where they are several that exclude each other, the question which it is in
     each of them.
     """
     if len(feeders) == 1:

@@ -98,8 +98,8 @@ def _find_steady_end(kind: str, e: Excursion, spans: list[tuple[str, Excursion]]
 
 
 def _extend_lasting_falls(trace: Trace, outside: Sequence[Excursion]) -> list[Excursion]:
-    """The same with falls that do not return up to what happens next, or to the end: they last so
-    long, and not only until they are level.
+    """The excursions, with falls that do not return extended up to what happens next, or to the
+    end: they last so long, and not only until they are level.
     """
     ends = [*(e.start for e in outside), len(trace.t)][1:]
     return [
@@ -111,7 +111,7 @@ def _extend_lasting_falls(trace: Trace, outside: Sequence[Excursion]) -> list[Ex
 
 
 def _merge_ramps(spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursion]]:
-    """The same in order of time, with ramps between which nothing else happens as one."""
+    """The spans in order of time, with ramps between which nothing else happens as one."""
     merged: list[tuple[str, Excursion]] = []
     for kind, e in spans:
         if kind == "ramp" and merged and merged[-1][0] == "ramp":

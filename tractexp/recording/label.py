@@ -220,7 +220,7 @@ def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
 
 
 def _order_by_phases(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
-    """The same by what the file calls the phases."""
+    """The order of channels by what the file calls the phases."""
     for letters in ORDERS:
         labels = [phase(c, (letters,)) for c in channels]
         for two, reading in ((False, "abc".find), (True, lambda mark: PLACE.get(mark, -1))):
@@ -231,7 +231,9 @@ def _order_by_phases(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool
 
 
 def _order_by_names(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
-    """The same by marks at one place of all names, as they stand, else without counting numbers."""
+    """The order of channels by marks at one place of all names, as they stand, else without
+    counting numbers.
+    """
     names = [normalize(c.name) for c in channels]
     for texts in (names, [COUNTER.sub("", name) for name in names]):
         read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]

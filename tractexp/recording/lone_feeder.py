@@ -177,10 +177,10 @@ def _half_at(
     first, second = sorted((current, other))
     name = list_names(recording, [other])
     return (
-        f"{MAYBE_HALF}: {lacks}; if {name} is that of the other"
-        " conductor, counted the other way, both are one load:"
-        f" data.voltages=[{volts[0]},{volts[1]}] data.currents=[{first},{second}]"
-        f" 'data.connection={{name: {connection}, feeder: inward}}'"
+        f"{MAYBE_HALF}: {lacks}; if {name} is that of the other conductor, counted the other way,"
+        f" both are one load: data.voltages=[{volts[0]},{volts[1]}]"
+        f" data.currents=[{first},{second}] 'data.connection={{name: {connection}, feeder:"
+        f" inward}}'"
     )
 
 

@@ -36,7 +36,7 @@ class Trace:
         return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
 
     def without_currents(self) -> "Trace":
-        """The same where no currents are recorded, nor powers."""
+        """The trace as if no currents were recorded, nor powers."""
         none, unknown = self.I[:0], np.full(len(self.t), np.nan)
         return replace(self, P=unknown, Q=unknown, I=none, second=none, content=none)
 

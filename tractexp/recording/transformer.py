@@ -110,8 +110,8 @@ def _judge_sides(
 
 
 def _list_buses(feeders: Sequence[Feeder]) -> list[np.ndarray]:
-    """Of each bus the numbers of its loaded feeders of three phases whose currents do not close,
-    where there are several.
+    """The loaded feeders of each bus, of three phases whose currents do not close, where there are
+    several.
     """
     buses: dict[tuple[int, ...], list[int]] = {}
     for k, f in enumerate(feeders):

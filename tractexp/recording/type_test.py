@@ -69,7 +69,7 @@ class TypeTest:
         return f"a type test: {told}; per unit of {self.power:.3g} MVA and {self.voltage:.4g} kV"
 
     def to_dict(self) -> dict[str, Any]:
-        """As `look.json` has it."""
+        """The test as `look.json` has it."""
         return {
             "values": [vars(each) for each in self.values],
             "voltage": self.voltage,
@@ -109,7 +109,7 @@ class Course:
 
     @classmethod
     def from_phasors(cls, phasors: Phasors) -> "Course":
-        """Of three phases."""
+        """The course of phasors of three phases."""
         current = np.abs(phasors.I1)
         second = np.abs(phasors.I2)
         return cls(
@@ -124,8 +124,8 @@ class Course:
 
     @classmethod
     def from_record(cls, record: Record) -> "Course | None":
-        """Of a record that says how many kV and MVA its per unit is; None of another, and where no
-        frequency was recorded or values are missing.
+        """The course of a record that says how many kV and MVA its per unit is; None of another,
+        and where no frequency was recorded or values are missing.
         """
         if record.f is None or not record.is_from_field:
             return None

@@ -55,7 +55,7 @@ def explain_unrecognized(recording: Recording) -> str:
 
 
 def _explain_voltages(recording: Recording) -> str:
-    """The same where there are voltages and currents."""
+    """Why a recording with voltages and currents shows no load."""
     volts = [i for i, c in enumerate(recording.channels) if kind(c) == "voltage"]
     f = frequency(recording, volts)
     if f is not None and nearest_nominal(f) is None:

@@ -92,7 +92,7 @@ def errors(fit: "Identification") -> Table:
 
 
 def tabulate_errors(result: Any) -> Table:
-    """The same of a result."""
+    """The errors of a result on each event."""
     unknown = {"value": None, "interval": (), "of_S": None}
     of_events = result.model_error.get("events") or [unknown] * len(result.events)
     return error_table(result.events, of_events, result.epsilons)

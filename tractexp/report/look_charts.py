@@ -325,7 +325,7 @@ def envelope(wave: np.ndarray, every: int) -> np.ndarray:
 
 
 def _spectrum(recording: Recording, shown: Sight) -> Chart:
-    """Of the first voltage and the first current, before the first event."""
+    """The spectra of the first voltage and the first current, before the first event."""
     assert shown.feeder is not None
     segment = recording.waveforms()[0]
     whole = FeederWaves.from_recording(recording, shown.feeder, segment)

@@ -170,8 +170,8 @@ class Spectrum(NamedTuple):
 
 
 def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]:
-    """Of what calculated currents (3, N) leave, from the dip on and before it; over whole cycles,
-    unweighted.
+    """The spectra of what calculated currents (3, N) leave, from the dip on and before it; over
+    whole cycles, unweighted.
 
     Unweighted, the squares of all of it add up to the residual's energy, a decay at its beginning
     included.

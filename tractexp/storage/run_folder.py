@@ -191,8 +191,7 @@ def hold(folder: Path) -> Iterator[None]:
 
 
 def _settle(folder: Path) -> bool:
-    """As `settle`, of a folder that is held. That of somebody else may hold anything by the name of
-    `WHOLE`.
+    """Settle a folder that is held. That of somebody else may hold anything by the name of `WHOLE`.
 
     So nothing is moved by a link, from elsewhere or to there.
     """

@@ -77,7 +77,7 @@ class Cores(Launcher):
     def launch(
         self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
     ) -> Sequence[JobReturn]:
-        """As Hydra's other sweepers call it, batch by batch: what a job returns is what
+        """Run a batch of jobs, as Hydra's other sweepers call it: what a job returns is what
         `sweep.returns` names.
 
         A job that was done before, in this sweep or an earlier one in the same folder, is not run

@@ -29,14 +29,14 @@ class Bowl:
 
 
 class Noted(Bowl):
-    """The same, which also stores every batch."""
+    """A bowl that stores every batch."""
 
     def __init__(self) -> None:
         """No batch was asked for yet."""
         self.batches: list[np.ndarray] = []
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
-        """As the bowl's; the points are kept."""
+        """The bowl's residuals; the points are kept."""
         self.batches.append(values)
         return super().residuals(values)
 

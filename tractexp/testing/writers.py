@@ -52,7 +52,7 @@ def writes_a_record_that_is_read_again(cls: type[Writer]) -> None:
 
 
 def writes_a_recording_that_is_read_again(cls: type[Writer]) -> None:
-    """The same for a recording: its channels, by name, have the same values."""
+    """The channels of a written recording, by name, have the same values when read."""
     t = np.arange(800) / 4000
     names = ("Ua", "Ub", "Uc", "Ia", "Ib", "Ic")
     raw = [

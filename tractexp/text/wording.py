@@ -35,7 +35,7 @@ def escape_text(text: object) -> str:
 
 
 def one_line(text: object) -> str:
-    """As `escape_text`, in one line: a line break would be a line of somebody else's."""
+    """The text by `escape_text` in one line: a line break would be a line of somebody else's."""
     return escape_text(text).replace("\n", "\\n")
 
 

@@ -106,6 +106,8 @@ def search(
 
 
 def close_quietly(client: Any) -> None:
-    """As `close_stale`, but errors are ignored: the next use of the store raises them."""
+    """Close stale runs by `close_stale`, and ignore errors: the next use of the store
+    raises them.
+    """
     with contextlib.suppress(Exception):
         closed.extend(close_stale(client))

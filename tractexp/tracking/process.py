@@ -91,7 +91,9 @@ class Logger:
             pass  # it has ended, which `log` reports
 
     def log(self, run: TrackedRun) -> str:
-        """As `tracking.log`, once. Paths in `run` are taken from where the process was started."""
+        """Log a run by `tracking.log`, once. Paths in `run` are taken from where the process was
+        started.
+        """
         run.check()
         self._tell(run)
         answer, _ = self._process.communicate()

@@ -94,7 +94,7 @@ class PaperResult(Written):
 
     @functools.cached_property
     def _report(self) -> Report:
-        """The same page, made once."""
+        """The page, made once."""
         from tractexp.studies.paper.page import report
 
         return report(self.study, self.parts, self.claims)

@@ -132,8 +132,8 @@ def _is_same_problem(problem: Problem, ends: np.ndarray, runs: Sequence[SearchRu
 
 
 def _spread(problem: Problem) -> np.ndarray:
-    """The best of points that fill the unit cube evenly, but denser near its walls, where times are
-    short; (k, d).
+    """The best (k, d) of points that fill the unit cube evenly, but denser near its bounds, where
+    times are short.
     """
     unit = np.sin(np.pi * spread_evenly(SCATTER, problem.space.dimension) / 2) ** 2
     objectives = problem.objective(problem.space.from_unit(unit))

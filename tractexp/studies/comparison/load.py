@@ -85,7 +85,7 @@ def _job(folder: Path) -> SearchRun | None:
 
 
 def _read_job(folder: Path) -> SearchRun | None:
-    """The same, with errors as they come."""
+    """The run of a sweep's folder, None for what is no search; errors come as they are."""
     config = _yaml(folder / ".hydra" / "config.yaml")
     if config["task"]["name"] != FITTING:
         return None

@@ -125,8 +125,8 @@ class Band:
 
     @property
     def top(self) -> float:
-        """Of an axis: the upper quartile after a fiftieth of the search. The very start is off the
-        page.
+        """The upper end of an axis: the upper quartile after a fiftieth of the search. The very
+        start is off the page.
         """
         return float(
             self.upper[np.searchsorted(self.x, self.x[0] + 0.02 * (self.x[-1] - self.x[0]))]

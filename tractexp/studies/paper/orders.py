@@ -40,12 +40,12 @@ class Order:
 
     @property
     def step(self) -> Operations:
-        """Of one Runge-Kutta step of a candidate."""
+        """The operations of one Runge-Kutta step of a candidate."""
         return self.cost.step
 
     @property
     def per_sample(self) -> Operations:
-        """Of a sample of a candidate with all its steps, the errors summed."""
+        """The operations of a sample of a candidate with all its steps, the errors summed."""
         return self.cost.per_sample(self.substeps)
 
     @property
@@ -71,7 +71,7 @@ class Order:
 
     @property
     def condition(self) -> float:
-        """Of the information matrix, parameters in units of their ranges."""
+        """The condition number of the information matrix, parameters in units of their ranges."""
         return float(np.linalg.cond(self.uncertainty.information.J) ** 2)
 
     def spread(self, role: str) -> tuple[float, float]:

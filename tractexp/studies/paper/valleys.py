@@ -60,7 +60,7 @@ def draw_uniform_points(problem: Problem, n: int, seed: int) -> np.ndarray:
 
 
 def with_bounds(problem: Problem, name: str, low: float, high: float) -> Problem:
-    """The same problem with other bounds of one parameter, and the same Runge-Kutta step."""
+    """The problem with other bounds of one parameter, and as many Runge-Kutta steps a sample."""
     bounds = {p.name: p.bounds for p in problem.parameters} | {name: (low, high)}
     step = int(problem.step.substeps.max())
     return Problem(
