@@ -17,7 +17,7 @@ from tractexp.domain.excitation import phasors
 from tractexp.errors import UserError
 from tractexp.inference.recorder_window import RecorderWindow, windows_of
 from tractexp.model.drive import Drive
-from tractexp.record.window import average
+from tractexp.record.window import average, averaged_power
 
 
 def mean(y, samples):
@@ -95,6 +95,53 @@ def test_what_a_triangle_did_is_undone():
     shows, error = U - event.record.U, back - event.record.U
     assert np.abs(shows).max() > 0.01
     assert error @ error < 0.2 * (shows @ shows)
+
+
+def turn_voltage(event, jump):
+    """The event with the voltage turned by `jump` [rad] during the dip, as phasors averaged over
+    20 ms show it, f the slope of their angle; and the voltage (N,) that was averaged.
+    """
+    record, window = event.record, 0.02
+    rise = np.clip((record.t[event.start - 1] - record.t) / -0.004, 0, 1)
+    fall = np.clip((record.t[event.end - 1] - record.t) / -0.004, 0, 1)
+    u = record.U * np.exp(1j * jump * (rise - fall))
+    shown = mean(u.real, window / record.step) + 1j * mean(u.imag, window / record.step)
+    slope = np.gradient(np.unwrap(np.angle(shown)), record.step)
+    f = record.base.frequency + slope / (2 * np.pi)
+    turned = replace(record, U=np.abs(shown), f=f)
+    return replace(event, record=turned, f0=record.base.frequency), u
+
+
+def test_a_jump_of_the_angle_is_reckoned_back_with_the_voltage():
+    (event,) = events(count=1, recorder=FAST)
+    shown, u = turn_voltage(event, -0.2)
+    record = RecorderWindow(0.02).sharpen_event(shown).record
+    back = record.U * np.exp(1j * record.U_angle)
+    angle = 2 * np.pi * np.cumsum(shown.record.f - 50.0) * record.step
+    seen = np.linalg.norm(shown.record.U * np.exp(1j * angle) - u)
+    assert np.linalg.norm(back - u) < 0.5 * seen
+    assert record.U_angle[event.start + 15] == pytest.approx(-0.2, abs=0.02)
+
+
+def test_a_voltage_that_does_not_turn_is_reckoned_back_as_before():
+    (event,) = events(count=1, recorder=FAST)
+    off_nominal = replace(event.record, f=np.full(event.record.samples, 50.3))
+    steady = replace(event, record=off_nominal, f0=50.3)
+    window = RecorderWindow(0.02)
+    record = window.sharpen_event(steady).record
+    assert record.U.tolist() == window.sharpen_event(event).record.U.tolist()
+    assert record.f is off_nominal.f
+
+
+def test_the_power_of_turning_phasors_is_that_of_their_averages():
+    t = np.arange(400) * 2e-3
+    u = (1 - 0.3 * (t > 0.4)) * np.exp(0.3j * (t > 0.4))
+    current = (0.7 - 0.2j) * np.exp(2j * np.pi * 3 * t)
+    S = u * np.conj(current)
+    weights = np.full(11, 1 / 11)
+    U, I = (average(x.real, weights) + 1j * average(x.imag, weights) for x in (u, current))
+    shown = averaged_power(np.stack([S.real, S.imag])[:, None], u, weights)[:, 0]
+    assert shown[0] + 1j * shown[1] == pytest.approx(U * np.conj(I), abs=1e-12)
 
 
 def test_a_window_of_phasors_is_no_missing_effect():

@@ -74,7 +74,7 @@ class RecorderWindow(Measurement):
         for e in range(drive.events):
             part = drive.part(e)
             weights = self.weights(drive.event[e, -1])
-            u = drive.inputs[0, part]
+            u = drive.find_phasors(e)
             shown[:, :, part] = averaged_power(power[:, :, part], u, weights)
         return shown
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tractexp.kernel.layout import EVENT, INPUTS
+from tractexp.record.angle import integrate
 from tractexp.record.curve import slopes
 
 PHASORS, WAVES = DOMAINS = ("phasors", "waves")
@@ -162,29 +163,6 @@ class WaveformDrive:
         return self.currents
 
 
-def integrate(speed: np.ndarray, step: float) -> np.ndarray:
-    """The angle that a speed turns.
-
-    Parameters
-    ----------
-    speed : (N,) [rad/s]
-        On straight lines between samples.
-    step : float [s]
-        Between samples.
-
-    Returns
-    -------
-    (N,) array [rad]
-        Zero at the first sample.
-
-    Examples
-    --------
-    >>> integrate(np.array([0.0, 2.0, 2.0]), 0.5).tolist()
-    [0.0, 0.5, 1.5]
-    """
-    return np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) * (step / 2))])
-
-
 def band_limited(y: np.ndarray) -> np.ndarray:
     """The slope at each sample, per sample, of the cubic spline through them.
 
@@ -291,6 +269,12 @@ class Drive:
     def part(self, event: int) -> slice:
         """The samples of one event."""
         return slice(int(self.first[event]), int(self.first[event + 1]))
+
+    def find_phasors(self, event: int) -> NDArray[np.complex128]:
+        """The voltage (n,) [pu] of one event's phasors, in a frame of nominal frequency."""
+        part = self.part(event)
+        angle = self.inputs[INPUTS.index("U_angle"), part]
+        return self.inputs[INPUTS.index("U"), part] * np.exp(1j * angle)
 
 
 def _join(events: Sequence[Excitation | WaveformDrive], name: str) -> np.ndarray:

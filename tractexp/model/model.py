@@ -281,7 +281,7 @@ class Model:
             if window is not None:
                 part = drive.part(e)
                 outputs[:, :, part] = averaged_power(
-                    outputs[:, :, part], drive.inputs[0, part], window
+                    outputs[:, :, part], drive.find_phasors(e), window
                 )
         for effect in self.measurements:
             columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}

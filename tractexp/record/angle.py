@@ -61,3 +61,26 @@ def measure_frequency(angle: np.ndarray, step: float, nominal: float) -> np.ndar
     leaning = (left * m[1:-2] + right * m[2:-1]) / np.where(total > 0, total, 1.0)
     turned = np.where(total > 0, leaning, both)
     return nominal + turned / (2 * np.pi * step)
+
+
+def integrate(speed: np.ndarray, step: float) -> np.ndarray:
+    """The angle that a speed turns.
+
+    Parameters
+    ----------
+    speed : (N,) [rad/s]
+        On straight lines between samples.
+    step : float [s]
+        Between samples.
+
+    Returns
+    -------
+    (N,) array [rad]
+        Zero at the first sample.
+
+    Examples
+    --------
+    >>> integrate(np.array([0.0, 2.0, 2.0]), 0.5).tolist()
+    [0.0, 0.5, 1.5]
+    """
+    return np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) * (step / 2))])

@@ -4,9 +4,10 @@ voltage behind it.
 With a window h, U = h * u and I = h * i are recorded, and P + jQ = U conj(I). A load whose current
 is linear in the voltage would not show it; any other does wherever the voltage bends. u is computed
 back from U near the edges of the dip, where it is free to bend; the current a model draws at u is
-then averaged as the recorder does.
+then averaged as the recorder does. Voltage and current are phasors: where the angle of the voltage
+jumps with the dip, as it was recorded or as f turns it, their averages turn step by step.
 
-Source: IEC/IEEE 60255-118-1. Departures: the angle of the voltage is taken as steady over a window.
+Source: IEC/IEEE 60255-118-1.
 """
 
 import functools
@@ -15,6 +16,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+from tractexp.record.angle import integrate, measure_frequency
 
 if TYPE_CHECKING:
     from tractexp.record.event import Event
@@ -152,33 +156,40 @@ def average(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.lib.stride_tricks.sliding_window_view(wide, len(weights), axis=-1) @ weights
 
 
-@np.errstate(over="ignore")  # likewise
-def averaged_power(power: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
+@np.errstate(over="ignore", invalid="ignore")  # likewise
+def averaged_power(power: np.ndarray, u: NDArray[np.complex128], weights: np.ndarray) -> np.ndarray:
     """The power of a load as phasors of a window show it.
 
-    The current, power over voltage, is averaged, and multiplied by the averaged voltage.
+    The conjugate of the current, power over voltage, is averaged, and multiplied by the averaged
+    voltage.
 
     Parameters
     ----------
-    power : (..., N) [pu]
-        What the load draws.
-    u : (N,) [pu]
-        The voltage that it sees.
+    power : (2, ..., N) [pu]
+        P and Q that the load draws.
+    u : (N,) complex [pu]
+        The voltage that it sees, in a frame of nominal frequency.
     weights : (odd,)
         Of the window.
 
     Returns
     -------
-    (..., N) array [pu]
+    (2, ..., N) array [pu]
     """
-    return average(power / u, weights) * average(u, weights)
+    back: NDArray[np.complex128] = 1 / u
+    P, Q = power
+    real = average(P * back.real - Q * back.imag, weights)
+    imag = average(P * back.imag + Q * back.real, weights)
+    shown = average(u.real, weights) + 1j * average(u.imag, weights)
+    return np.stack([real * shown.real - imag * shown.imag, real * shown.imag + imag * shown.real])
 
 
 def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Event":
     """The event with the voltage that the load saw.
 
     Of the voltages whose average is the recorded one, within its noise, it is the one that bends
-    least: weighted least squares. Near the edges of the dip it is free to bend.
+    least: weighted least squares. Near the edges of the dip it is free to bend. Its angle is
+    computed back with its size where either was recorded to turn.
 
     Parameters
     ----------
@@ -204,8 +215,43 @@ def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Even
     free = (np.abs(at - event.start) < near) | (np.abs(at - event.end) < near)
     error = max(ERROR, event.noise_U)
     factor = _factor(weights.tobytes(), len(U), free.tobytes(), error)
-    u = cho_solve_banded((factor, False), np.convolve(U, weights) / error**2)
-    return replace(event, record=replace(event.record, U=u[len(weights) // 2 :][: len(U)]))
+
+    def undo(shown: np.ndarray) -> np.ndarray:
+        u = cho_solve_banded((factor, False), np.convolve(shown, weights) / error**2)
+        return u[len(weights) // 2 :][: len(U)]
+
+    record = event.record
+    turned = find_turned_angle(event)
+    if not turned.any():
+        return replace(event, record=replace(record, U=undo(U)))
+    u = undo(U * np.cos(turned)) + 1j * undo(U * np.sin(turned))
+    steady = 2 * np.pi * (event.f0 - record.base.frequency) * step * np.arange(len(U))
+    angle = steady + np.unwrap(np.angle(u))
+    f = measure_frequency(angle, step, record.base.frequency)
+    return replace(event, record=replace(record, U=np.abs(u), U_angle=angle, f=f))
+
+
+def find_turned_angle(event: "Event") -> np.ndarray:
+    """By how much the voltage's angle was recorded to turn, beside what it turned by before the
+    dip.
+
+    Parameters
+    ----------
+    event : Event
+        Its `U_angle`, or else what f turns.
+
+    Returns
+    -------
+    (N,) array [rad]
+        Zero throughout where neither was recorded or nothing turns.
+    """
+    record = event.record
+    if record.f is None:
+        return np.zeros(record.samples)
+    if record.U_angle is None:
+        return integrate(2 * np.pi * (record.f - event.f0), record.step)
+    steady = 2 * np.pi * (event.f0 - record.base.frequency) * record.step
+    return record.U_angle - record.U_angle[0] - steady * np.arange(record.samples)
 
 
 @functools.lru_cache(maxsize=32)
