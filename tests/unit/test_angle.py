@@ -6,7 +6,7 @@ import pytest
 import tractexp
 from tractexp.errors import UserError
 from tractexp.record import Record
-from tractexp.record.angle import measure_frequency, unwrap_angle
+from tractexp.record.angle import measure_frequency, place_jumps, unwrap_angle
 
 T = np.arange(400) * 5e-3
 JUMP = 0.2  # rad, where the dip begins, and back where it ends
@@ -108,6 +108,33 @@ def test_a_frequency_that_turns_by_more_than_half_a_turn_is_none(samples):
     f[100 : 100 + samples] = 38.0
     with pytest.raises(UserError, match=r"sample 101 .*f = 38 is more than 20 % off the nominal"):
         record(f).check()
+
+
+def slope_over_two(angle):
+    return np.gradient(angle, T)
+
+
+def slope_behind(angle):
+    return np.diff(angle, prepend=angle[:1]) / (T[1] - T[0])
+
+
+@pytest.mark.parametrize("take_slope", [slope_over_two, slope_behind])
+def test_a_peak_of_f_is_a_jump_in_the_step_in_which_the_voltage_jumps(take_slope):
+    f = 50.0 + take_slope(ANGLE) / (2 * np.pi)
+    read = tractexp.read({"t": T, "U": U, "P": P, "Q": Q, "f": f})[0].record
+    turned = ANGLE - ANGLE[0]
+    np.testing.assert_allclose(
+        read.U_angle[1:] - read.U_angle[1], turned[1:] - turned[1], atol=1e-6
+    )
+    np.testing.assert_allclose(read.f[1:], 50.3, atol=1e-6)
+
+
+def test_without_a_jump_of_the_voltage_within_a_step_f_stays_what_it_is():
+    f = 50.0 + np.gradient(ANGLE, T) / (2 * np.pi)
+    slow = np.interp(T, [0.5, 0.52, 0.7, 0.72], [1.0, 0.7, 0.7, 1.0])
+    assert place_jumps(f, slow, T[1], 50.0) is None
+    assert place_jumps(np.full(len(T), 50.3), U, T[1], 50.0) is None
+    assert place_jumps(f[:3], U[:3], T[1], 50.0) is None
 
 
 def test_an_angle_survives_a_stored_record():

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tractexp.errors import DATA, UserError
-from tractexp.record.angle import measure_frequency
+from tractexp.record.angle import measure_frequency, place_jumps
 from tractexp.record.gap import (
     MOST_ROWS,
     SAME_VOLTAGE,
@@ -272,11 +272,15 @@ class Record:
     def _turn(self) -> "Record":
         """The record with the frequency at which its angle turns between jumps.
 
-        Where f was recorded and says that the angle turns in another frame than that of the nominal
+        Where f alone was recorded, its peaks at jumps of the voltage are jumps of an angle. Where f
+        says that the angle turns in another frame than that of the nominal
         frequency, a note says so and the angle is left out.
         """
         if self.U_angle is None:
-            return self
+            turned = self.f is not None and place_jumps(
+                self.f, self.U, self.step, self.base.frequency
+            )
+            return replace(self, U_angle=turned[0], f=turned[1]) if turned else self
         f = measure_frequency(self.U_angle, self.step, self.base.frequency)
         if self.f is None or abs(float(np.median(f - self.f))) < SAME_FRAME:
             return replace(self, f=f)
