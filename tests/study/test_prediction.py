@@ -16,10 +16,11 @@ from tractexp.configuration.plugin import get
 from tractexp.discrepancy.decide import decide, find_predicting
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.explain import explain, find_nearest_sets
-from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.explanations import search_effect_sets
+from tractexp.discrepancy.investigate import investigate, is_end_of_range
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.precision import estimates, standard_errors
-from tractexp.discrepancy.prediction import SHARING, search_third
+from tractexp.discrepancy.prediction import SHARING, search_third, select_grounds
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.ranking import beats, find_nearest
 from tractexp.identification.verdict import UNIDENTIFIED
@@ -244,6 +245,9 @@ def dips(depths=(0.5, 0.35, 0.6)):
             )
         )
     return made
+
+
+OTHER_TRIPS = {"motor_trip", "static_trip", "two_stage_trip"}
 
 
 @pytest.fixture(scope="module")
@@ -561,3 +565,47 @@ def test_a_size_that_is_known_no_better_than_its_bounds_is_told(inexact):
         for e in inexact.final_estimates
     ]
     assert blind.open_sizes == ("of tripped_share the events know no more than the bounds",)
+
+
+def test_what_rests_on_a_bound_is_told_of_the_effects_alone(inexact, monkeypatch):
+    rest = ["tripped_share", "T_m"]
+    monkeypatch.setattr("tractexp.discrepancy.investigate.at_bound", lambda *_: rest)
+    told = [sentence.partition(" ")[0] for sentence in replace(inexact).open_sizes]
+    assert told == ["tripped_share"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "ends"),
+    [
+        ("tripped_share", 0.0, True),
+        ("trip_level", 0.95, True),
+        ("trip_delay", 0.5, True),
+        ("trip_delay", 0.0, False),
+        ("reconnect_delay", 0.02, True),
+    ],
+)
+def test_a_setting_rests_at_the_end_of_its_range_unless_nature_ends_there(name, value, ends):
+    """The level of a relay at the end of what was tried is no level; a delay of 0 is one."""
+    own = {p.name: p for p in get("effect", "undervoltage_trip")().parameters}
+    assert is_end_of_range(own[name], value) == ends
+
+
+def test_a_second_effect_is_sought_beside_the_law_that_fits_best(inexact):
+    """Beside a member of the family where that fits best, and never beside its own textbook."""
+    context = inexact.explanations.base.context.with_measured_power.held_to_usual
+    catalogue, noise = context.catalogue, inexact.evidence.noise
+    refits = {row.fit.names: row.fit for row in inexact.evidence.every}
+    textbook = refits[("undervoltage_trip",)]
+    member = next(fit for names, fit in refits.items() if {*names} & OTHER_TRIPS)
+    best = replace(member, deviance=textbook.deviance - 100.0)
+    refits[best.names] = best
+    families = [catalogue.textbook(fit.names) for fit in select_grounds(catalogue, refits.values())]
+    grounds = select_grounds(catalogue, refits.values())
+    assert grounds[0] is best
+    assert len({*families}) == len(grounds) == 2
+    ground = inexact.first.score_fit(context, inexact.bare, noise)
+    beside = ground.score_fit(context, best, noise)
+    pairs = search_effect_sets([ground, beside], refits, 2, context.effort.say)
+    found = [fit.names for fit in pairs if member.names[0] in fit.names]
+    assert found
+    assert not any("undervoltage_trip" in names for names in found)

@@ -273,7 +273,8 @@ def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
     """
     first, last = steps[0], steps[-1]
     sets: dict[Names, float] = {}
-    for score in last.scores[: SHORTLIST[size]]:
+    own = last.context.catalogue.textbook(last.fit.names)
+    for score in [s for s in last.scores if s.name not in own][: SHORTLIST[size]]:
         sets[tuple(sorted((*last.fit.names, score.name)))] = last.fit.deviance - score.drop
     if 1 < size <= MOST_NAMED:
         names = [s.name for s in first.scores if s.drop > 0][:COMBINED]
@@ -296,14 +297,17 @@ def _column(at: Disagreement, score: Score) -> np.ndarray:
 
 def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[Start]:
     """Starts for one set: each subset's fit with the others at their one-step size, at their best
-    two settings.
+    two settings. Members of families, which have no column, begin where they were fitted.
     """
     begin: list[Start] = []
+    columns = steps[0].projection.ranked_scores
     for left in names:
         rest = tuple(n for n in names if n != left)
         from_fit = refits.get(rest, steps[0].fit)
         at = next((s for s in reversed(steps) if s.fit.names == rest), steps[0])
         missing = [n for n in names if n not in from_fit.names]
+        if not columns.keys() >= {*missing}:
+            continue
         for rank in range(RANKS):
             point = from_fit.unit
             for name in missing:

@@ -63,6 +63,7 @@ from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
+from tractexp.parameter import Parameter
 from tractexp.record import Event
 from tractexp.text.wording import join_words
 
@@ -203,16 +204,16 @@ class Findings:
 
     @property
     def open_sizes(self) -> tuple[str, ...]:
-        """Sizes of what was added, of the graded model, that rest on a bound, in words; and those
-        of an effect of which no size is known better than its bounds.
+        """Parameters of what was added, of the graded model, that rest on a bound, in words; and
+        the sizes of an effect of which no size is known better than its bounds.
         """
         graded = self.final_grade
-        own = {p.name for p in self.catalogue.sizes(self.names)}
-        at = graded.problem.space.names
+        own = {p.name: p for p in self.catalogue.parameters(self.names)}
+        values = dict(zip(graded.problem.space.names, graded.values.tolist(), strict=True))
         told = [
-            f"{name} rests on its bound, {graded.values[at.index(name)]:.4g}"
+            f"{name} rests on its bound, {values[name]:.4g}"
             for name in at_bound(graded.problem, graded.values)
-            if name in own
+            if name in own and is_end_of_range(own[name], values[name])
         ]
         unknown = {
             e.parameter.name for e in self.final_estimates if e.verdict.startswith(UNIDENTIFIED)
@@ -395,6 +396,14 @@ class Findings:
             self.select_misfit(one).error for one in (self.base_grade, self.final_grade)
         )
         return measure_closed_share(before, after) >= share_gone(self.context.criteria.ahead)
+
+
+def is_end_of_range(parameter: Parameter, value: float) -> bool:
+    """Whether the bound that a parameter of an effect rests on is where the search ended and not
+    where nature does: no time, level or margin is below 0.
+    """
+    nearest = min(parameter.bounds, key=lambda bound: abs(bound - value))
+    return parameter.null is not None or nearest != 0
 
 
 def investigate(

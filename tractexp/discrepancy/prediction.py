@@ -29,6 +29,7 @@ from tractexp.discrepancy.least_squares import least_squares_tests, residual_noi
 from tractexp.discrepancy.proposal.best_term import best_terms
 from tractexp.discrepancy.ranking import find_nearest, rank_sets
 from tractexp.inference.base_fit import minima_of
+from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.inference.fitting import Refit, best_of, refit, wide_refits
@@ -143,8 +144,8 @@ def search_third(
     if not best or len(best[0].fit.names) < MOST_NAMED:
         return []
     pair = refits.get(best[0].fit.names, best[0].fit)
-    known = context.catalogue.of_load
-    if best[0].held_out_prediction.error < LEAST_PARTING or not {*pair.names} <= {*known}:
+    families, of_load = context.catalogue.textbook(pair.names), context.catalogue.of_load
+    if best[0].held_out_prediction.error < LEAST_PARTING or not {*families} <= {*of_load}:
         return []
     beside = ground.score_fit(context, pair, ground.noise)
     return search_effect_sets([ground, beside], refits, len(pair.names) + 1, _say(context))
@@ -194,11 +195,21 @@ def _search_all_sets(
     singles = [f for f in best_of(refits.values()) if len(f.names) == 1]
     of_family = {context.catalogue.textbook(f.names)[0] for f in singles[:MOST_TRIED_FAMILIES]}
     add(member_fits(context, noise, refits, of_family))
-    # members of families have no columns
-    of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]
-    for single in of_load[:MOST_TRIED_FAMILIES]:
+    for single in select_grounds(context.catalogue, refits.values()):
         add(search_effect_sets([ground, ground.score_fit(context, single, noise)], refits, 2, say))
     return ground, refits
+
+
+def select_grounds(catalogue: Catalogue, refits: Iterable[Refit]) -> list[Refit]:
+    """The single effects of the load beside which a second is sought: of the families that fit
+    best, each by the law that fits best. A weaker effect shows beside the right law of a stronger.
+    """
+    grounds: dict[str, Refit] = {}
+    for fit in best_of(refits):
+        family = catalogue.textbook(fit.names)
+        if len(family) == 1 and family[0] in catalogue.of_load:
+            grounds.setdefault(family[0], fit)
+    return [*grounds.values()][:MOST_TRIED_FAMILIES]
 
 
 def predict(there: Context, fit: Refit) -> PredictedError:
