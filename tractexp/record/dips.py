@@ -17,6 +17,8 @@ from tractexp.record.reader import Events
 from tractexp.record.record import GREATEST_CURRENT, SIZES, Record
 
 LONGEST_REACH = 60.0  # s of a record that are used before its dip and after
+# of a dip's depth: an earlier one that is shallower leaves no machines that still accelerate
+LEAST_EARLIER_DEPTH = 0.5
 
 
 @dataclass(frozen=True)
@@ -96,11 +98,14 @@ class _Cut:
             return error
 
     def join(self, following: "_Cut") -> "_Cut | None":
-        """Both dips as one; None where the load is at rest between them, or either cannot be
-        used.
+        """Both dips as one; None where the load is at rest between them or moves for another reason
+        than the first, a shallow one, and where either cannot be used.
         """
-        event = following._event
-        if isinstance(event, UserError) or event.at_rest:
+        own, event = self._event, following._event
+        if isinstance(own, UserError) or isinstance(event, UserError):
+            return None
+        shallow = own.depth < LEAST_EARLIER_DEPTH * event.depth
+        if event.at_rest or shallow:
             return None
         both = replace(self, window=slice(self.window.start, following.window.stop))
         return both if isinstance(both.result, Record) else None
