@@ -33,7 +33,7 @@ tractexp.__version__  # noqa: B018
 from run_machine import ended_at  # noqa: E402
 
 from tractexp.__main__ import main as command  # noqa: E402
-from tractexp.api.task import Job  # noqa: E402
+from tractexp.api.job import Job  # noqa: E402
 from tractexp.storage import files  # noqa: E402
 from tractexp.storage.run_folder import LOCK, settle  # noqa: E402
 

@@ -296,7 +296,7 @@ def perform(arguments, folder):
     from hydra import compose
     from omegaconf import OmegaConf, open_dict
 
-    from tractexp.api.task import Job
+    from tractexp.api.job import Job
     from tractexp.cli.chosen import collect_chosen_settings, refuse_unread
     from tractexp.configuration.overrides import overrides
     from tractexp.configuration.plugin import build

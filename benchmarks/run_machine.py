@@ -40,7 +40,7 @@ from hypothesis.stateful import (
 )
 
 from tractexp import tracking
-from tractexp.api.task import Job
+from tractexp.api.job import Job
 from tractexp.cli.again import build_repeat_command
 from tractexp.errors import UserError
 from tractexp.storage import files

@@ -42,7 +42,7 @@ def compute(folder: Path) -> float:
         os.environ[f"{library}_NUM_THREADS"] = "1"
     import yaml
 
-    from tractexp.api.task import Job
+    from tractexp.api.job import Job
     from tractexp.identification.search import Limits, search
 
     spent, problem = 0.0, None

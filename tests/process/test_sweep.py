@@ -337,7 +337,7 @@ def test_who_is_killed_while_a_job_is_done_again_loses_nothing_of_the_earlier_ti
 def test_a_job_that_fails_when_it_is_done_again_leaves_the_earlier_result(
     logged, tmp_path, monkeypatch
 ):
-    from tractexp.api.task import Job
+    from tractexp.api.job import Job
     from tractexp.errors import UserError
 
     shutil.copytree(logged[1] / "0", tmp_path / "sweep" / "0")
@@ -730,7 +730,7 @@ def test_settings_of_one_optimizer_are_not_pooled_under_its_name(tmp_path):
     ],
 )
 def test_a_variant_is_named_after_what_was_chosen_but_the_seed(chosen, name):
-    from tractexp.api.task import variant
+    from tractexp.api.job import variant
 
     assert variant("issa", chosen) == name
 

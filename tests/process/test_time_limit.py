@@ -11,8 +11,8 @@ from command_line import run_command
 
 import tractexp
 import tractexp.data
+from tractexp.api.job import read_events
 from tractexp.api.surveying import rows_of
-from tractexp.api.task import read_events
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.storage import files, time_limit

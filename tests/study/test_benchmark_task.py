@@ -296,7 +296,7 @@ def test_what_the_task_cannot_use_is_refused(ioh, tmp_path, extra, sentence):
 
 
 def test_ours_against_the_same_with_other_settings_has_a_name_of_its_own(ioh):
-    from tractexp.api.task import Job
+    from tractexp.api.job import Job
 
     task = build("task", {"name": "benchmark", "against": ["pso"]})
     config = {"optimizer": {"name": "pso", "population": 20}}

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
+from tractexp.api.job import Job
 from tractexp.api.read import GROUP, node_of
-from tractexp.api.task import Job, Task
+from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
 from tractexp.configuration.plugin import build, discover, plugin

@@ -17,10 +17,11 @@ import numpy as np
 from tractexp.api.arguments import Choice, public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
+from tractexp.api.job import Job
 from tractexp.api.read import dips_together
 from tractexp.api.response import Response
 from tractexp.api.setup import Given, describe_records
-from tractexp.api.task import Job, Task, print_result, print_written
+from tractexp.api.task import Task, print_result, print_written
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import get, plugin
 from tractexp.configuration.run_command import build_again_command

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
-from tractexp.api.task import Job, Task
+from tractexp.api.job import Job
+from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
 from tractexp.configuration.plugin import build, plugin

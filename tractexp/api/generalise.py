@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tractexp.api.arguments import Choice, public
+from tractexp.api.job import Job
 from tractexp.api.setup import Setup
-from tractexp.api.task import SEARCH, Job, Task
+from tractexp.api.task import SEARCH, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import build, plugin
 from tractexp.configuration.run_command import OF_LOAD, build_again_command

@@ -11,10 +11,11 @@ import numpy as np
 
 from tractexp.api.arguments import Choice, public
 from tractexp.api.compose import LoadModel
+from tractexp.api.job import Job
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.api.setup import Setup
-from tractexp.api.task import Job, Task
+from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.choices import set_holding
 from tractexp.configuration.plugin import plugin

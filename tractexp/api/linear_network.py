@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.compose import DOMAIN
+from tractexp.api.job import Job
 from tractexp.api.read import Dips, dips_of, dips_together
 from tractexp.api.response import Response, response_of
 from tractexp.api.setup import describe_records
-from tractexp.api.task import Job, Task
+from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.cache import provenance
 from tractexp.configuration.choices import choices, defaults

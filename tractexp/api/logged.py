@@ -16,7 +16,7 @@ from tractexp.text import quoting
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Estimate, Identification
-    from tractexp.api.task import Job
+    from tractexp.api.job import Job
     from tractexp.identification.result import Result
 
 FLOOR = 1.01  # times the estimate's objective: from there a search has found what the noise leaves

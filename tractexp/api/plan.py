@@ -12,9 +12,10 @@ import numpy as np
 
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
+from tractexp.api.job import Job
 from tractexp.api.next_event import Recommended, recommend_event
 from tractexp.api.setup import Setup
-from tractexp.api.task import Job, Task
+from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
 from tractexp.configuration.run_command import suggest_run

@@ -12,7 +12,8 @@ import numpy as np
 
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
-from tractexp.api.task import Job, Task
+from tractexp.api.job import Job
+from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
 from tractexp.errors import UserError, check_range

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
-from tractexp.api.task import Job, Task
+from tractexp.api.job import Job
+from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
 from tractexp.configuration.run_command import suggest_run

@@ -10,9 +10,10 @@ import numpy as np
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
+from tractexp.api.job import Job
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
-from tractexp.api.task import LOAD, Job, Task
+from tractexp.api.task import LOAD, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
 from tractexp.domain import domain_of

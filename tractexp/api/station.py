@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import UNUSABLE, Identification
+from tractexp.api.job import Job
 from tractexp.api.listed import Listed
 from tractexp.api.station_load import LoadJob, fit_load, read_files
 from tractexp.api.survey import build_fit_command, survey
 from tractexp.api.surveying import FEWEST_DIPS, complete_entries, keys, name_load
-from tractexp.api.task import Job, Task, call
+from tractexp.api.task import Task, call
 from tractexp.blocks import Report, Table
 from tractexp.cache.store import Store, environment, key
 from tractexp.configuration.overrides import format_assignment, survey_of

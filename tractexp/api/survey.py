@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
+from tractexp.api.job import Job
 from tractexp.api.listed import Listed
 from tractexp.api.load_command import RACE
 from tractexp.api.surveying import (
@@ -19,7 +20,7 @@ from tractexp.api.surveying import (
     look_at_files,
     name_load,
 )
-from tractexp.api.task import Job, Task
+from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.overrides import build_typed_command, format_assignment
 from tractexp.configuration.plugin import discover, get, plugin

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tractexp.api.task import ALWAYS
+from tractexp.api.job import ALWAYS
 from tractexp.errors import UserError
 
 OF = {"domain": "model.domain"}  # groups that choose for another, and what

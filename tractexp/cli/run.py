@@ -4,7 +4,7 @@ import contextlib
 from pathlib import Path
 from typing import Any
 
-from tractexp.api.task import Job
+from tractexp.api.job import Job
 from tractexp.cli import configuration
 from tractexp.cli.chosen import collect_chosen_settings, refuse_unread
 from tractexp.configuration import run_command

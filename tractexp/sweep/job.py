@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tractexp.api.task import Job, read_events, variant
+from tractexp.api.job import Job, read_events, variant
 from tractexp.cli.chosen import collect_chosen_settings
 from tractexp.cli.configuration import list_named_files
 from tractexp.configuration import run_command

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import tracking
-from tractexp.api.task import Job
+from tractexp.api.job import Job
 from tractexp.cache import provenance
 from tractexp.errors import UserError
 from tractexp.storage.files import write_json

@@ -16,7 +16,7 @@ from hydra.core.plugins import Plugins
 from hydra.plugins.sweeper import Sweeper
 from omegaconf import OmegaConf
 
-from tractexp.api.task import Job
+from tractexp.api.job import Job
 from tractexp.blocks import Table
 from tractexp.cli.chosen import refuse_unread
 from tractexp.compat.hydra_plugins import NAMESPACE

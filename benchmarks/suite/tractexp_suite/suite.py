@@ -9,7 +9,8 @@ from typing import Any, Self
 import numpy as np
 
 from tractexp import tracking
-from tractexp.api.task import Job, Task
+from tractexp.api.job import Job
+from tractexp.api.task import Task
 from tractexp.blocks import Table
 from tractexp.cache import provenance
 from tractexp.configuration.plugin import plugin

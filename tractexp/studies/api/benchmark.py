@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from tractexp.api.arguments import Choice, public
-from tractexp.api.task import Job, Task
+from tractexp.api.job import Job
+from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.cache import provenance
 from tractexp.configuration.plugin import build, get, plugin

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from tractexp.api.arguments import public
-from tractexp.api.task import Job, Task, print_paths
+from tractexp.api.job import Job
+from tractexp.api.task import Task, print_paths
 from tractexp.blocks import Report, Table
 from tractexp.configuration.overrides import format_assignment
 from tractexp.configuration.plugin import plugin

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from tractexp.api.arguments import public
+from tractexp.api.job import Job
 from tractexp.api.setup import Setup, describe_records
-from tractexp.api.task import Job, Task, print_paths
+from tractexp.api.task import Task, print_paths
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
 from tractexp.errors import check_choice, check_range
@@ -20,8 +21,8 @@ from tractexp.text.progress import NEXT_LINES, Pace, Progress, say, tell_stages
 
 if TYPE_CHECKING:
     from tractexp.api.given import Chosen, ModelGiven, Records
-    from tractexp.studies.paper.claims import Claim
     from tractexp.studies.paper.study import Study
+    from tractexp.studies.paper.verdict import Claim
     from tractexp.tracking import TrackedRun
 
 PARTS = (
@@ -126,7 +127,7 @@ class PaperResult(Written):
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         """The claims that `to_dict` gave."""
-        from tractexp.studies.paper.claims import Claim
+        from tractexp.studies.paper.verdict import Claim
 
         claims = [Claim(**claim) for claim in content["claims"]]
         seconds = content.get("seconds", 0.0)

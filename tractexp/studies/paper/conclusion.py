@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tractexp.studies.paper import equations, why
-from tractexp.studies.paper.claims import CONFIRMED, DEPENDS, PAIRS, Claim, compare_ends, number
 from tractexp.studies.paper.printed import COMPARED, LABELS
 from tractexp.studies.paper.study import FLOOR_FACTOR, NARROW, TRADED, WIDE, Study
+from tractexp.studies.paper.verdict import CONFIRMED, DEPENDS, PAIRS, Claim, compare_ends, number
 from tractexp.text.wording import join_words
 
 # times the lowest objective: a valley that a search might take for the right one

@@ -12,7 +12,6 @@ from tractexp.studies.comparison import charts
 from tractexp.studies.comparison.floor import Floor
 from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.paper import conclusion, figures, maps, why
-from tractexp.studies.paper.claims import middle, number
 from tractexp.studies.paper.printed import COMPARED, LABELS, label
 from tractexp.studies.paper.study import (
     BUDGETS,
@@ -23,6 +22,7 @@ from tractexp.studies.paper.study import (
     TRADED,
     Study,
 )
+from tractexp.studies.paper.verdict import middle, number
 from tractexp.text.wording import as_sentence
 
 SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn

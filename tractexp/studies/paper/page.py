@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.studies.paper import conclusion, equations, printed
-from tractexp.studies.paper.claims import BOTH, Claim, count_verdicts, middle
+from tractexp.studies.paper.claims import count_verdicts
 from tractexp.studies.paper.figure_sections import (
     figure3,
     figure4,
@@ -19,6 +19,7 @@ from tractexp.studies.paper.figure_sections import (
 )
 from tractexp.studies.paper.printed import LABELS, READINGS
 from tractexp.studies.paper.study import Study
+from tractexp.studies.paper.table_claims import BOTH
 from tractexp.studies.paper.table_sections import (
     TO_THE_LETTER,
     add_generalization_table,
@@ -26,6 +27,7 @@ from tractexp.studies.paper.table_sections import (
     table2,
     table3,
 )
+from tractexp.studies.paper.verdict import Claim, middle
 
 TITLE = "The paper, table by table"
 

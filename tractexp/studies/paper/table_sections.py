@@ -7,9 +7,9 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.studies.paper import printed
-from tractexp.studies.paper.claims import PAIRS, middle, number
 from tractexp.studies.paper.printed import COMPARED, LABELS, LITERAL, READINGS, TEN, label
 from tractexp.studies.paper.study import BUDGETS, FLOOR_FACTOR, LEVEL, Study
+from tractexp.studies.paper.verdict import PAIRS, middle, number
 
 TO_THE_LETTER = (
     "To the letter: Eqs. (4), (12) and (15) as they are printed, in raw units, every move taken, SD"

@@ -1,0 +1,152 @@
+"""Claims of the paper's figures."""
+
+import numpy as np
+
+from tractexp.studies.comparison.statistics import (
+    SIGNIFICANCE_LEVEL,
+    holm,
+    vargha_delaney,
+    wilcoxon,
+)
+from tractexp.studies.paper import maps, printed, why
+from tractexp.studies.paper.printed import LABELS
+from tractexp.studies.paper.study import BUDGETS, TARGETS, Study
+from tractexp.studies.paper.verdict import (
+    CONFIRMED,
+    DIFFERENT,
+    PAIRS,
+    REFUTED,
+    Claim,
+    decide,
+    merge_verdicts,
+    number,
+    readings_of,
+)
+
+
+def figure9(study: Study) -> list[Claim]:
+    """Speed, and local optima."""
+    claims = []
+    targets = " and ".join(f"{t:g}" for t in TARGETS)
+    for first, second in PAIRS:
+        for by in BUDGETS:
+            verdicts = {}
+            phrases = []
+            for how, names in readings_of(first, second).items():
+                verdicts[how], numbers = faster(study, names[first], names[second], by)
+                phrases.append(f"{how} {LABELS[first]} {numbers[0]}, {LABELS[second]} {numbers[1]}")
+            text = f"{LABELS[first]} converges faster than {LABELS[second]}, by {by}"
+            measured = f"expected {by} to {targets} times the floor: {'; '.join(phrases)}"
+            claims.append(Claim("figure9", text, measured, merge_verdicts(verdicts)))
+    claims.append(_jumps(study))
+    return claims
+
+
+def faster(study: Study, first: str, second: str, by: str) -> tuple[str, list[str]]:
+    """Whether `first` reaches every target with less, over paired seeds, and the expected running
+    times of both.
+    """
+    p = []
+    A = []
+    for target in TARGETS:
+        a, b = (
+            np.where(*_mark_reached_cost(study.spent(name, target, by))) for name in (first, second)
+        )
+        p.append(wilcoxon(a, b)[0])
+        A.append(vargha_delaney(a, b))
+    times = [
+        ", ".join(number(study.running_time(name, t, by)) for t in TARGETS)
+        for name in (first, second)
+    ]
+    return decide(study, max(holm(p)) < SIGNIFICANCE_LEVEL and min(A) > 0.5), times
+
+
+def _mark_reached_cost(
+    spent: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """The arguments of `numpy.where`: whether the target was reached, the cost there, else
+    infinity.
+    """
+    return spent[1], spent[0], np.inf
+
+
+def _jumps(study: Study) -> Claim:
+    """Whether ISSA ends in the valley of the lowest objective more often than the two others do."""
+    verdicts = {}
+    phrases = []
+    for how, names in readings_of("issa", "ssa").items():
+        shares = {name: study.shares(names[name]) for name in printed.COMPARED}
+        tests = [why.fisher(shares["issa"], shares[name], "valley") for name in ("ssa", "pso")]
+        more = all(shares["issa"].valley > shares[name].valley for name in ("ssa", "pso"))
+        verdicts[how] = decide(study, more and max(holm(tests)) < SIGNIFICANCE_LEVEL)
+        phrases.append(
+            f"{how} "
+            + ", ".join(
+                f"{LABELS[n]} {s.valley} of {s.n} (at its floor {s.floor})"
+                for n, s in shares.items()
+            )
+        )
+    control = study.control_shares
+    phrases.append(f"of random points {control.valley} of {control.n} descend there")
+    return Claim(
+        "figure9",
+        "SSA and PSO are caught in local optima, ISSA jumps out of them",
+        f"searches that end in the valley of the lowest objective: {'; '.join(phrases)}",
+        merge_verdicts(verdicts),
+    )
+
+
+def figure3(study: Study) -> list[Claim]:
+    """How even the maps are."""
+    flock, *_ = study.uniformity.values()
+    middle = {name: float(np.median(values)) for name, values in flock.items()}
+    tent = {name: value for name, value in middle.items() if name.startswith("tent")}
+    own = f"tent, alpha = {printed.TENT_ALPHA:g}"
+    best = min(tent, key=lambda name: tent[name])
+    measured = f"median centered discrepancy of {next(iter(study.uniformity))}: "
+    far = np.median(flock[own]) / np.median(flock["uniform"])
+    return [
+        Claim(
+            "figure3",
+            "the tent map is more uniform than the logistic map",
+            f"{measured}tent {number(middle[own])}, logistic {number(middle['logistic'])}",
+            CONFIRMED if middle[own] < middle["logistic"] else REFUTED,
+        ),
+        Claim(
+            "figure3",
+            "with alpha = 0.3 it is relatively uniform",
+            f"lowest of the alphas tried: {best.partition(', ')[2]} with {number(tent[best])}; 0.3"
+            f" has {number(tent[own])}",
+            CONFIRMED if tent[own] < DIFFERENT * tent[best] else REFUTED,
+        ),
+        Claim(
+            "figure3",
+            "initializing by the tent map makes the flock more even",
+            f"{far:.2f} times the discrepancy of plain random numbers,"
+            f" {middle[own] / middle['Sobol']:.1f} times that of Sobol points",
+            CONFIRMED if far < 1 / DIFFERENT else REFUTED,
+        ),
+    ]
+
+
+def figure4(study: Study) -> list[Claim]:
+    """The claims on the Lévy flight."""
+    slopes = {formula: maps.tail_exponent(steps) for formula, steps in study.tails.items()}
+    even = {formula: float(np.mean(steps > 0)) for formula, steps in study.tails.items()}
+    return [
+        Claim(
+            "figure4",
+            "Lévy steps have good randomness in size and direction",
+            f"Mantegna's: {even['mantegna']:.1%} of the steps positive, tail exponent"
+            f" {slopes['mantegna']:.2f}",
+            CONFIRMED if abs(even["mantegna"] - 0.5) < 0.01 and slopes["mantegna"] < 2 else REFUTED,
+        ),
+        Claim(
+            "figure4",
+            "Eq. (15) gives Lévy steps with beta = 3/2",
+            f"as printed the tail exponent is {slopes['printed']:.2f} (2/3 in theory), which a Lévy"
+            " flight of exponent 3/2 has not; Mantegna's |nu|^(1/beta) has"
+            f" {slopes['mantegna']:.2f}",
+            CONFIRMED if abs(slopes["printed"] - 1.5) < 0.2 else REFUTED,
+        ),
+    ]
