@@ -160,33 +160,44 @@ class TestTables:
         np.testing.assert_array_equal(made.extra["stamps"], recording.extra["stamps"])
         assert made.extra["stamps"].dtype == "<u4"
 
-    @settings(max_examples=8, deadline=None)
-    @given(data=st.data())
-    def test_whatever_the_numbers_and_names(self, tmp_path_factory, ending, data):
-        n = data.draw(st.integers(2, 30))
-        channels = [
-            Channel(
-                data.draw(NAMES),
-                np.array(
-                    data.draw(st.lists(st.integers(-32768, 32767), min_size=n, max_size=n)),
-                    dtype="<i2",
-                ),
-                gain=data.draw(st.floats(1e-9, 1e3)),
-                offset=data.draw(st.floats(-1e3, 1e3)),
-                missing=data.draw(st.sampled_from([None, -32768])),
-            )
-            for _ in range(data.draw(st.integers(1, 4)))
-        ]
-        channels.append(
-            Channel("x", np.array(data.draw(st.lists(st.floats(), min_size=n, max_size=n))))
+
+def check_any_recording(data, folder, ending):
+    n = data.draw(st.integers(2, 30))
+    channels = [
+        Channel(
+            data.draw(NAMES),
+            np.array(
+                data.draw(st.lists(st.integers(-32768, 32767), min_size=n, max_size=n)),
+                dtype="<i2",
+            ),
+            gain=data.draw(st.floats(1e-9, 1e3)),
+            offset=data.draw(st.floats(-1e3, 1e3)),
+            missing=data.draw(st.sampled_from([None, -32768])),
         )
-        recording = Recording("x", channels, [Segment(0, n, 1000.0, 0.0)])
-        table, _ = write_recording(recording, tmp_path_factory.mktemp("any") / f"rec{ending}")
-        made = restore_recording(str(table), read_sidecar(str(table)).recording)
-        for x, y in zip(recording.channels, made.channels, strict=True):
-            # else the offset swallows the digits of a step
-            if abs(x.offset) < 1e3 * x.gain * 32768:
-                np.testing.assert_array_equal(x.values(), y.values())
+        for _ in range(data.draw(st.integers(1, 4)))
+    ]
+    channels.append(
+        Channel("x", np.array(data.draw(st.lists(st.floats(), min_size=n, max_size=n))))
+    )
+    recording = Recording("x", channels, [Segment(0, n, 1000.0, 0.0)])
+    table, _ = write_recording(recording, folder / f"rec{ending}")
+    made = restore_recording(str(table), read_sidecar(str(table)).recording)
+    for x, y in zip(recording.channels, made.channels, strict=True):
+        # else the offset swallows the digits of a step
+        if abs(x.offset) < 1e3 * x.gain * 32768:
+            np.testing.assert_array_equal(x.values(), y.values())
+
+
+@settings(max_examples=25, deadline=None)
+@given(data=st.data())
+def test_whatever_the_numbers_and_names(tmp_path_factory, data):
+    check_any_recording(data, tmp_path_factory.mktemp("any"), ".csv")
+
+
+@settings(max_examples=3, deadline=None)  # a process reads each
+@given(data=st.data())
+def test_whatever_the_numbers_and_names_in_parquet(tmp_path_factory, data):
+    check_any_recording(data, tmp_path_factory.mktemp("any"), ".parquet")
 
 
 def test_a_sidecar_of_another_table_is_refused(tmp_path):
