@@ -36,7 +36,8 @@ import numpy as np  # noqa: E402
 from memory import peak, reset  # noqa: E402
 
 from tractexp.errors import UserError  # noqa: E402
-from tractexp.filetypes import cev, comtrade  # noqa: E402
+from tractexp.filetypes import comtrade  # noqa: E402
+from tractexp.filetypes.cev_text import checksum  # noqa: E402
 from tractexp.record import reader_of  # noqa: E402
 from tractexp.recording import Channel, Recording, Segment, StatusChannel  # noqa: E402
 from tractexp.storage import files  # noqa: E402
@@ -149,7 +150,7 @@ def event_report(made, every=1):
 
     def row(*cells):
         text = "".join(f"{cell}," for cell in cells)
-        return f'{text}"{cev.checksum(text)}"'
+        return f'{text}"{checksum(text)}"'
 
     lines = [
         row('"FID"'),

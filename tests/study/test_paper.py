@@ -18,7 +18,16 @@ from tractexp.errors import UserError
 from tractexp.identification.generalization import by_depth, mean_residual
 from tractexp.studies import searches
 from tractexp.studies.api.paper import PARTS
-from tractexp.studies.paper import claims, equations, maps, printed, valleys, why
+from tractexp.studies.paper import (
+    claims,
+    equations,
+    figure_claims,
+    maps,
+    printed,
+    valleys,
+    verdict,
+    why,
+)
 from tractexp.studies.paper.study import Shares, Study
 from tractexp.studies.paper.valleys import Ends
 
@@ -589,38 +598,38 @@ def read_alike(issa, ssa, pso, **others):
 
 def test_planted_rankings_are_judged_as_they_are():
     study = planted(10, read_alike(1.0, 2.0, 0.5))
-    assert claims.compare_ends(study, "issa", "ssa", "iterations")[0] == claims.CONFIRMED
-    assert claims.compare_ends(study, "issa", "pso", "iterations")[0] == claims.REFUTED
-    assert claims.compare_ends(study, "ssa", "pso", "simulations")[0] == claims.REFUTED
+    assert verdict.compare_ends(study, "issa", "ssa", "iterations")[0] == verdict.CONFIRMED
+    assert verdict.compare_ends(study, "issa", "pso", "iterations")[0] == verdict.REFUTED
+    assert verdict.compare_ends(study, "ssa", "pso", "simulations")[0] == verdict.REFUTED
 
 
 def test_a_verdict_that_depends_on_the_reading_says_so():
     """Equal with SD = 20, and ISSA lower with 10 perceivers, as the text can be read too."""
     study = planted(10, read_alike(2.0, 2.0, 3.0, issa_10_perceivers=1.0))
-    verdict, told = claims.compare_ends(study, "issa", "ssa", "iterations")
-    assert verdict == "depends on the reading: confirmed only with the 10 perceivers of section 4.2"
+    ends, told = verdict.compare_ends(study, "issa", "ssa", "iterations")
+    assert ends == "depends on the reading: confirmed only with the 10 perceivers of section 4.2"
     assert told.startswith(
         "with SD = 20 (section 4.3) medians 2.01 and 2.01 pu², p = 1, A = 0.50; with the 10"
         " perceivers"
     )
     limited = planted(10, read_alike(1.0, 2.0, 3.0, pso_limited=0.5))
-    assert claims.compare_ends(limited, "issa", "pso", "iterations")[0].endswith(
+    assert verdict.compare_ends(limited, "issa", "pso", "iterations")[0].endswith(
         "confirmed only with SD = 20 (section 4.3) and with the 10 perceivers of section 4.2"
     )
-    assert claims.compare_ends(limited, "issa", "ssa", "iterations")[0] == claims.CONFIRMED
+    assert verdict.compare_ends(limited, "issa", "ssa", "iterations")[0] == verdict.CONFIRMED
 
 
 def test_equal_optimizers_confirm_nothing_and_few_seeds_settle_nothing():
     equal, few = planted(10, read_alike(1.0, 1.0, 1.0)), planted(5, read_alike(1.0, 2.0, 3.0))
-    assert claims.compare_ends(equal, "issa", "ssa", "iterations")[0] == claims.REFUTED
-    assert claims.compare_ends(few, "issa", "ssa", "iterations")[0] == claims.OPEN
+    assert verdict.compare_ends(equal, "issa", "ssa", "iterations")[0] == verdict.REFUTED
+    assert verdict.compare_ends(few, "issa", "ssa", "iterations")[0] == verdict.OPEN
 
 
 def test_pairs_are_won_only_beyond_chance():
     """Ten seeds of ten lower win; five of ten do not; and the second of a pair never wins."""
     low = 1.0 + 0.01 * np.arange(10)
     high, mixed = low + 1, low + np.where(np.arange(10) % 2, 0.5, -0.5)
-    assert claims.lower([(low, high), (high, low), (low, mixed), (low, low)]) == [
+    assert verdict.lower([(low, high), (high, low), (low, mixed), (low, low)]) == [
         True,
         False,
         False,
@@ -640,10 +649,10 @@ def test_running_times_are_those_of_the_planted_histories():
 
 def test_the_faster_reaches_every_target_with_less_beyond_chance():
     study = planted(10, {"issa": 1.0, "ssa": 1.7, "pso": 1.0})
-    assert claims.faster(study, "issa", "ssa", "iterations")[0] == claims.CONFIRMED
-    assert claims.faster(study, "ssa", "issa", "iterations")[0] == claims.REFUTED
-    assert claims.faster(study, "issa", "pso", "simulations") == (
-        claims.REFUTED,
+    assert figure_claims.faster(study, "issa", "ssa", "iterations")[0] == verdict.CONFIRMED
+    assert figure_claims.faster(study, "ssa", "issa", "iterations")[0] == verdict.REFUTED
+    assert figure_claims.faster(study, "issa", "pso", "simulations") == (
+        verdict.REFUTED,
         ["300, 450", "300, 450"],
     )
 
@@ -780,8 +789,8 @@ def test_the_page_has_every_table_and_figure_and_a_verdict_for_each_claim(page):
     judged = json.loads((folder / "run" / "paper.json").read_text())["claims"]
     assert rows == len(judged) >= 36
     assert sum(line.strip().startswith(PARTS) for line in told.splitlines()) == len(judged)
-    for verdict in (claims.CONFIRMED, claims.REFUTED, claims.IMPOSSIBLE):
-        assert f">{verdict}</td>" in html
+    for word in (verdict.CONFIRMED, verdict.REFUTED, verdict.IMPOSSIBLE):
+        assert f">{word}</td>" in html
     assert html.count('class="chart"') == text.count("*Chart of the page: ") == 12
     assert not list((folder / "run").glob("*.svg"))
     for shown in (html, text):
@@ -838,7 +847,7 @@ def test_the_equations_alone_take_no_search(tmp_path, monkeypatch):
     monkeypatch.setattr(searches, "run", None)
     study = Study(_recipe, {}, _recipe().events, (), 30)
     judged = claims.claims(study, ["equations"])
-    assert [claim.verdict for claim in judged] == [claims.REFUTED] * 2
+    assert [claim.verdict for claim in judged] == [verdict.REFUTED] * 2
     text = markdown(page.report(study, ["equations"], judged))
     assert text.count("| does not agree |") == sum(not check.holds for check in equations.checks())
 

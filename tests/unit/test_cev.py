@@ -11,6 +11,7 @@ import tractexp
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes import cev
+from tractexp.filetypes.cev_text import checksum
 from tractexp.record.reader import reader_of
 
 KILOVOLT, AMPERE, LAG, F, PER_CYCLE = 63.5, 200.0, np.deg2rad(30), 49.98, 32
@@ -22,7 +23,7 @@ BITS = "50P1 * 51P TRIP 52A RB1 RB2 RB3 RB4"
 def row(*cells):
     """Cells of a line with its checksum, as in the appendix Compressed ASCII."""
     text = "".join(f"{cell}," for cell in cells)
-    return f'{text}"{cev.checksum(text)}"'
+    return f'{text}"{checksum(text)}"'
 
 
 def names(*cells):
@@ -92,8 +93,8 @@ def test_a_row_that_is_lost_or_double_is_noted(write, change):
 
 
 def test_the_checksum_is_that_of_the_manual():
-    assert cev.checksum('"FID",') == "0143"  # printed in the manual of the SEL-311L
-    assert cev.checksum('"MONTH","DAY","YEAR","HOUR","MIN","SEC","MSEC",') == "0ACA"
+    assert checksum('"FID",') == "0143"  # printed in the manual of the SEL-311L
+    assert checksum('"MONTH","DAY","YEAR","HOUR","MIN","SEC","MSEC",') == "0ACA"
 
 
 def test_a_report_is_read_in_primary_instantaneous_values(write):
@@ -260,7 +261,7 @@ def test_a_raw_report_of_a_relay_that_tracks_is_evened(write):
     first = next(k for k, line in enumerate(lines) if "TRIG" in line) + 1
     for k in range(1920):
         text = lines[first + k].rpartition(',"')[0].replace("49.98", f"{f[k]:.2f}") + ","
-        lines[first + k] = f'{text}"{cev.checksum(text)}"'
+        lines[first + k] = f'{text}"{checksum(text)}"'
     recording = cev.load(write(lines))
     [segment] = recording.segments
     assert segment.t[-1] == pytest.approx(t[-1], rel=1e-9)
