@@ -71,6 +71,13 @@ def test_where_no_set_is_kept_the_base_model_decides():
     assert word(row("a", gap=DENIED), base_p=1e-4)[0] == "unexplained"
 
 
+def test_a_set_without_a_size_in_the_graded_model_is_the_base_model_whose_grade_decides():
+    absent = row("a", gap=CONFIRMED, is_absent=True)
+    assert word(absent, grade="adequate") == ("none", ())
+    assert word(absent, grade="effect_missing") == ("unexplained", ())
+    assert word(row("a", is_absent=True), grade="adequate") == ("none", ())
+
+
 def test_of_one_family_the_best_member_is_kept():
     member = replace(row("a_member", behind=2.0, gap=CONFIRMED), family=("a",))
     assert word(row("a", gap=CONFIRMED), member) == ("named", (("a",),))

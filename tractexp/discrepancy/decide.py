@@ -14,8 +14,8 @@ A set is *kept* by one of two rules.
 Several sets kept are tied. One is *named* where an event confirms it that took no part in choosing
 it, or each of several that was left out in turn, where it has one or two effects, whose sizes are
 known within their bounds, and the model with it is not graded a wrong model; else it is a
-*candidate*. Where none is kept the
-records agree with the base model, or they do not.
+*candidate*. A set that has no size in the model that is graded is the base model, whose grade
+decides. Where none is kept the records agree with the base model, or they do not.
 """
 
 from collections.abc import Sequence
@@ -29,6 +29,7 @@ from tractexp.inference.fitting import Names
 
 NONE, CANDIDATE, NAMED, TIED, UNEXPLAINED = "none", "candidate", "named", "tied", "unexplained"
 WRONG_MODEL = "wrong_model"  # the grade of a model that has no name
+ADEQUATE = "adequate"  # of a model that leaves noise alone
 # effects together: of some 3,000 data sets that were judged, three were named four times, and never
 # the right ones
 MOST_NAMED = 2
@@ -93,7 +94,7 @@ def decide(evidence: Evidence, criteria: Criteria) -> Verdict:
         word = NAMED if is_sound(kept[0]) and is_confirmed(kept[0], evidence) else CANDIDATE
     else:
         agrees = least_p >= criteria.adequate_p and find_adequate(evidence, criteria)
-        word = NONE if agrees else UNEXPLAINED
+        word = NONE if agrees or evidence.base.grade == ADEQUATE else UNEXPLAINED
     return Verdict(word, tuple(kept), word != UNEXPLAINED and not evidence.is_predicted)
 
 
@@ -131,9 +132,9 @@ def find_explaining(evidence: Evidence, criteria: Criteria) -> list[SetEvidence]
 
 
 def holds(row: SetEvidence, criteria: Criteria) -> bool:
-    """Whether the held-out events, and all events together, leave a set standing."""
-    if row.gap is None:
-        return True
+    """Whether the held-out events, all events together, and the grade leave a set standing."""
+    if row.gap is None or row.is_absent:
+        return not row.is_absent
     stands = row.p_of_all >= criteria.adequate_p and not criteria.rejects(row.behind_of_all)
     return stands and DENIED not in {gap.outcome for gap in row.gaps}
 

@@ -99,6 +99,7 @@ class SetEvidence:
     is_fitted_to_all: bool = False  # whether `final` is the fit to all events
     prediction: PredictedError | None = None
     grade: str = ""  # of the model with it, where one set alone is kept
+    is_absent: bool = False  # whether all its sizes are at their null in the model that is graded
     # of its sizes: on a bound, or not known within their bounds, in words
     open_sizes: tuple[str, ...] = ()
     # the share of what it takes away of events with all fitted that it takes away with each left

@@ -437,6 +437,8 @@ def _explain_denial(word: str, seemed: str, best: SetEvidence, context: Context)
 
 def _describe_objection(best: SetEvidence, context: Context) -> str:
     """Why the best set is not kept, by what the held-out events say."""
+    if best.is_absent:
+        return "fitted to all of them it has no size"
     assert best.gap is not None
     if best.gap.outcome == DENIED:
         return "there it fits no better than the base model"

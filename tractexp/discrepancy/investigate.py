@@ -68,6 +68,7 @@ from tractexp.record import Event
 from tractexp.text.wording import join_words
 
 HELD = "held"  # the verdict on a parameter that the extended model does not search
+LEAST_SIZE = 1e-3  # of its range: an effect whose sizes are nearer to their null is not there
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,6 +224,19 @@ class Findings:
             if unknown.issuperset(sizes):
                 told.append(f"of {join_words(sizes)} the events know no more than the bounds")
         return tuple(told)
+
+    @property
+    def is_absent(self) -> bool:
+        """Whether all sizes of what was added are at their null in the graded model: then that is
+        the base model.
+        """
+        graded = self.final_grade
+        values = dict(zip(graded.problem.space.names, graded.values.tolist(), strict=True))
+        sizes = self.catalogue.sizes(self.names)
+        return all(
+            p.name in values and abs(values[p.name] - p.absent) < LEAST_SIZE * np.ptp(p.bounds)
+            for p in sizes
+        )
 
     @property
     def window(self) -> float | str | None:
@@ -523,10 +537,29 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grade
     is_open = evidence.is_mild or shows_more(evidence, criteria)
     if verdict.word == UNEXPLAINED and validate and not is_open:
         evidence = predict_held_out(explained, validate, seed)
-        verdict = decide(evidence, criteria)
-    tests = evidence.base.tests
+    findings = _conclude(explained, by_likelihood, evidence, validate, grader)
+    if len(findings.verdict.kept) != 1:
+        return findings
+    if evidence.is_predicted or not findings.is_absent:
+        return _complete_row(findings, validate)
+    chosen, without = findings.verdict.kept[0], grader.grade((), findings.window)
+    rows = [replace(row, is_absent=row is chosen) for row in evidence.rows]
+    base_row = replace(evidence.base, grade=str(without.adequacy.grade))
+    evidence = replace(evidence, base=base_row, rows=tuple(rows))
+    return _conclude(explained, by_likelihood, evidence, validate, grader)
+
+
+def _conclude(
+    explained: Explanations,
+    by_likelihood: Evidence,
+    evidence: Evidence,
+    validate: Sequence[Event],
+    grader: Grader,
+) -> Findings:
+    """The findings of a table of evidence."""
+    tests, verdict = evidence.base.tests, decide(evidence, explained.last.criteria)
     assert tests is not None
-    findings = Findings(
+    return Findings(
         base=explained.base,
         places=() if verdict.word == NONE else tuple(places(tests)),
         explanations=explained,
@@ -539,7 +572,6 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grade
         grader=grader,
         tie_breaker=choose_next_event(verdict, evidence, explained.base.context),
     )
-    return _complete_row(findings, validate) if len(verdict.kept) == 1 else findings
 
 
 def _complete_row(findings: Findings, validate: Sequence[Event]) -> Findings:
