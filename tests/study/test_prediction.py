@@ -121,6 +121,13 @@ def test_what_all_share_is_named_though_pairs_are_ahead_of_it():
     ) == [("a",)]
 
 
+@pytest.mark.parametrize(("error", "names"), [(0.5, []), (0.44, [("a",)])])
+def test_what_three_effects_divide_together_bears_out_no_member(error, names):
+    """A compensator, told as a recovery because that and two more divided the error of 96 %."""
+    three = off("a", "b", "c", error=0.4)
+    assert named(off(error=1.0), off("a", error=0.6), off("a", "b", error=error), three) == names
+
+
 def test_of_sets_that_share_nothing_the_smallest_are_tied():
     """Of the pairs with `a` neither is told beside `a` itself, which does as well as they do."""
     others = off("b", error=0.9), off("c", error=0.9), off("b", "c", error=0.41)

@@ -10,7 +10,6 @@ import numpy as np
 from tractexp.discrepancy.decide import (
     CANDIDATE,
     CONFIRMED_SHARE,
-    MOST_NAMED,
     NAMED,
     NONE,
     TIED,
@@ -26,6 +25,7 @@ from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.ranking import (
+    MOST_NAMED,
     compute_factor,
     find_leading,
     find_nearest,

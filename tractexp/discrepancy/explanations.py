@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from tractexp.discrepancy.decide import MOST_NAMED
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examine_fit
 from tractexp.discrepancy.families import against_members
+from tractexp.discrepancy.ranking import MOST_NAMED
 from tractexp.discrepancy.window_search import behind_window
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.context import Context

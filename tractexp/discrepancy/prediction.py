@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.discrepancy.classes import LEAST_PARTING
-from tractexp.discrepancy.decide import MOST_NAMED, find_predicting
+from tractexp.discrepancy.decide import find_predicting
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.explanations import (
@@ -27,7 +27,7 @@ from tractexp.discrepancy.explanations import (
 from tractexp.discrepancy.families import member_fits
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.proposal.best_term import best_terms
-from tractexp.discrepancy.ranking import find_nearest, rank_sets
+from tractexp.discrepancy.ranking import MOST_NAMED, find_nearest, rank_sets
 from tractexp.inference.base_fit import minima_of
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
