@@ -1,4 +1,4 @@
-"""Records that begin before a load is steady, or end before the voltage is back."""
+"""Records that begin before a load is steady, end before the voltage is back, or have no rest."""
 
 import functools
 
@@ -110,3 +110,21 @@ def test_a_dip_before_which_the_load_has_come_to_rest_is_one_of_its_own(tmp_path
     first, second = tractexp.read(written(tmp_path, 1.0))
     assert first.record.t[-1] < BEGIN
     np.testing.assert_allclose(second.Q0, 0.6, rtol=0.03)
+
+
+def test_a_held_out_dip_without_steady_state_makes_a_wrong_model_and_no_refusal():
+    """At a voltage of 0.88 a torque of 0.9 behind X' = 0.45 has none."""
+    fitted, lower = record(3.0), record(3.0)
+    lower["U"] = 0.88 * lower["U"]
+    found = tractexp.identify(
+        tractexp.read(**fitted, name="fitted"),
+        "third_order_exponential",
+        validate=tractexp.read(**lower, name="lower"),
+        fixed={"C": 0.9, "X_prime": 0.45, "T_m": 0.9, "M": 0.006, "p_v": 1.2},
+        optimizer="multistart_least_squares",
+        check_intervals=False,
+        progress=False,
+    )
+    assert found.grade == "wrong_model"
+    assert "lower cannot be simulated (no steady state exists before the event" in found.headline
+    assert [event["name"] for event in found.result.events] == ["fitted"]

@@ -191,6 +191,18 @@ def grade_playable(
     estimation = (
         estimate_without_search(problem) if searched is None else estimate(problem, searched)
     )
+    return grade_playable_estimate(problem, estimation, validate, shown)
+
+
+def grade_playable_estimate(
+    problem: Problem,
+    estimation: EstimationResult,
+    validate: Sequence[Event] = (),
+    shown: Collection[str] = (),
+) -> GradedModel:
+    """As `grade_estimate`; but a held-out event without a steady state makes a wrong model and no
+    refusal.
+    """
     shared = problem.full(estimation.uncertainty.values)[0]
     refusals = {
         event.record.name: explain_refusal(problem.model, shared, event) for event in validate

@@ -119,7 +119,11 @@ def find_free_optimum(
         return None
     values = likelihood.values(ended.best)
     away = _find_outside(dict(zip(free.space.names, values.tolist(), strict=True)), held)
-    return _compare(play(free, values, validate), fits, len(free.events), away) if away else None
+    try:
+        played = play(free, values, validate)
+    except UserError:  # beside these values some event has no steady state
+        return None
+    return _compare(played, fits, len(free.events), away) if away else None
 
 
 def say_ranges(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) -> Uncertainty:

@@ -59,10 +59,12 @@ def _play_beside(
     """Rival structures and the best linear network by name, with what each calculates of all
     events; without those that cannot be simulated on one.
     """
+    names = {fit.event.record.name for fit in fits}
+    played = [event for event in validate if event.record.name in names]
     beside = []
     for rival in uncertainty.rivals[:MOST_RIVALS]:
         with suppress(UserError):
-            beside.append((f"with {rival.name}", play(rival.problem, rival.free, validate)))
+            beside.append((f"with {rival.name}", play(rival.problem, rival.free, played)))
     with suppress(UserError):
         beside.append(("best linear network", play_network(fits)[1]))
     return beside
