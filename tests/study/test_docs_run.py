@@ -16,7 +16,6 @@ from tractexp import PUBLIC
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.long  # .ci/run investigates a shipped load, and process/test_tutorial.py has the rest
 def test_the_tutorial_prints_what_it_quotes_and_names_what_is_missing(tmp_path):
     """Of the investigation three effects of the catalogue; .ci/run has one of all of them."""
     only = ["task.effects=[stator_transients,stator_resistance,dc_link_lag]"]
