@@ -547,7 +547,6 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
         MODEL_FILE,
         PLUGIN,
         adopt_term,
-        investigate_with,
         use_of,
     )
 
@@ -563,7 +562,7 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
         else:
             lines.append(f"use the extended model{which}: {use}")
         if grade != Grade.ADEQUATE and not better:
-            again = investigate_with(domain, model, fit_all=fit_all)
+            again = use_of(domain, model, fit_all=fit_all, task=["task=discrepancy"])
             lines.append(f"investigate it as the base model: {again}")
     if grade != Grade.ADEQUATE and better:
         in_waves = build_again_command("task=discrepancy", "domain=waves", of=("data", "task"))

@@ -2,7 +2,7 @@
 model for Hydra.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from tractexp.discrepancy.decide import CANDIDATE, NAMED, TIED, UNEXPLAINED, sho
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.explain import find_status
 from tractexp.discrepancy.forms import by_name, forms
-from tractexp.discrepancy.gap import SPREAD, Curves, GapTest, measure_closed_share
+from tractexp.discrepancy.gap import SPREAD, Curves
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import estimates
@@ -24,8 +24,7 @@ from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
 from tractexp.domain import DOMAINS
 from tractexp.errors import DATA
 from tractexp.identification.adequacy import Grade
-from tractexp.identification.grade import Misfit
-from tractexp.inference.model_error import ModelError, in_percent
+from tractexp.inference.model_error import Change, Misfit, ModelError, in_percent
 from tractexp.storage import files
 from tractexp.text import quoting
 from tractexp.text.wording import join_words
@@ -69,7 +68,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "extended": MODEL_FILE.as_posix() if investigation.names else None,
         "noise": investigation.context.describe(investigation.last.noise),
         "phasor_window": None if window is None else window.window,
-        "recorder_window": recorder_window(investigation),
+        "recorder_window": investigation.window,
         "false_alarm_rate": investigation.context.criteria.false_alarms,
         "parameters": parameters(investigation),
         "simulations": investigation.context.effort.simulations,
@@ -166,43 +165,27 @@ def gaps(investigation: Findings) -> dict[str, Any]:
     )
     ranked = {"train": investigation.train, "validate": investigation.validate}
     rows: dict[str, Any] = {
-        role: was and now and _graded_gap(was, now, ranked[role])
+        role: was and now and _gap(Change(was, now), ranked[role])
         for role, was, now in zip(ranked, before, after, strict=True)
     }
     return {**rows, "fitted_to_both": investigation.fitted_to_both}
 
 
-def _graded_gap(before: Misfit, after: Misfit, ranked: GapTest | None) -> dict[str, Any]:
-    """The gap between two graded models, with the deviance of the ranked fits beside it."""
-    was, now = (
-        (None, None)
-        if ranked is None
-        else (ranked.before.chi2_per_sample, ranked.after.chi2_per_sample)
-    )
-    closed = measure_closed_share(before.error, after.error)
+def _gap(change: Change[Any], ranked: Change[Curves] | None) -> dict[str, Any]:
+    """What two models leave, with the deviance of the ranked fits beside it."""
     return {
-        "before": _misfit(before, was),
-        "after": _misfit(after, now),
-        "closed": files.plain(closed),
+        "before": _misfit(change.before, ranked and ranked.before),
+        "after": _misfit(change.after, ranked and ranked.after),
+        "closed": files.plain(change.closed_share),
     }
 
 
-def _misfit(misfit: Misfit, chi2: float | None) -> dict[str, Any]:
-    """The errors of a graded model."""
+def _misfit(misfit: Misfit, ranked: Curves | None) -> dict[str, Any]:
+    """The errors of a model."""
     own = {} if misfit.epsilon_i is None else {"epsilon_i": misfit.epsilon_i}
     errors = {"epsilon_p": misfit.epsilon_p, "epsilon_q": misfit.epsilon_q}
-    return files.plain(
-        {"model_error": _error(misfit.error)} | errors | own | {"chi2_per_sample": chi2}
-    )
-
-
-def _gap(before: Curves, after: Curves) -> dict[str, Any]:
-    """The gap between two curves."""
-    return {
-        "before": _curves(before),
-        "after": _curves(after),
-        "closed": files.plain(measure_closed_share(before.error, after.error)),
-    }
+    chi2 = {"chi2_per_sample": ranked and ranked.chi2_per_sample}
+    return files.plain({"model_error": _error(misfit.error)} | errors | own | chi2)
 
 
 def _nearest(investigation: Findings) -> dict[str, Any] | None:
@@ -216,10 +199,10 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
     by_name = {
         e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)
     }
-    on = {"train": near.curves, "validate": near.carried}
+    on = {"train": near.fitted, "validate": near.held_out}
     return {
         "effects": list(near.names),
-        "gap": {role: both and _gap(*both) for role, both in on.items()},
+        "gap": {role: both and _gap(both, both) for role, both in on.items()},
         "others": [
             {"effects": list(names), "closed": files.plain(share)} for names, share in near.others
         ],
@@ -239,16 +222,11 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     near = investigation.nearest
     tests = investigation.tests
     shapes = list(map(asdict, investigation.remainder))
-    nearest = near and (near.carried or near.curves)[1].error
-    before, after = (
-        investigation.select_misfit(one)
-        for one in (investigation.base_grade, investigation.final_grade)
-    )
+    change = investigation.graded_change
+    last = change if near is None else near.held_out or near.fitted
     return {
-        "model_error": _error(nearest or after.error),
-        "share": files.plain(1 - measure_closed_share(before.error, after.error))
-        if investigation.names
-        else None,
+        "model_error": _error(last.after.error),
+        "share": files.plain(1 - change.closed_share) if investigation.names else None,
         "p": tests.p_left,
         "where": tests.loudest,
         "sentence": investigation.headline,
@@ -281,7 +259,7 @@ def write_left(investigation: Findings, path: Path) -> Path:
     """
     drive = investigation.context.drive
     nearest = investigation.nearest
-    near = (investigation.train.after if nearest is None else nearest.curves[1]).calculated
+    near = (investigation.train.after if nearest is None else nearest.fitted.after).calculated
     lines = [",".join(["event", "t", *drive.names])]
     for e, event in enumerate(investigation.context.events):
         left = drive.measurements[:, drive.part(e)] - near[:, drive.part(e)]
@@ -297,18 +275,6 @@ def write_plugin(investigation: Findings, path: Path) -> Path:
     proposal = investigation.proposed.proposal
     assert proposal is not None
     return files.write(path, proposal.source)
-
-
-def _curves(curves: Curves) -> dict[str, Any]:
-    """The errors of calculated curves."""
-    own = {} if curves.epsilon_i is None else {"epsilon_i": curves.epsilon_i}
-    errors = {"epsilon_p": curves.epsilon_p, "epsilon_q": curves.epsilon_q}
-    return (
-        {"model_error": _error(curves.error)}
-        | errors
-        | own
-        | {"chi2_per_sample": curves.chi2_per_sample}
-    )
 
 
 def sets(investigation: Findings) -> list[dict[str, Any]]:
@@ -378,22 +344,13 @@ def _singles(investigation: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def use_of(domain: str, model: Path | str, *, fit_all: bool) -> str:
+def use_of(domain: str, model: Path | str, *, fit_all: bool, task: Collection[str] = ()) -> str:
     """The command that fits the model of a file to the records of this run; with `fit_all` to the
-    dips that it holds out, too.
+    dips that it holds out, too. With a `task` it does that instead, by the settings of this run.
     """
-    settings = [*DOMAINS[domain].setting.split(), f"model={model}"]
+    settings = [*task, *DOMAINS[domain].setting.split(), f"model={model}"]
     settings += list_settings_of_all() if fit_all else []
-    return build_again_command(*settings, of=("data",))
-
-
-def investigate_with(domain: str, model: Path | str, *, fit_all: bool) -> str:
-    """The command that investigates the model of a file as the base model, by the records and
-    settings of this run; with `fit_all` as `use_of`.
-    """
-    settings = ["task=discrepancy", *DOMAINS[domain].setting.split(), f"model={model}"]
-    settings += list_settings_of_all() if fit_all else []
-    return build_again_command(*settings, of=("data", "task"))
+    return build_again_command(*settings, of=("data", "task") if task else ("data",))
 
 
 def adopt_term(plugin: Path) -> str:
@@ -412,7 +369,7 @@ def write_model(
     """
     effects = sorted({*node.get("effects", ()), *investigation.names})
     held = investigation.undetermined_values
-    window = recorder_window(investigation)
+    window = investigation.window
     extended: dict[str, Any] = {
         "defaults": [
             {"motor": node["motor"]["name"]},
@@ -471,8 +428,3 @@ def _explain_model(
             " out what yours can tell."
         )
     return lines
-
-
-def recorder_window(investigation: Findings) -> float | str | None:
-    """The recorder's window that was taken into account, as `model.window` names it."""
-    return investigation.window

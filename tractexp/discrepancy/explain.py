@@ -20,7 +20,7 @@ from tractexp.discrepancy.decide import (
     is_confirmed,
 )
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
-from tractexp.discrepancy.gap import DENIED, MILD, SHOWN, Curves, curves, measure_closed_share
+from tractexp.discrepancy.gap import DENIED, MILD, SHOWN, Curves, curves
 from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.proposal.library import term
@@ -35,7 +35,7 @@ from tractexp.discrepancy.ranking import (
 from tractexp.inference.chance import by_draws
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
-from tractexp.inference.model_error import describe_stall, in_percent
+from tractexp.inference.model_error import Change, describe_stall, in_percent
 from tractexp.inference.recorder_window import RecorderWindow
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -53,8 +53,8 @@ class Nearest:
     row: SetEvidence
     # the next ones, and what share of the gap they close on fitted events
     others: list[tuple[tuple[str, ...], float]]
-    curves: tuple[Curves, Curves]  # of the base model and with these, on the fitted events
-    carried: tuple[Curves, Curves] | None  # on the held-out ones
+    fitted: Change[Curves]  # of the base model and with these, on the fitted events
+    held_out: Change[Curves] | None  # on the held-out ones, if any
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,12 +66,8 @@ class Nearest:
         """The share of the gap that is closed on the fitted and on the held-out events, nan without
         any.
         """
-        before, after = self.curves
-        fitted = measure_closed_share(before.error, after.error)
-        if self.carried is None:
-            return fitted, np.nan
-        before, after = self.carried
-        return fitted, measure_closed_share(before.error, after.error)
+        there = self.held_out
+        return self.fitted.closed_share, np.nan if there is None else there.closed_share
 
 
 def find_nearest_sets(
@@ -84,28 +80,28 @@ def find_nearest_sets(
     assert evidence.base.tests is not None
     context = evidence.base.tests.context
     rows = evidence.rows[:MOST_NEAR]
-    is_base = evidence.there is not None and not find_nearest(evidence, context.criteria).fit.names
+    is_base = evidence.is_predicted and not find_nearest(evidence, context.criteria).fit.names
     if verdict.word != UNEXPLAINED or not rows or not rows[0].fit.names or is_base:
         return None
     fits = [evidence.base.fit, *(row.fit for row in rows)]
     before, *after = (curves(context, fit.unit, evidence.last.noise, fit.names) for fit in fits)
     there = _carry_curves(context, validate, fits[:2]) if validate else None
     others = [
-        (row.fit.names, measure_closed_share(before.error, one.error))
+        (row.fit.names, Change(before, one).closed_share)
         for row, one in zip(rows[1:], after[1:], strict=True)
     ]
-    return Nearest(rows[0], others, (before, after[0]), there)
+    return Nearest(rows[0], others, Change(before, after[0]), there)
 
 
 def _carry_curves(
     context: Context, validate: Sequence[Event], fits: Sequence[Refit]
-) -> tuple[Curves, Curves] | None:
+) -> Change[Curves] | None:
     """What two fits leave of held-out events, the base model's first; None where one has no steady
     state there.
     """
     other, units, noise = carry_fits(context, validate, fits)
     pair = curves(other, units[0], noise), curves(other, units[1], noise, fits[1].names)
-    return pair if np.isfinite([one.deviance for one in pair]).all() else None
+    return Change(*pair) if np.isfinite([one.deviance for one in pair]).all() else None
 
 
 def choose_next_event(verdict: Verdict, evidence: Evidence, context: Context) -> NextEvent | None:
@@ -184,10 +180,10 @@ def _explain_word(
 ) -> str:
     """Why the verdict is what it is, in a sentence."""
     sets = verdict.sets
-    if evidence.there is not None and sets:
+    if evidence.is_predicted:
+        if not sets:
+            return explain_distance(evidence, context)
         return describe_prediction(verdict, evidence, context)
-    if evidence.there is not None:
-        return explain_distance(evidence, context)
     if verdict.word in (NAMED, CANDIDATE):
         return _describe_name(sets[0], evidence, context)
     if verdict.word == TIED:
@@ -329,10 +325,7 @@ def _describe_shared(chosen: SetEvidence, evidence: Evidence, context: Context) 
     """
     if compute_factor(chosen, evidence.base) > context.criteria.divides:
         return ""
-    best = min(
-        (row for row in evidence.every if row.prediction is not None),
-        key=lambda row: row.held_out_prediction.excess,
-    )
+    best = min(evidence.every, key=lambda row: row.held_out_prediction.excess)
     labels = join_words(label_effects(best.names, context))
     return f"; {labels} miss {_size(best)}, the least, and all sets that come near have it"
 
@@ -455,7 +448,7 @@ def _describe_objection(best: SetEvidence, context: Context) -> str:
 
 def find_status(row: SetEvidence, verdict: Verdict, evidence: Evidence, context: Context) -> str:
     """What became of a set that was compared, in two words."""
-    is_outdone = evidence.there is not None and row not in verdict.kept
+    is_outdone = evidence.is_predicted and row not in verdict.kept
     if is_outdone or context.criteria.rejects(row.behind):
         return "rejected"
     return "adequate" if row.p_left >= context.criteria.adequate_p else "not adequate"

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.domain.playback import relative_error
 from tractexp.inference.context import Context
 from tractexp.inference.differences import two_sided
 from tractexp.inference.injection import PUSHES, perturbations
 from tractexp.inference.linearization import find_active_bounds
-from tractexp.inference.model_error import ModelError, model_error
+from tractexp.inference.model_error import Change, Misfit
 from tractexp.noise import Noise
 from tractexp.noise.span import compute_basis
 
@@ -24,35 +23,24 @@ LEAST_DISTINCT_PUSH = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class Curves:
+class Curves(Misfit):
     """What a model calculates of all events end to end, and what it leaves.
 
     Attributes
     ----------
     calculated : (C, N) [pu]
         P and Q, or currents.
-    epsilon_p, epsilon_q : float
-        Relative errors of Eq. (20), as fractions; of waveforms those of P and Q that the record's
-        estimator sees in calculated and in recorded currents.
     deviance, chi2_per_sample : float
         The sum of squares of whitened residuals, and that per sample.
-    error : ModelError
-        The model's error.
-    epsilon_i : float or None
-        That of the currents, over several events the rms of theirs.
     """
 
     calculated: np.ndarray
-    epsilon_p: float
-    epsilon_q: float
     deviance: float
     chi2_per_sample: float
-    error: ModelError
-    epsilon_i: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class GapTest:
+class GapTest(Change[Curves]):
     """The model's error before and after, and whether some events bear the extension out.
 
     Attributes
@@ -70,7 +58,7 @@ class GapTest:
     shown : float
         The gain from which the events show the extension.
     noise : Noise
-        Of the events.
+        Of the events, by which both are judged.
     context : Context or None
         The events and models.
     units : two (D,) arrays
@@ -79,21 +67,14 @@ class GapTest:
         What of `expected` is of each event.
     """
 
-    before: Curves
-    after: Curves
     gain: float
     left: float
     expected: float
-    shown: float  # the criterion
-    noise: Noise  # by which both are judged
+    shown: float
+    noise: Noise
     context: Context | None = None
     units: tuple[np.ndarray, ...] = ()
     by_event: tuple[float, ...] = ()
-
-    @property
-    def closed_share(self) -> float:
-        """The share of the squared model error that is gone."""
-        return measure_closed_share(self.before.error, self.after.error)
 
     @property
     def explained_share(self) -> float:
@@ -128,36 +109,19 @@ def share_gone(factor: float) -> float:
     return 1 - 1 / factor**2
 
 
-def measure_closed_share(before: ModelError, after: ModelError) -> float:
-    """The share of the squared model error that is gone; above 1 where less is left than noise
-    leaves in the mean, below 0 where more is left than before. nan where that falls short of the
-    noise by more than there was before, which was within the error of the noise's level then.
-    """
-    square, rest = before.square, after.square
-    return 1 - rest / square if 0 < square < np.inf and rest >= -square else np.nan
-
-
 def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] = ()) -> Curves:
     """What a fit with the named effects leaves; beyond all measure where it has no steady state."""
     residual = context.residuals(unit[None], names)
     white = context.whiten(noise, residual)[0]
-    measured = context.drive.measurements
-    calculated = residual[0] + measured
+    calculated = residual[0] + context.drive.measurements
     deviance = float(np.nan_to_num(white @ white, nan=np.inf))
     each = [
         context.domain.comparison(event, calculated[:, context.drive.part(e)])
         for e, event in enumerate(context.events)
     ]
-    measured = np.concatenate(
-        [np.stack([one.event.record.P, one.event.record.Q]) for one in each], axis=1
-    )
-    power = np.concatenate([np.stack([one.P, one.Q]) for one in each], axis=1)
-    P, Q = (relative_error(measured[c], power[c]) for c in (0, 1))
-    currents = [one.epsilon_i**2 for one in each if one.epsilon_i is not None]
-    i = float(np.sqrt(np.mean(currents))) if currents else None
-    return Curves(
-        calculated, P, Q, deviance, deviance / max(context.samples, 1), model_error(each), i
-    )
+    misfit = Misfit.from_played(each)
+    chi2 = deviance / max(context.samples, 1)
+    return Curves(**vars(misfit), calculated=calculated, deviance=deviance, chi2_per_sample=chi2)
 
 
 def gap(

@@ -28,7 +28,7 @@ from tractexp.discrepancy.explain import (
     measure_least_error,
 )
 from tractexp.discrepancy.explanations import Explanations, explanations
-from tractexp.discrepancy.gap import GapTest, gap, measure_closed_share, share_gone
+from tractexp.discrepancy.gap import GapTest, gap, share_gone
 from tractexp.discrepancy.grades import Grader
 from tractexp.discrepancy.held_out import judge_held_out
 from tractexp.discrepancy.next_event.choose import NextEvent
@@ -49,7 +49,7 @@ from tractexp.discrepancy.replication import replicate
 from tractexp.discrepancy.rival_sets import compare_rivals
 from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.domain import domain_of
-from tractexp.identification.grade import GradedModel, Misfit
+from tractexp.identification.grade import GradedModel
 from tractexp.identification.result import at_bound
 from tractexp.identification.verdict import UNIDENTIFIED, size
 from tractexp.inference.base_fit import BaseFit, base_fit
@@ -59,6 +59,7 @@ from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
+from tractexp.inference.model_error import Change, Misfit
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records, check_events
@@ -284,7 +285,7 @@ class Findings:
         split = len(self.grader.train)
         fitted = graded.fits[:split]
         held_out = graded.fits[split:]
-        return Misfit.from_fits(fitted), Misfit.from_fits(held_out) if held_out else None
+        return Misfit.from_played(fitted), Misfit.from_played(held_out) if held_out else None
 
     def select_misfit(self, graded: GradedModel) -> Misfit:
         """How far off a graded model is on the held-out events; on the fitted ones where there
@@ -292,6 +293,13 @@ class Findings:
         """
         fitted, held_out = self.misfits(graded)
         return held_out or fitted
+
+    @property
+    def graded_change(self) -> Change[Misfit]:
+        """What the graded models leave of the held-out events; of the fitted ones where there are
+        none.
+        """
+        return Change(self.select_misfit(self.base_grade), self.select_misfit(self.final_grade))
 
     @functools.cached_property
     def final_estimates(self) -> list[ParameterEstimate]:
@@ -406,10 +414,7 @@ class Findings:
         """
         if len(self.verdict.kept) != 1:
             return False
-        before, after = (
-            self.select_misfit(one).error for one in (self.base_grade, self.final_grade)
-        )
-        return measure_closed_share(before, after) >= share_gone(self.context.criteria.ahead)
+        return self.graded_change.closed_share >= share_gone(self.context.criteria.ahead)
 
 
 def is_end_of_range(parameter: Parameter, value: float) -> bool:
@@ -536,7 +541,7 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grade
     verdict = decide(evidence, criteria)
     is_open = evidence.is_mild or shows_more(evidence, criteria)
     if verdict.word == UNEXPLAINED and validate and not is_open:
-        evidence = predict_held_out(explained, validate, seed)
+        evidence = predict_held_out(explained, validate, seed) or by_likelihood
     findings = _conclude(explained, by_likelihood, evidence, validate, grader)
     if len(findings.verdict.kept) != 1:
         return findings

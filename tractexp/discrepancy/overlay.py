@@ -67,7 +67,7 @@ def on_fitted(
 ) -> list[Overlay]:
     """The fitted events; `extended` tells whether there is an extended model."""
     after = gap.after.calculated if extended else None
-    near = None if nearest is None else nearest.curves[1].calculated
+    near = None if nearest is None else nearest.fitted.after.calculated
     return _each(context, gap.noise, (gap.before.calculated, after, near), places, held_out=False)
 
 

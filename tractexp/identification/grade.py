@@ -22,11 +22,10 @@ from tractexp.identification.result import (
     explain_refusal,
     model_errors,
     play,
-    relative_errors,
 )
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.inference.interval import ParameterEstimate
-from tractexp.inference.model_error import ModelError, model_error
+from tractexp.inference.model_error import ModelError
 from tractexp.inference.problem import Problem
 from tractexp.record import Event
 from tractexp.text.wording import join_words
@@ -116,33 +115,6 @@ class GradedModel:
         it.
         """
         return forecast_next_dip(self)
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """How far a model is off some events.
-
-    Attributes
-    ----------
-    error : ModelError
-        Its error as a share of the response.
-    epsilon_p, epsilon_q : float
-        The relative errors of Eq. (20), as fractions.
-    epsilon_i : float or None
-        That of the currents, over several events the rms of theirs; None of phasors.
-    """
-
-    error: ModelError
-    epsilon_p: float
-    epsilon_q: float
-    epsilon_i: float | None
-
-    @classmethod
-    def from_fits(cls, fits: Sequence[Fit]) -> "Misfit":
-        """The misfit of some events together."""
-        currents = [fit.epsilon_i**2 for fit in fits if fit.epsilon_i is not None]
-        of_currents = float(np.sqrt(np.mean(currents))) if currents else None
-        return cls(model_error(fits), *relative_errors(fits), of_currents)
 
 
 def grade_model(

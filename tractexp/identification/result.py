@@ -16,14 +16,13 @@ import numpy as np
 from tractexp.cache import provenance
 from tractexp.configuration.plugin import build
 from tractexp.domain import DOMAINS, Playback, domain_of
-from tractexp.domain.playback import relative_error
 from tractexp.errors import MODEL, UserError
 from tractexp.identification import stored
 from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.forecast import Forecast
 from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.identification.verdict import BOUND_DISTANCE
-from tractexp.inference.model_error import in_percent, model_error
+from tractexp.inference.model_error import in_percent, model_error, relative_errors
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
@@ -523,15 +522,6 @@ def play(problem: Problem, free: np.ndarray, validate: Sequence[Event] = ()) -> 
     ]
     shared = problem.full(free)[0]
     return fits + [respond(problem.model, shared, event, VALIDATE) for event in validate]
-
-
-def relative_errors(fits: Sequence[Fit]) -> tuple[float, float]:
-    """epsilon_p and epsilon_q of Eq. (20) over some events together, as fractions."""
-    measured = {c: np.concatenate([getattr(fit.event.record, c) for fit in fits]) for c in "PQ"}
-    calculated = {c: np.concatenate([getattr(fit, c) for fit in fits]) for c in "PQ"}
-    return relative_error(measured["P"], calculated["P"]), relative_error(
-        measured["Q"], calculated["Q"]
-    )
 
 
 def describe_search(problem: Problem, end: SearchResult) -> dict[str, Any]:

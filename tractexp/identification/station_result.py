@@ -16,11 +16,10 @@ from tractexp.identification.result import (
     active_bounds,
     at_bound,
     model_errors,
-    relative_errors,
 )
 from tractexp.identification.station import LoadSpec, SharedFit
 from tractexp.identification.station_constants import Constants
-from tractexp.inference.model_error import model_error
+from tractexp.inference.model_error import model_error, relative_errors
 from tractexp.record import OwnBase
 from tractexp.record.identity import Identity
 

@@ -11,11 +11,12 @@ A test of significance says whether something is left; this says how much it mat
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from tractexp.domain import Playback
+from tractexp.domain.playback import relative_error
 from tractexp.inference.blocks import LENGTH, reach
 from tractexp.noise.random_walk import WANDERING_COSINES, without_drift, without_slow
 from tractexp.record import Event
@@ -77,6 +78,62 @@ class ModelError:
     def __str__(self) -> str:
         """ "3.1 % of its response (0.9 % of S)"."""
         return f"{in_percent(self.value)} of its response ({in_percent(self.of_S)} of S)"
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How far a model is off some events.
+
+    Attributes
+    ----------
+    error : ModelError
+        Its error as a share of the response.
+    epsilon_p, epsilon_q : float
+        The relative errors of Eq. (20), as fractions.
+    epsilon_i : float or None
+        That of the currents, over several events the rms of theirs; None of phasors.
+    """
+
+    error: ModelError
+    epsilon_p: float
+    epsilon_q: float
+    epsilon_i: float | None
+
+    @classmethod
+    def from_played(cls, played: Sequence[Playback]) -> "Misfit":
+        """The misfit of some events together."""
+        currents = [one.epsilon_i**2 for one in played if one.epsilon_i is not None]
+        of_currents = float(np.sqrt(np.mean(currents))) if currents else None
+        return cls(model_error(played), *relative_errors(played), of_currents)
+
+
+M = TypeVar("M", bound=Misfit)
+
+
+@dataclass(frozen=True, eq=False)
+class Change(Generic[M]):
+    """What two models leave of the same events."""
+
+    before: M
+    after: M
+
+    @property
+    def closed_share(self) -> float:
+        """The share of the squared model error that is gone; above 1 where less is left than noise
+        leaves in the mean, below 0 where more is left than before. nan where that falls short of
+        the noise by more than there was before, which was within the error of the noise's level
+        then.
+        """
+        square, rest = self.before.error.square, self.after.error.square
+        return 1 - rest / square if 0 < square < np.inf and rest >= -square else np.nan
+
+
+def relative_errors(played: Sequence[Playback]) -> tuple[float, float]:
+    """epsilon_p and epsilon_q of Eq. (20) over some events together, as fractions."""
+    measured = {c: np.concatenate([getattr(one.event.record, c) for one in played]) for c in "PQ"}
+    calculated = {c: np.concatenate([getattr(one, c) for one in played]) for c in "PQ"}
+    epsilon_p, epsilon_q = (relative_error(measured[c], calculated[c]) for c in "PQ")
+    return epsilon_p, epsilon_q
 
 
 def weigh_error(error: float, response: float, variance: float, step: float) -> float:

@@ -222,18 +222,18 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
 
 def _with_nearest(near: Nearest) -> list[list[str]]:
     """The base model's gap and that of the candidates which come nearest."""
-    pairs = (("fitted", near.curves), ("held out", near.carried))
+    pairs = (("fitted", near.fitted), ("held out", near.held_out))
     stages = ("base model", "nearest candidates")
     return [
         [
             label,
             stage,
             _error(c.error.to_dict()),
-            *_off(vars(c), waves=near.curves[0].epsilon_i is not None),
+            *_off(vars(c), waves=near.fitted.before.epsilon_i is not None),
         ]
         for label, both in pairs
         if both
-        for stage, c in zip(stages, both, strict=True)
+        for stage, c in zip(stages, (both.before, both.after), strict=True)
     ]
 
 
