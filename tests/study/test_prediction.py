@@ -20,7 +20,12 @@ from tractexp.discrepancy.explanations import search_effect_sets
 from tractexp.discrepancy.investigate import investigate, is_end_of_range
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.precision import estimates, standard_errors
-from tractexp.discrepancy.prediction import SHARING, search_third, select_grounds
+from tractexp.discrepancy.prediction import (
+    SHARING,
+    predict_held_out,
+    search_third,
+    select_grounds,
+)
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.ranking import beats, find_nearest
 from tractexp.identification.verdict import UNIDENTIFIED
@@ -424,6 +429,24 @@ def test_by_the_size_of_the_error_the_same_family_is_chosen(inexact):
     assert (
         best[0].prediction.error * inexact.context.criteria.divides < evidence.base.prediction.error
     )
+
+
+def test_where_noise_hides_what_the_base_model_misses_no_set_can_divide_it():
+    blocks = np.ones(10)
+    hidden = PredictedError(1.05 * blocks, blocks, 50 * blocks, np.zeros(0))
+    assert hidden.largest_factor == 1.0
+    assert replace(hidden, squares=1.6 * blocks).largest_factor == pytest.approx(6**0.5)
+    assert replace(hidden, squares=np.full(10, np.inf)).largest_factor == np.inf  # it stalls
+
+
+def test_no_set_is_fitted_by_least_squares_where_none_could_be_named(inexact):
+    """The table of the search by likelihood stands then: it tells what the fitted events say."""
+    found = inexact.explanations
+    context = replace(found.base.context, criteria=Criteria(divides=1e6))
+    none = replace(found, base=replace(found.base, context=context))
+    begun = context.effort.simulations
+    assert predict_held_out(none, inexact.withheld, 0) is None
+    assert context.effort.simulations - begun < 20_000
 
 
 def test_at_the_powers_measured_a_fit_to_any_number_of_events_is_as_the_identification_has_it():

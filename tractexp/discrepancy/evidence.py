@@ -53,8 +53,17 @@ class PredictedError:
     @property
     def excess(self) -> float:
         """The squares beyond the noise, no less than can be told of them."""
-        noise = float(self.noise.sum())
-        return max(float(self.squares.sum()) - noise, FINEST * noise, LEAST_SQUARED_ERROR)
+        return max(float(self.squares.sum() - self.noise.sum()), self.least_excess)
+
+    @property
+    def least_excess(self) -> float:
+        """The least that can be told of squares beyond the noise."""
+        return max(FINEST * float(self.noise.sum()), LEAST_SQUARED_ERROR)
+
+    @property
+    def largest_factor(self) -> float:
+        """The most by which any set could divide this error: noise hides what is less."""
+        return (self.excess / self.least_excess) ** 0.5
 
     @property
     def error(self) -> float:
@@ -174,11 +183,7 @@ class Evidence:
         steps, missing = [self.base], set(names)
         while missing:
             wanted = [tuple(sorted((*steps[-1].fit.names, name))) for name in missing]
-            found = [
-                row
-                for row in map(self.row_of, wanted)
-                if row is not None and row.prediction is not None
-            ]
+            found = [row for row in map(self.row_of, wanted) if row is not None]
             if not found:
                 break
             steps.append(min(found, key=lambda row: row.held_out_prediction.excess))

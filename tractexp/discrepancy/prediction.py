@@ -26,7 +26,10 @@ from tractexp.discrepancy.explanations import (
 )
 from tractexp.discrepancy.families import member_fits
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
-from tractexp.discrepancy.proposal.best_term import best_terms
+from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms
+from tractexp.discrepancy.proposal.library import terms
+from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, term_fits
+from tractexp.discrepancy.proposal.screen import Ground, screen
 from tractexp.discrepancy.ranking import MOST_NAMED, find_nearest, rank_sets
 from tractexp.inference.base_fit import minima_of
 from tractexp.inference.catalogue import Catalogue
@@ -45,12 +48,17 @@ CARRIED = 12  # sets of the search by likelihood that are fitted again
 SHARING = 10.0
 
 
-def predict_held_out(explained: Explanations, events: Sequence[Event], seed: int) -> Evidence:
+def predict_held_out(
+    explained: Explanations, events: Sequence[Event], seed: int
+) -> Evidence | None:
     """The table of all sets by what they predict: those kept first, or else the nearest, with their
-    tests, then the others.
+    tests, then the others. None where noise hides so much of the base model's error there that no
+    set could divide it by as much as a name must.
     """
     explained.base.context.effort.say("judging what leaves something on the held-out events")
     table = predict_errors(explained, events)
+    if table is None:
+        return None
     criteria, quiet, noise = explained.last.criteria, explained.base.quiet, table.noise
     assert noise is not None
     leading = find_predicting(table, criteria) or [find_nearest(table, criteria)]
@@ -68,10 +76,10 @@ def predict_held_out(explained: Explanations, events: Sequence[Event], seed: int
     return replace(table, base=base, rows=rows, others=tuple(others), last=first.tests)
 
 
-def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence:
+def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence | None:
     """The table of single effects, of sets of two, of a third beside the best two, and of what the
     search by likelihood ended with, by the model's error on the held-out events. The powers before
-    events are those measured, as in an identification.
+    events are those measured, as in an identification. None as of `predict_held_out`.
     """
     plain = explained.base.context.with_measured_power
     context, noise = plain.held_to_usual, residual_noise(plain, explained.chosen)
@@ -93,7 +101,11 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
         fits = refit(context, noise, missing, faults=()) if missing else []
         return replace(table, rows=(*table.rows, *fill(fits)))
 
-    ground, refits = _search_all_sets(context, explained, noise)
+    bare = _fit_base(context, explained, noise)
+    (alone,) = fill(_fit_without_faults(context, noise, [bare]))
+    if alone.held_out_prediction.largest_factor <= criteria.divides:
+        return None
+    ground, refits = _search_all_sets(context, explained, noise, bare)
     base, *rows = sorted(
         fill(_fit_without_faults(context, noise, refits.values())),
         key=lambda row: bool(row.fit.names),
@@ -123,12 +135,21 @@ def _find_missing_subsets(
 
 
 def _find_best_term(context: Context, table: Evidence) -> SetEvidence:
-    """The term of the library that predicts best beside the base model."""
-    assert table.noise is not None
-    assert table.there is not None
-    of_terms, fits = best_terms(context, table.base.fit, table.noise)
-    beside = of_terms.move_to_records(table.there.records)
-    rows = [SetEvidence(fit, fit.names, fit.names, prediction=predict(beside, fit)) for fit in fits]
+    """The term of the library that predicts best beside the base model, fitted as the sets are
+    whose rival it is.
+    """
+    noise, there = table.noise, table.there
+    assert noise is not None
+    assert there is not None
+    context.effort.say("looking for a term of the library that predicts better")
+    under = context_of_terms(context).with_measured_power.held_to_usual
+    ground = Ground.from_coordinates(
+        under, carried_over(under, context, table.base.fit.unit), noise
+    )
+    found = term_fits(screen(ground, terms(), seed=0, draws=0), [])
+    best = _fit_without_faults(found.context, noise, found.fits[:MOST_JUDGED_TERMS])
+    beside = found.context.move_to_records(there.records)
+    rows = [SetEvidence(fit, fit.names, fit.names, prediction=predict(beside, fit)) for fit in best]
     return min(rows, key=lambda row: (row.held_out_prediction.excess, row.names))
 
 
@@ -165,20 +186,24 @@ def _say(context: Context) -> Callable[[str], None]:
     return lambda line: context.effort.say(f"{line}, by least squares")
 
 
+def _fit_base(context: Context, explained: Explanations, noise: Noise) -> Refit:
+    """The base model by least squares, from all over its box, with the faults of the measurement
+    free.
+    """
+    squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0])
+    squares = replace(squares, prior=context.prior)
+    known = explained.steps[0].fit.unit, *explained.base.local_minima
+    units = [*map(context.coordinates.at_measured_power, known), *minima_of(context, squares)]
+    return refit(context, noise, [((), unit) for unit in units])[0]
+
+
 def _search_all_sets(
-    context: Context, explained: Explanations, noise: Noise
+    context: Context, explained: Explanations, noise: Noise, bare: Refit
 ) -> tuple[Disagreement, dict[Names, Refit]]:
     """The tests of the base model by least squares, and the best fits of it and of sets of effects,
     with the faults of the measurement free.
     """
-    base, at, say = explained.base, context.coordinates, _say(context)
-
-    squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0])
-    squares = replace(squares, prior=context.prior)
-    by_likelihood = map(at.at_measured_power, (explained.steps[0].fit.unit, *base.local_minima))
-    bare = refit(
-        context, noise, [((), unit) for unit in (*by_likelihood, *minima_of(context, squares))]
-    )[0]
+    at, say = context.coordinates, _say(context)
     ground = explained.steps[0].score_fit(context, bare, noise)
     refits: dict[Names, Refit] = {(): bare}
 

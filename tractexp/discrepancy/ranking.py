@@ -54,7 +54,7 @@ def rank_sets(evidence: Evidence, criteria: Criteria) -> list[SetEvidence]:
     """
     families: dict[Names, list[SetEvidence]] = {}
     for row in sorted(evidence.every, key=_rank):
-        if row.fit.names and row.prediction is not None:
+        if row.fit.names:
             families.setdefault(row.family, []).append(row)
     simplest = [
         min(
@@ -70,8 +70,7 @@ def _rank(row: SetEvidence) -> tuple[float, int, Names]:
     """What sets are ranked by: what they leave of the held-out events, then their size and
     names.
     """
-    left = float("inf") if row.prediction is None else row.held_out_prediction.excess
-    return left, len(row.fit.names), row.fit.names
+    return row.held_out_prediction.excess, len(row.fit.names), row.fit.names
 
 
 def find_rivals(
@@ -89,7 +88,7 @@ def needs_all(one: SetEvidence, evidence: Evidence, criteria: Criteria) -> bool:
     """
     subsets = itertools.combinations(one.fit.names, len(one.fit.names) - 1)
     fewer = [row for row in map(evidence.row_of, subsets) if row is not None]
-    return all(compute_factor(one, row) > criteria.ahead for row in fewer if row.prediction)
+    return all(compute_factor(one, row) > criteria.ahead for row in fewer)
 
 
 def beats(one: SetEvidence, other: SetEvidence, criteria: Criteria) -> bool:

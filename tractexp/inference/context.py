@@ -126,13 +126,17 @@ class Context:
 
         Its count of simulations is a part of this one's; P0 and Q0 are free where they are here.
         """
-        kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
-        same = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
-        priors = kernels.bare.priors
-        there = Context.from_records(
-            self.load, self.catalogue, records, *same, type(kernels.family), priors=priors
-        )
+        there = self.rebuild(self.catalogue, records, self.effort.anew(), type(self.kernels.family))
         return there if len(self.coordinates.before) else there.with_measured_power
+
+    def rebuild(
+        self, catalogue: Catalogue, records: Records, effort: Effort, family: type[Family]
+    ) -> "Context":
+        """The same base model, bounds, steps and thresholds with another catalogue or records."""
+        kernels = self.kernels
+        same = kernels.bounds, kernels.fixed, self.criteria, effort, kernels.substeps, family
+        priors = kernels.bare.priors
+        return Context.from_records(self.load, catalogue, records, *same, priors=priors)
 
     @property
     def with_measured_power(self) -> "Context":

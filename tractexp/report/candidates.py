@@ -33,7 +33,7 @@ MOST_SETS = 12  # that are compared in a table
 
 def candidates(page: Report, findings: Findings) -> None:
     """By the deviance that each lowers, or where names go by the model's error, by that."""
-    if findings.evidence.there is not None:
+    if findings.evidence.is_predicted:
         return add_prediction_section(page, findings)
     rows = list_candidates(findings)
     labels = _labels(rows)

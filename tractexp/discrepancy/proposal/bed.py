@@ -70,19 +70,8 @@ def context_of_terms(original: Context) -> Context:
     whole = tuple(
         Candidate(kind, effect, (), ({},)) for kind, effect in ((k, Library(k)) for k in KINDS)
     )
-    kernels = original.kernels
-    return Context.from_records(
-        original.load,
-        Catalogue((*faults, *whole), {}),
-        original.records,
-        kernels.bounds,
-        kernels.fixed,
-        original.criteria,
-        original.effort,
-        kernels.substeps,
-        Terms,
-        priors=kernels.bare.priors,
-    )
+    catalogue = Catalogue((*faults, *whole), {})
+    return original.rebuild(catalogue, original.records, original.effort, Terms)
 
 
 def with_terms(context: Context, chosen: Sequence[Term]) -> Context:
