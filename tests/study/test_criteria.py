@@ -33,6 +33,7 @@ from tractexp.inference.context import FAULT_PRIOR
 from tractexp.inference.criteria import CHOSEN, DERIVED, Criteria
 from tractexp.inference.fitting import Refit
 from tractexp.inference.free_set import FreeSet
+from tractexp.inference.model_error import Change
 from tractexp.inference.score_test import Score
 from tractexp.noise import random_walk
 from tractexp.noise.random_walk import Rest, find
@@ -113,17 +114,15 @@ def closes_share(c, closed, kept=1):
     """Whether an investigation of all events that keeps so many sets closes a share of the model's
     error.
     """
-    errors = {"before": 1.0, "after": 1.0 - closed}
-    graded = {
-        "base_grade": "before",
-        "final_grade": "after",
-        "context": SimpleNamespace(criteria=c),
-    }
-    judged = {
-        "select_misfit": lambda which: SimpleNamespace(error=SimpleNamespace(square=errors[which]))
-    }
-    verdict = SimpleNamespace(kept=("one",) * kept)
-    return Findings.closes_share.fget(SimpleNamespace(verdict=verdict, **graded, **judged))
+    before, after = (
+        SimpleNamespace(error=SimpleNamespace(square=square)) for square in (1.0, 1.0 - closed)
+    )
+    found = SimpleNamespace(
+        context=SimpleNamespace(criteria=c),
+        graded_change=Change(before, after),
+        verdict=SimpleNamespace(kept=("one",) * kept),
+    )
+    return Findings.closes_share.fget(found)
 
 
 def wandering(seed, rests=(), walk=0.0):
@@ -227,9 +226,9 @@ FURTHER = [  # decisions by a criterion that has one above, too
         "unexplained",
     ),
     ("shown", 9.0, lambda c: word_of(c, with_a_member(c, gain=10.0, expected=11.0)), "candidate"),
-    ("ahead", 1.45, lambda c: proposed(c, explained=0.54).stands(c), False),
+    ("ahead", 1.45, lambda c: proposed(c, explained=0.54).objections(c) == [], False),
     ("ahead", 1.45, lambda c: closes_share(c, 0.54), False),
-    ("shown", 9.0, lambda c: proposed(c, whole=11.0).stands(c), False),
+    ("shown", 9.0, lambda c: proposed(c, whole=11.0).objections(c) == [], False),
 ]
 # of one algorithm alone: where it stands, a looser value, what it decides, what that is by default
 NUMBERS = [
@@ -244,7 +243,13 @@ NUMBERS = [
     (chance, "QUIET_WORTH", 100.0, lambda: is_known(120.0), False),
     (catalogue, "LEAST_SWING", 0.04, lambda: "moves by less than" in swinging(), True),
     (judgement, "TESTABLE", 0.7, status, "not testable"),
-    (judge, "PROPOSED_P", 0.02, lambda: proposed(Criteria(), p=0.011).stands(Criteria()), False),
+    (
+        judge,
+        "PROPOSED_P",
+        0.02,
+        lambda: proposed(Criteria(), p=0.011).objections(Criteria()) == [],
+        False,
+    ),
     (choose, "DECIDED", 0.9, chosen_dip, 0.6),
 ]
 

@@ -260,6 +260,7 @@ def test_a_transformer_whose_ratio_steps_is_found_in_the_voltage_that_the_load_s
     assert found.proposal.values["size"] == pytest.approx(
         0.5 * EFFECTS["tap_changer_step"].reference, rel=0.05
     )
+    assert min(change.closed_share for change in found.proposal.changes) > 0.5
     assert [t.name for t, _ in found.tried].index(power) > 0
 
 
@@ -276,6 +277,8 @@ def test_what_a_right_term_explains_does_not_hang_on_the_level_of_the_noise(seed
     assert held.gain / excess == pytest.approx(measured, abs=0.1)
     assert 0.8 < held.explained_share <= 1.0
     assert found.proposal.term.name == STEP
+    fitted, _ = found.proposal.changes  # a term in a fit leaves no more of it
+    assert fitted.after.error.square <= fitted.before.error.square
 
 
 def test_nothing_is_proposed_where_nothing_is_missing():

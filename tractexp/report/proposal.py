@@ -97,15 +97,20 @@ def _add_explanation(page: Report, proposal: Proposal) -> None:
     rows = [
         [
             role,
-            *(tell_error(vars(c.error)) for c in (g.before, g.after)),
-            percent(g.explained_share),
+            *(tell_error(vars(c.error)) for c in (change.before, change.after)),
+            percent(judged.explained_share),
         ]
-        for role, g in (("fitted", proposal.train), ("held out", proposal.validate))
+        for role, change, judged in zip(
+            ("fitted", "held out"),
+            proposal.changes,
+            (proposal.train, proposal.validate),
+            strict=True,
+        )
     ]
     page.table(
         ["events", "model's error without it", "with it", "explained"],
         rows,
-        "Errors are of the response, faults of the measurement free in both; explained is the"
+        "Errors are of the response, both models as least squares fit them; explained is the"
         " term's part of what it gains and what pushes into the balances or the other terms tried"
         f" would gain beside it, beyond chance; {chance(proposal.p)}.",
     )

@@ -6,17 +6,27 @@ estimated, and that and chance move it by more than what is missing may do.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.gap import SHOWN, GapTest, compute_pushed_changes, gap, share_gone
+from tractexp.discrepancy.gap import (
+    SHOWN,
+    Curves,
+    GapTest,
+    compute_pushed_changes,
+    curves,
+    gap,
+    share_gone,
+)
 from tractexp.discrepancy.held_out import carry_fits
+from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.proposal.bed import carried_over
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, TermFits
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
-from tractexp.inference.fitting import Refit
+from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.model_error import Change
 from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -37,12 +47,8 @@ class TermAssessment:
     validate: GapTest
     p: float
 
-    def stands(self, criteria: Criteria) -> bool:
-        """Whether it is proposed."""
-        return not self.objections(criteria)
-
     def objections(self, criteria: Criteria) -> list[str]:
-        """Why it is not proposed, each as the end of a sentence."""
+        """Why it is not proposed, each as the end of a sentence; none where it is."""
         gap = self.validate
         least = share_gone(criteria.ahead)
         little = (
@@ -114,6 +120,38 @@ def _assess_models(
     return [assess_fit(fit, unit) for fit, unit in zip(fits, units, strict=True)]
 
 
+def measure_changes(
+    result: TermFits, fit: Refit, events: Sequence[Event]
+) -> tuple[Change[Curves], Change[Curves]]:
+    """What the base model and that with a term leave of the fitted and of held-out events, both
+    fitted by least squares, as a model is graded.
+
+    The term was looked for by the likelihood of the noise, which may give up some of the error in S
+    for what is told more surely: by those fits a term that is there may seem to make it worse.
+    """
+    context = result.context.with_measured_power.held_to_usual
+    at = context.coordinates
+    bare, found = (at.without_faults(one.unit, ()) for one in (result.bare, fit))
+    noise = residual_noise(context, replace(result.bare, unit=bare))
+    starts = bare, at.remove_effects(found, fit.names)
+    base = refit(context, noise, [((), start) for start in starts], faults=())[0]
+    nested = found.copy()  # from the base model's, so that the term leaves no more
+    nested[at.base] = base.unit[at.base]
+    nested[at.sizes(fit.names)] = at.null[at.sizes(fit.names)]
+    (best,) = refit(context, noise, [(fit.names, found), (fit.names, nested)], faults=())
+    there = context.move_to_records(Records.from_events(events, context.records.window))
+    fitted, held_out = (
+        Change(
+            *(
+                curves(seen, seen.coordinates.at_measured_power(one.unit), noise, one.names)
+                for one in (base, best)
+            )
+        )
+        for seen in (context, there)
+    )
+    return fitted, held_out
+
+
 def list_tied_terms(
     result: TermFits, chosen: TermAssessment, others: Sequence[TermAssessment]
 ) -> list[TermAssessment]:
@@ -122,5 +160,5 @@ def list_tied_terms(
     return [
         o
         for o in others
-        if o.stands(criteria) and not criteria.rejects(o.fit.cost - chosen.fit.cost)
+        if not o.objections(criteria) and not criteria.rejects(o.fit.cost - chosen.fit.cost)
     ]

@@ -8,17 +8,23 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.gap import GapTest
+from tractexp.discrepancy.gap import Curves, GapTest
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
-from tractexp.discrepancy.proposal.judge import TermAssessment, list_tied_terms, term_assessments
+from tractexp.discrepancy.proposal.judge import (
+    TermAssessment,
+    list_tied_terms,
+    measure_changes,
+    term_assessments,
+)
 from tractexp.discrepancy.proposal.library import Term, terms
 from tractexp.discrepancy.proposal.refit import TermFits, standard_errors, term_fits
 from tractexp.discrepancy.proposal.screen import Ground, screen
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
+from tractexp.inference.model_error import Change
 from tractexp.noise import Noise
 from tractexp.record import Event
 from tractexp.text.wording import join_words
@@ -49,6 +55,8 @@ class Proposal:
     estimates: tuple[ParameterEstimate, ...]
     train: GapTest
     validate: GapTest
+    # what it leaves of the fitted and of the held-out events by least squares
+    changes: tuple[Change[Curves], Change[Curves]]
     p: float
     acting: tuple[Acting, ...]
     # with the shares they explain on fitted and on held-out events
@@ -104,7 +112,7 @@ def propose(
     lowered = [result.bare.deviance - fit.deviance for fit in result.fits]
     ranked = term_assessments(context, result, validate, [screened.p(drop) for drop in lowered])
     tried = tuple((result.term(w.fit), w) for w in ranked)
-    standing = [w for w in ranked if w.stands(context.criteria)]
+    standing = [w for w in ranked if not w.objections(context.criteria)]
     if not standing:
         objections = join_words(ranked[0].objections(context.criteria))
         return ProposalResult(
@@ -112,11 +120,11 @@ def propose(
             f"of the terms tried the best is {result.term(ranked[0].fit).words}, but {objections}",
             tried,
         )
-    return ProposalResult(_proposal(result, first, standing, screened.ground), "", tried)
+    return ProposalResult(_proposal(result, first, standing, validate), "", tried)
 
 
 def _proposal(
-    result: TermFits, first: Disagreement, standing: Sequence[TermAssessment], ground: Ground
+    result: TermFits, first: Disagreement, standing: Sequence[TermAssessment], held: Sequence[Event]
 ) -> Proposal:
     """The proposal of the best term that stands, with those that it cannot be told from."""
     chosen, *others = standing
@@ -132,6 +140,7 @@ def _proposal(
         estimates=estimates,
         train=chosen.train,
         validate=chosen.validate,
+        changes=measure_changes(result, chosen.fit, held),
         p=chosen.p,
         acting=tuple(_find_acting_places(result, chosen.fit)),
         ties=tuple(
