@@ -120,12 +120,7 @@ def imagine_grid(context: Context, fits: Sequence[Refit]) -> list[ImaginedDip]:
     of the sets reads it.
     """
     domain = context.domain
-    reads = {
-        channel
-        for fit in fits
-        for name in fit.names
-        for channel in context.catalogue[name].effect.reads
-    }
+    reads = context.catalogue.list_channels(name for fit in fits for name in fit.names)
     unbalances = GRID_UNBALANCES if not domain.further or "U2" in reads else GRID_UNBALANCES[:1]
     durations = [one for one in GRID_DURATIONS if one < domain.dips.length]
     every = itertools.product(GRID_DEPTHS, durations, GRID_JUMPS, unbalances)

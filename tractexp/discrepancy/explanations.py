@@ -10,10 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
 
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examine_fit
-from tractexp.discrepancy.families import against_members
+from tractexp.discrepancy.families import against_members, worth
 from tractexp.discrepancy.ranking import MOST_NAMED
 from tractexp.discrepancy.window_search import behind_window
 from tractexp.inference.base_fit import BaseFit
@@ -141,11 +140,7 @@ def without_needless(
         for left in fit.names
     ]
     fewer = refit(context, tests.noise, wanted)[0]
-    gained, parameters = (
-        max(fewer.deviance - fit.deviance, 0.0),
-        max(fit.parameters - fewer.parameters, 1),
-    )
-    if chdtrc(parameters, gained) < context.criteria.further_name_p:
+    if worth(fit, fewer, context.criteria.further_name_p):
         return tests
     refits[fewer.names] = fewer
     return without_needless(base, examine_fit(base.quiet, fewer, tests.noise, seed), refits, seed)

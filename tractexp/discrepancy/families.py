@@ -62,12 +62,12 @@ def member_fits(
     return wide_refits(context, noise, wanted, NEAREST, refits.values())
 
 
-def worth(member: Refit, textbook: Refit, p: float) -> bool:
-    """Whether a member explains more than the best textbook effect by more than its further
-    parameters cost.
+def worth(larger: Refit, other: Refit, p: float) -> bool:
+    """Whether a set or member explains more than another by more than its further parameters
+    cost.
     """
-    further = max(member.parameters - textbook.parameters, 1)
-    gained = textbook.deviance - member.deviance
+    further = max(larger.parameters - other.parameters, 1)
+    gained = other.deviance - larger.deviance
     return gained > 0 and float(chdtrc(further, gained)) < p
 
 

@@ -31,14 +31,13 @@ from tractexp.inference.multistart import (
     along_least_certain,
     distinct,
     explore_minima,
-    screen_points,
+    search_box,
 )
 from tractexp.inference.observed import Observed
 from tractexp.inference.prior import held_in_words, weigh_prior
 from tractexp.inference.problem import Problem
 from tractexp.noise.color import (
     FEWEST_NOISE_SAMPLES,
-    SMALLEST_DEVIATION,
     fit_autoregression,
     stretches,
     white_noise,
@@ -240,17 +239,11 @@ def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
 def _robust(problem: Problem, values: np.ndarray) -> EstimationResult:
     """The estimate of a robust loss, from where the search ended."""
     observed = Observed.from_problem(problem)
-    squares = Likelihood.of_squares(observed.problem, _level(observed.problem, values))
+    objective = float(observed.problem.objective(values[None])[0])
+    squares = Likelihood.of_objective(observed.problem, objective)
     squares = drop_outliers(squares, squares.to_unit(values))
     ends = DescentEnds(observed, squares, squares.descent(squares.to_unit(values)), ("search",))
     return _choose_estimate(ends.looked_beside(), robust=True)
-
-
-def _level(problem: Problem, values: np.ndarray) -> float:
-    """The root of the mean square [pu] that free values (d,) leave: a sum of squares over it counts
-    samples.
-    """
-    return max(float(np.sqrt(problem.objective(values[None])[0])), SMALLEST_DEVIATION)
 
 
 def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
@@ -263,11 +256,7 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
     key = f"{problem.digest()} {events}"
     if key not in _remembered:
         observed = Observed.from_problem(problem)
-        points, least = screen_points(observed.problem)
-        likelihood = Likelihood.of_squares(
-            observed.problem, max(float(np.sqrt(least)), SMALLEST_DEVIATION)
-        )
-        result = explore_minima(likelihood, points)
+        likelihood, result = search_box(observed.problem)
         ends = DescentEnds(observed, likelihood, result, ("box",) * len(result.unit))
         if not np.isfinite(ends.lowest):
             return ends, None

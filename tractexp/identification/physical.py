@@ -23,7 +23,6 @@ from tractexp.identification.verdict import (
     ParameterVerdict,
 )
 from tractexp.inference.model_error import model_error
-from tractexp.inference.problem import Problem
 from tractexp.parameter import spread_evenly
 from tractexp.record import Event
 
@@ -95,26 +94,13 @@ def find_free_optimum(
         return None
     problem = uncertainty.likelihood.problem
     own = {p.name: p.bounds for p in problem.parameters if p.name not in held}
-    steps = int(problem.step.substeps.max())
     try:
-        free = Problem(
-            problem.model,
-            problem.events,
-            own,
-            problem.fixed,
-            steps,
-            problem.per_event,
-            problem.loss,
-        )
+        free = problem.vary(problem.model, own)
     except UserError:
         return None
-    likelihood = replace(uncertainty.likelihood, problem=free)
     known = free.space.to_unit(uncertainty.values)
     starts = np.vstack([known, spread_evenly(FREE_STARTS, len(known))])
-    coordinates = likelihood.place_parameters(np.clip(starts, 0.0, 1.0))
-    if uncertainty.exact:
-        coordinates[:, likelihood.free :] = uncertainty.unit[uncertainty.likelihood.free :]
-    ended = likelihood.descent(coordinates, iterations=FREE_ITERATIONS, tolerance=0.01)
+    likelihood, ended = uncertainty.descend_in(free, starts, FREE_ITERATIONS)
     if not ended.deviance.min() < uncertainty.deviance:
         return None
     values = likelihood.values(ended.best)

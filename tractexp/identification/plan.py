@@ -19,7 +19,8 @@ from tractexp.inference.likelihood import Likelihood, before_the_event
 from tractexp.inference.model_error import weigh_error
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive
-from tractexp.noise import Autoregression, Noise
+from tractexp.noise import Noise
+from tractexp.noise.color import forgetting_noise
 from tractexp.record import Event
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
@@ -79,11 +80,7 @@ class DipShape:
     def noise(self) -> Noise:
         """Noise of what is compared at this rate: a first-order autoregression."""
         a = math.exp(-1 / (self.rate * self.memory)) if self.memory > 0 else 0.0
-        color, shock = np.array([[0.0], [a]]), math.sqrt(1 - a * a)
-        P, Q = (
-            Autoregression(color, level * np.array([1.0, shock]))
-            for level in (self.noise_P, self.noise_Q)
-        )
+        P, Q = (forgetting_noise(level, a) for level in (self.noise_P, self.noise_Q))
         return Noise(((P, Q, P)[: len(self.domain.channels)],))
 
     def check(self, where: str = "task") -> None:

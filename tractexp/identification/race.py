@@ -16,7 +16,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.multistart import distinct, explore_minima, screen_points
+from tractexp.inference.multistart import distinct, search_box
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model
 from tractexp.noise.color import SMALLEST_DEVIATION
@@ -136,10 +136,7 @@ def _fit(
         problem = Problem(candidate.model, events, candidate.bounds, own)
     except UserError as error:
         return Entry(candidate.name, len(candidate.model.names), np.inf, np.inf, str(error))
-    points, least = screen_points(problem)
-    level = max(float(np.sqrt(least)), SMALLEST_DEVIATION)
-    likelihood = Likelihood.of_squares(problem, level)
-    ends = explore_minima(likelihood, points)
+    likelihood, ends = search_box(problem)
     if not np.isfinite(ends.deviance.min(initial=np.inf)):
         why = "nothing in its bounds can be simulated"
         return Entry(candidate.name, problem.space.dimension, np.inf, np.inf, why)

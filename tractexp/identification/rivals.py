@@ -140,25 +140,19 @@ def _fit_rival(uncertainty: Uncertainty, name: str, model: Model) -> RivalStruct
     """
     problem = uncertainty.likelihood.problem
     own = {p.name: p.bounds for p in problem.parameters if p.name in model.names}
-    fixed = {n: value for n, value in problem.fixed.items() if n in model.names}
-    per_event = [n for n in problem.per_event if n in model.names]
     try:
-        substeps = int(problem.step.substeps.max())
-        other = Problem(model, problem.events, own, fixed, substeps, per_event, problem.loss)
+        other = problem.vary(model, own)
     except UserError:
         return None
-    likelihood = replace(uncertainty.likelihood, problem=other)
-    start = likelihood.place_parameters(_starts(uncertainty, other))
-    if uncertainty.exact:
-        start[:, likelihood.free :] = uncertainty.unit[uncertainty.likelihood.free :]
-    ended = likelihood.descent(start, iterations=RIVAL_ITERATIONS, tolerance=0.01)
-    best = int(ended.deviance.argmin())
-    if not ended.deviance[best] < uncertainty.deviance + threshold():
+    starts = _starts(uncertainty, other)
+    likelihood, ended = uncertainty.descend_in(other, starts, RIVAL_ITERATIONS)
+    least = float(ended.deviance.min())
+    if not least < uncertainty.deviance + threshold():
         return None
-    free = likelihood.values(ended.unit[best])
+    free = likelihood.values(ended.best)
     values = dict(zip(other.space.names, free.tolist(), strict=True))
     shared = {n: value for n, value in values.items() if n in uncertainty.names}
-    squares = float(ended.deviance[best] / max(uncertainty.deviance, 1e-30))
+    squares = least / max(uncertainty.deviance, 1e-30)
     return RivalStructure(name, squares, shared, other, free)
 
 
@@ -173,4 +167,4 @@ def _starts(uncertainty: Uncertainty, other: Problem) -> np.ndarray:
     usual = np.array([shared.get(n, parameters[n.partition("[")[0]].default) for n in names])
     start = np.tile(other.space.to_unit(usual), (STARTS + 1, 1))
     start[1:, alone] = spread_evenly(STARTS, max(len(alone), 1))[:, : len(alone)]
-    return np.clip(start, 0.0, 1.0)
+    return start

@@ -20,11 +20,10 @@ from tractexp.inference.differences import central_differences
 from tractexp.inference.least_squares import descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import model_error
-from tractexp.inference.multistart import explore_minima, screen_points
+from tractexp.inference.multistart import search_box
 from tractexp.inference.prediction_band import PredictionBand, measure_band
 from tractexp.inference.sized_problem import SizedProblem
 from tractexp.model.model import Model
-from tractexp.noise.color import SMALLEST_DEVIATION
 from tractexp.record import Event, measure_promise
 
 MOST_BEGUN = 4  # dips that the first fit, from all over the box, is made to
@@ -168,19 +167,13 @@ def _fit_constants(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None
 
 def _search_constants(problem: SizedProblem) -> np.ndarray:
     """The constants (k,) of the best fit to few dips, from all over the box."""
-    points, least = screen_points(problem)
-    ends = explore_minima(weigh_squares(problem, least), points)
+    _, ends = search_box(problem)
     if not np.isfinite(ends.deviance.min(initial=np.inf)):
         raise UserError(
             f"{problem.events[0].record.name}: nothing in the bounds of the model can be simulated;"
             " widen model.bounds or choose another model"
         )
     return problem.space.from_unit(ends.best)[problem.constants]
-
-
-def weigh_squares(problem: SizedProblem, objective: float) -> Likelihood:
-    """Least squares in units of what an objective [pu²] leaves."""
-    return Likelihood.of_squares(problem, max(float(np.sqrt(objective)), SMALLEST_DEVIATION))
 
 
 def _place(problem: SizedProblem, constants: np.ndarray) -> tuple[Likelihood, np.ndarray]:
@@ -193,7 +186,7 @@ def _place(problem: SizedProblem, constants: np.ndarray) -> tuple[Likelihood, np
     units = np.empty((TRIED_TORQUES, problem.space.dimension))
     units[:] = tried[:, None]
     units[:, at] = np.clip((constants - low) / span, 0.0, 1.0)
-    likelihood = weigh_squares(problem, 1.0)
+    likelihood = Likelihood.of_objective(problem, 1.0)
     rows = likelihood.rows(units)
     squares = np.stack([np.sum(rows[:, mine] ** 2, axis=1) for mine in problem.separable.rows])
     squares = np.where(np.isfinite(squares), squares, np.inf)
@@ -202,7 +195,7 @@ def _place(problem: SizedProblem, constants: np.ndarray) -> tuple[Likelihood, np
     objective = float(np.sum(squares.min(axis=1)))
     if not np.isfinite(objective):
         objective = 1.0
-    return weigh_squares(problem, objective / problem.drive.samples), unit
+    return Likelihood.of_objective(problem, objective / problem.drive.samples), unit
 
 
 def _fit_torques(spec: LoadSpec, dips: Sequence[Dip], constants: np.ndarray) -> SharedFit:

@@ -16,11 +16,11 @@ from tractexp.identification.station import (
     SharedFit,
     differentiate,
     find_event,
-    weigh_squares,
 )
 from tractexp.inference.blocks import blocks_of
 from tractexp.inference.information import Information
 from tractexp.inference.interval import interval_factor
+from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.sandwich import SINGULAR_ROUNDING, moves_without_blocks, robust_root
 from tractexp.inference.sized_problem import SizedProblem
 
@@ -56,7 +56,7 @@ def judge_constants(spec: LoadSpec, fit: SharedFit) -> Constants:
     values = np.empty(problem.space.dimension)
     values[problem.constants] = fit.constants
     values[problem.shares] = torques[some]
-    likelihood = weigh_squares(problem, float(problem.objective(values[None])[0]))
+    likelihood = Likelihood.of_objective(problem, float(problem.objective(values[None])[0]))
     unit = likelihood.to_unit(values)[0]
     rows, J = differentiate(likelihood, problem, unit)
     own = _project_out(J, problem)

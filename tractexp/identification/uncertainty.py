@@ -16,7 +16,9 @@ from tractexp.identification.verdict import ParameterVerdict, judge
 from tractexp.inference.differences import CENTRAL
 from tractexp.inference.information import Information
 from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
+from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.problem import Problem
 from tractexp.inference.residual_tests import jarque_bera, ljung_box
 from tractexp.inference.sandwich import scatter
 from tractexp.inference.separable import Sensitivities
@@ -121,6 +123,34 @@ class Uncertainty:
     def judge_point(self, unit: np.ndarray) -> "Uncertainty":
         """The judgement of another point (D,) of the likelihood."""
         return conclude(self.likelihood, unit, None if self.exact else self.of_noise, self.notes)
+
+    def descend_in(
+        self, problem: Problem, points: np.ndarray, iterations: int
+    ) -> tuple[Likelihood, Descent]:
+        """The ends of descents of another problem on the same events, whose rows count as this
+        estimate's do.
+
+        Parameters
+        ----------
+        problem : Problem
+            With other parameters or bounds.
+        points : (n, d)
+            Its free values in the unit cube to begin at; P0 and Q0, where they are free, begin as
+            estimated.
+        iterations : int
+            At most so many.
+
+        Returns
+        -------
+        Likelihood
+            Of that problem.
+        Descent
+        """
+        likelihood = replace(self.likelihood, problem=problem)
+        start = likelihood.place_parameters(np.clip(points, 0.0, 1.0))
+        if self.exact:
+            start[:, likelihood.free :] = self.unit[self.likelihood.free :]
+        return likelihood, likelihood.descent(start, iterations=iterations, tolerance=0.01)
 
     @property
     def exact(self) -> bool:

@@ -2,7 +2,7 @@
 
 import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,6 +126,10 @@ class Catalogue:
     def textbook(self, names: Sequence[str]) -> tuple[str, ...]:
         """The names of the textbook effects whose families these effects belong to."""
         return tuple(self.family(name) for name in names)
+
+    def list_channels(self, names: Iterable[str]) -> set[str]:
+        """The channels beside the voltage that effects read."""
+        return {channel for name in names for channel in self[name].effect.reads}
 
     def label_effect(self, name: str) -> str:
         """The name of the textbook effect, followed by what differs from it in place or law."""

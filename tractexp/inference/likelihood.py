@@ -74,6 +74,11 @@ class Likelihood(FitProblem):
             problem=problem, valid=problem.drive.weights > 0, noise=white, initial_power=False
         )
 
+    @classmethod
+    def of_objective(cls, problem: Problem, objective: float) -> "Likelihood":
+        """Eq. (8) in units of what an objective [pu²] leaves: a sum of squares counts samples."""
+        return cls.of_squares(problem, max(float(np.sqrt(objective)), SMALLEST_DEVIATION))
+
     @property
     def with_initial_power(self) -> "Likelihood":
         """The likelihood with P0 and Q0 of each event free."""

@@ -41,6 +41,26 @@ def screen_points(problem: Problem) -> tuple[np.ndarray, float]:
     return points[best_distinct(points, objective, APART, STARTS, norm=2)], float(objective.min())
 
 
+def search_box(problem: Problem) -> tuple[Likelihood, Descent]:
+    """The ends of descents by least squares from all over the box.
+
+    Parameters
+    ----------
+    problem : Problem
+        That is fitted.
+
+    Returns
+    -------
+    Likelihood
+        Eq. (8), in units of what the best point of the box leaves.
+    Descent
+        As of `explore_minima`.
+    """
+    points, least = screen_points(problem)
+    likelihood = Likelihood.of_objective(problem, least)
+    return likelihood, explore_minima(likelihood, points)
+
+
 def explore_minima(likelihood: Likelihood, points: np.ndarray | None = None) -> Descent:
     """The ends of descents from all over the box.
 

@@ -364,6 +364,30 @@ class Problem:
         other.drive = other._driven()
         return other
 
+    def vary(self, model: Model, bounds: Mapping[str, Sequence[float]]) -> "Problem":
+        """Another model or other bounds on the same events, with the same steps and loss.
+
+        Parameters
+        ----------
+        model : Model
+            What it has of the fixed parameters, and of those of each event, stays so.
+        bounds : {name: (lower, upper)}
+            In place of the model's own.
+
+        Returns
+        -------
+        Problem
+
+        Raises
+        ------
+        UserError
+            As of `Problem`.
+        """
+        fixed = {name: value for name, value in self.fixed.items() if name in model.names}
+        per_event = [name for name in self.per_event if name in model.names]
+        substeps = int(self.step.substeps.max())
+        return Problem(model, self.events, bounds, fixed, substeps, per_event, self.loss)
+
     @property
     def domain(self) -> Domain:
         """The domain in which model and records are compared: phasors or waveforms."""

@@ -157,6 +157,13 @@ def white_noise(deviation: float) -> Autoregression:
     return Autoregression(np.empty((1, 0)), np.array([max(deviation, SMALLEST_DEVIATION)]))
 
 
+def forgetting_noise(deviation: float, correlation: float) -> Autoregression:
+    """Noise of one standard deviation [pu] whose neighbors correlate so, 0 to 1."""
+    shock = float(np.sqrt(1 - correlation**2))
+    color = np.array([[0.0], [correlation]])
+    return Autoregression(color, deviation * np.array([1.0, shock]))
+
+
 def check_count(samples: int) -> None:
     """Raise `UserError` for too few quiet samples."""
     if samples < FEWEST_NOISE_SAMPLES:

@@ -183,12 +183,7 @@ def next_event(
     context.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
     sides = [linearize_side(context, noise, fit) for fit in (bare, *rivals)]
     separation, truths = Separation(sides, context.criteria, FEW, seed), range(1, len(sides))
-    reads = {
-        channel
-        for fit in rivals
-        for name in fit.names
-        for channel in context.catalogue[name].effect.reads
-    }
+    reads = context.catalogue.list_channels(name for fit in rivals for name in fit.names)
     events, denied = [], []
     by_rate = sorted(imagine_dips(context, sorted(reads)), key=lambda e: e.rate)
     # sampled alike

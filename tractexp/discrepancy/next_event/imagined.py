@@ -12,7 +12,8 @@ import numpy as np
 from tractexp.domain import PHASORS, Domain
 from tractexp.inference.context import Context
 from tractexp.model.drive import Drive, Excitation, WaveformDrive
-from tractexp.noise import Autoregression, Noise
+from tractexp.noise import Noise
+from tractexp.noise.color import forgetting_noise
 from tractexp.noise.random_walk import Load
 from tractexp.record import Event, Record
 
@@ -153,10 +154,7 @@ def noise_of(noise: Noise, drive: Drive, rate: int, step: float) -> Noise:
         return noise.apply_to_events(Load.from_powers(steady, drive.before, drive.first))
     memory = noise.memory(step)
     a = float(np.exp(-step / rate / memory)) if memory > 0 else 0.0
-    color, shock = np.array([[0.0], [a]]), float(np.sqrt(1 - a * a))
-    return Noise(
-        (tuple(Autoregression(color, level * np.array([1.0, shock])) for level in noise.levels),)
-    )
+    return Noise((tuple(forgetting_noise(level, a) for level in noise.levels),))
 
 
 def as_recorded(context: Context, event: ImaginedDip, power: np.ndarray) -> Event:
