@@ -205,6 +205,14 @@ def test_a_step_by_itself_is_found_with_its_time(stepped):
     )
 
 
+def test_the_errors_of_a_proposal_are_those_of_graded_fits_and_less_with_the_term(stepped):
+    _, found = stepped
+    fitted, _ = found.steps.proposed.proposal.changes
+    before = found.gap.train.before.model_error["value"]
+    assert fitted.before.error.value == pytest.approx(before, rel=0.05)
+    assert fitted.after.error.square <= fitted.before.error.square
+
+
 def test_what_machines_read(stepped):
     _, found = stepped
     told = json.loads(json.dumps(found.content))
