@@ -78,7 +78,14 @@ class Disagreement:
         """The scores at another fit under a noise, by what chance does at this one."""
         t = tangent(context, fit, noise)
         projection = t.build_score_test(noise)
-        return Disagreement(fit, noise, t, projection, self.chance, projection.scores())
+        return Disagreement(
+            fit,
+            noise,
+            t,
+            projection,
+            self.chance,
+            projection.scores(),
+        )
 
     @property
     def criteria(self) -> Criteria:

@@ -63,7 +63,14 @@ class Grader:
                 ((*self.train, *self.validate), ()) if fit_all else (self.train, self.validate)
             )
             model = self._extend_base(names, window)
-            problem = Problem(model, fitted, self.bounds, fixed, self.substeps, priors=self.priors)
+            problem = Problem(
+                model,
+                fitted,
+                self.bounds,
+                fixed,
+                self.substeps,
+                priors=self.priors,
+            )
             start = self._choose_start(problem, found or {})
             self.known[key] = grade_playable(problem, judged, start, self.shown)
         return self.known[key]

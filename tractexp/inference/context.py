@@ -136,7 +136,13 @@ class Context:
         kernels = self.kernels
         same = kernels.bounds, kernels.fixed, self.criteria, effort, kernels.substeps, family
         priors = kernels.bare.priors
-        return Context.from_records(self.load, catalogue, records, *same, priors=priors)
+        return Context.from_records(
+            self.load,
+            catalogue,
+            records,
+            *same,
+            priors=priors,
+        )
 
     @property
     def with_measured_power(self) -> "Context":

@@ -386,7 +386,15 @@ class Problem:
         fixed = {name: value for name, value in self.fixed.items() if name in model.names}
         per_event = [name for name in self.per_event if name in model.names]
         substeps = int(self.step.substeps.max())
-        return Problem(model, self.events, bounds, fixed, substeps, per_event, self.loss)
+        return Problem(
+            model,
+            self.events,
+            bounds,
+            fixed,
+            substeps,
+            per_event,
+            self.loss,
+        )
 
     @property
     def domain(self) -> Domain:
