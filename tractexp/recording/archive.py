@@ -4,10 +4,12 @@ import functools
 import re
 from pathlib import Path
 
+from tractexp.configuration.plugin import build
 from tractexp.errors import UserError, nearest
 from tractexp.record import Record
 from tractexp.recording.event_views import settings_of
 from tractexp.recording.overview import View, view_of
+from tractexp.recording.reader import WaveformReader
 from tractexp.recording.record_files import find_records
 from tractexp.recording.sight import LoadEvent, Sight
 from tractexp.storage import files, time_limit
@@ -63,9 +65,15 @@ def _record(
         raise UserError(
             f"{where}: {name}: {path} shows {loads}, and there is no load {load}; the first is 1"
         )
-    event = _select(view.sights[load - 1], dip, f"{where}: {name}")
+    shown = view.sights[load - 1]
+    event = _select(shown, dip, f"{where}: {name}")
     assert event.event is not None
     record = event.event.record
+    if view.recording is not None and shown.feeder is not None:
+        reader = build("data", view.node)
+        assert isinstance(reader, WaveformReader)
+        span = (event.what.start, event.what.end)
+        record = reader.attach_samples(view.recording, shown.feeder, record, span)
     return Record(
         **{**vars(record), "name": event_name(path.relative_to(folder).as_posix(), load, event)}
     )

@@ -2,7 +2,7 @@
 
 import itertools
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -33,7 +33,7 @@ from tractexp.recording.label import order, shared_name
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.proposal import propose
 from tractexp.recording.quality import describe_clipped, measure_clipped_shares
-from tractexp.recording.recording import Recording
+from tractexp.recording.recording import Recording, Segment
 from tractexp.recording.unit import check_doubt, check_units, in_units
 from tractexp.recording.unrecognized import can_be_named, explain_unrecognized
 from tractexp.text import quoting
@@ -144,11 +144,22 @@ class WaveformReader(Reader):
         events = chosen(
             self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips)
         )
-        identity = _identity(recording, feeder)
+        identity = _identify_load(recording, feeder)
         groups = (events.train, events.validate)
         return Events(
             *([_in_memory(replace(r, identity=identity)) for r in group] for group in groups)
         )
+
+    def attach_samples(
+        self, recording: Recording, feeder: Feeder, record: Record, span: tuple[float, float]
+    ) -> Record:
+        """The record of a dip that lasts a `span` [s] of the recording, with the samples that show
+        it in memory, and which load it is.
+        """
+        segments = itertools.chain(*recording.stretches())
+        waves = (self._waves(recording, feeder, segment) for segment in segments)
+        shown = _show_samples(record, span, waves, recording.frequency)
+        return _in_memory(replace(shown, identity=_identify_load(recording, feeder)))
 
     def dips(
         self,
@@ -325,23 +336,20 @@ class WaveformReader(Reader):
                 except UserError as error:
                     short.append(error)
                     continue
-                waves = FeederWaves.from_recording(recording, feeder, segment)
-                late = waves.late if self.skew else None
-                several.append(
-                    Waves(
-                        waves,
-                        segment.start,
-                        segment.rate,
-                        self.estimator,
-                        late,
-                        waves.bridged_times,
-                    )
-                )
+                several.append(self._waves(recording, feeder, segment))
             if parts:
                 streams.append((join_phasors(parts), several))
         if not streams:
             raise short[0]
         return streams
+
+    def _waves(self, recording: Recording, feeder: Feeder, segment: Segment) -> Waves:
+        """The samples of a load in a segment, read where they are sliced."""
+        samples = FeederWaves.from_recording(recording, feeder, segment)
+        late = samples.late if self.skew else None
+        return Waves(
+            samples, segment.start, segment.rate, self.estimator, late, samples.bridged_times
+        )
 
     def _notes(
         self, recording: Recording, feeder: Feeder, dips: Sequence[FileDip]
@@ -370,7 +378,7 @@ class WaveformReader(Reader):
         return tuple(notes)
 
 
-def _identity(recording: Recording, feeder: Feeder) -> dict[str, str]:
+def _identify_load(recording: Recording, feeder: Feeder) -> dict[str, str]:
     """Which load it is, as far as the file says."""
     load = feeder.name or shared_name([recording.channels[i] for i in feeder.currents])
     fields = {"station": recording.station, "device": recording.device, "load": load}
@@ -381,14 +389,21 @@ def _identity(recording: Recording, feeder: Feeder) -> dict[str, str]:
 
 
 def _with_waves(dip: FileDip, waves: Sequence[Waves], frequency: float) -> Record | UserError:
-    """The record of a dip with the waves that show it from before its start to its end, of several
-    sampling rates.
-    """
+    """The record of a dip with the waves that show it, of several sampling rates."""
     if isinstance(dip.result, UserError) or dip.result.waves is not None:
         return dip.result
-    lead = BEFORE / frequency
-    there = (each for each in waves if each.start + lead <= dip.start and dip.end <= each.end)
-    return replace(dip.result, waves=next(there, None))
+    return _show_samples(dip.result, (dip.start, dip.end), waves, frequency)
+
+
+def _show_samples(
+    record: Record, span: tuple[float, float], waves: Iterable[Waves], frequency: float
+) -> Record:
+    """The record with the first waves that show its dip from well before its start to its end,
+    without any where none do.
+    """
+    start, end = span[0] - BEFORE / frequency, span[1]
+    there = (each for each in waves if each.start <= start and end <= each.end)
+    return replace(record, waves=next(there, None))
 
 
 def _in_memory(record: Record) -> Record:
