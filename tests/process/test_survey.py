@@ -346,6 +346,10 @@ def test_an_event_is_read_by_its_name(field):
     assert [r.name for r in events.train] == ["day 0/e2.cfg#1.1", "day 1/e3.cfg#1.1"]
     direct = tractexp.read(field / "day 0" / "e2.cfg")[0].record
     np.testing.assert_array_equal(events.train[0].P, direct.P)
+    assert events.train[0].identity == direct.identity
+    shown, own = events.train[0].waves, direct.waves  # for domain=waves
+    assert (shown.start, shown.rate) == (own.start, own.rate)
+    np.testing.assert_array_equal(shown.samples, own.samples)
 
 
 @pytest.mark.parametrize(
