@@ -72,8 +72,12 @@ def _record(
     if view.recording is not None and shown.feeder is not None:
         reader = build("data", view.node)
         assert isinstance(reader, WaveformReader)
-        span = (event.what.start, event.what.end)
-        record = reader.attach_samples(view.recording, shown.feeder, record, span)
+        record = reader.attach_samples(
+            view.recording,
+            shown.feeder,
+            record,
+            span=(event.what.start, event.what.end),
+        )
     return Record(
         **{**vars(record), "name": event_name(path.relative_to(folder).as_posix(), load, event)}
     )

@@ -346,9 +346,13 @@ class WaveformReader(Reader):
     def _waves(self, recording: Recording, feeder: Feeder, segment: Segment) -> Waves:
         """The samples of a load in a segment, read where they are sliced."""
         samples = FeederWaves.from_recording(recording, feeder, segment)
-        late = samples.late if self.skew else None
         return Waves(
-            samples, segment.start, segment.rate, self.estimator, late, samples.bridged_times
+            samples,
+            start=segment.start,
+            rate=segment.rate,
+            estimator=self.estimator,
+            late=samples.late if self.skew else None,
+            bridged=samples.bridged_times,
         )
 
     def _notes(
