@@ -133,6 +133,18 @@ def test_a_voltage_that_does_not_turn_is_reckoned_back_as_before():
     assert record.f is off_nominal.f
 
 
+def test_the_noise_of_a_frequency_is_no_turn_of_the_voltage():
+    """Else an angle that never turned is computed back with what noise it has at the edges."""
+    (event,) = events(count=1, recorder=FAST)
+    record = event.record
+    angle = 2e-4 * np.random.default_rng(3).standard_normal(record.samples)  # as noisy as U
+    noisy = replace(record, f=50.0 + np.gradient(angle, record.step) / (2 * np.pi))
+    seen = replace(event, record=noisy, f0=50.0)
+    back = RecorderWindow(0.02).sharpen_event(seen).record
+    assert back.f is noisy.f
+    assert back.U.tolist() == RecorderWindow(0.02).sharpen_event(event).record.U.tolist()
+
+
 def test_the_power_of_turning_phasors_is_that_of_their_averages():
     t = np.arange(400) * 2e-3
     u = (1 - 0.3 * (t > 0.4)) * np.exp(0.3j * (t > 0.4))

@@ -27,6 +27,9 @@ LONGEST_WINDOW = 2.0  # s about a time stamp: far more than any recorder average
 BEND_SECONDS = 0.05  # s on either side of a window around an edge, in which the voltage may bend
 BENT, CALM = 0.01, 3e-4  # pu: second differences of the voltage there, and elsewhere
 ERROR = 2e-4  # pu: how exactly the average voltage must be the recorded one, if its noise allows
+TURN_OVER_NOISE = (
+    15.0  # times that error [rad], by which an angle turns beside an edge: less is noise
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +192,8 @@ def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Even
 
     Of the voltages whose average is the recorded one, within its noise, it is the one that bends
     least: weighted least squares. Near the edges of the dip it is free to bend. Its angle is
-    computed back with its size where either was recorded to turn.
+    computed back with its size where it turns there by more than noise: the angle of phasors is as
+    noisy as their size, and noise that is computed back grows.
 
     Parameters
     ----------
@@ -222,7 +226,7 @@ def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Even
 
     record = event.record
     turned = find_turned_angle(event)
-    if not turned.any():
+    if _measure_turn(event, turned, int(near)) <= TURN_OVER_NOISE * error:
         return replace(event, record=replace(record, U=undo(U)))
     u = undo(U * np.cos(turned)) + 1j * undo(U * np.sin(turned))
     steady = 2 * np.pi * (event.f0 - record.base.frequency) * step * np.arange(len(U))
@@ -252,6 +256,14 @@ def find_turned_angle(event: "Event") -> np.ndarray:
         return integrate(2 * np.pi * (record.f - event.f0), record.step)
     steady = 2 * np.pi * (event.f0 - record.base.frequency) * record.step
     return record.U_angle - record.U_angle[0] - steady * np.arange(record.samples)
+
+
+def _measure_turn(event: "Event", turned: np.ndarray, near: int) -> float:
+    """By how much the voltage's angle `turned` (N,) [rad] moves within `near` samples of either
+    edge of the dip.
+    """
+    spans = (slice(max(0, k - near), k + near) for k in (event.start, event.end))
+    return max(float(np.ptp(turned[span])) for span in spans)
 
 
 @functools.lru_cache(maxsize=32)
