@@ -216,7 +216,7 @@ def spread_evenly(n: int, d: int) -> np.ndarray:
 
     Examples
     --------
-    >>> even(3, 1).ravel().round(3).tolist()
+    >>> spread_evenly(3, 1).ravel().round(3).tolist()
     [0.118, 0.736, 0.354]
     """
     ratio = 2.0

@@ -79,7 +79,7 @@ def normalize(text: str) -> str:
 
     Examples
     --------
-    >>> plain(" ＵＡ ")
+    >>> normalize(" ＵＡ ")
     'ua'
     """
     return unicodedata.normalize("NFKC", text).strip().lower().translate(CYRILLIC)
