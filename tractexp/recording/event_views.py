@@ -112,7 +112,8 @@ def propose_joining(path: str, view: View | None = None) -> str:
         if node is not None:
             names = join_words([Path(one).name for one in node["join"]])
             command = shell("tractexp", "look", path, format_assignment("join", node["join"]))
-            return f"with {names} beside it, of the same event, it shows a load: {command}"
+            shown = "more of the event is shown" if alone else "it shows a load"
+            return f"with {names} beside it, of the same event, {shown}: {command}"
     return ""
 
 
