@@ -705,7 +705,7 @@ def _conclude_identification(
     """The estimate that a search led to, and what stands behind it."""
     from tractexp.identification.advice import advise
     from tractexp.identification.agreement import compare_events
-    from tractexp.identification.grade import grade_playable, grade_playable_estimate
+    from tractexp.identification.grade import grade_estimate, grade_model
     from tractexp.identification.load_drift import with_load_drift
     from tractexp.identification.physical import find_free_optimum, say_ranges
     from tractexp.identification.profile import check_by_profiles
@@ -718,7 +718,7 @@ def _conclude_identification(
     problem = setup.problem
     refuse_failed(problem, end)
     shown = setup.model.shown
-    graded = grade_playable(problem, setup.validate, end.values, shown)
+    graded = grade_model(problem, setup.validate, end.values, shown)
     uncertainty = graded.uncertainty
     if setup.check_intervals:
         profiled = check_by_profiles(
@@ -730,7 +730,7 @@ def _conclude_identification(
     uncertainty = say_ranges(uncertainty, setup.model.held)
     if not np.array_equal(uncertainty.values, graded.values):  # a profile led to a better optimum
         moved = replace(graded.estimation, uncertainty=uncertainty)
-        graded = grade_playable_estimate(problem, moved, setup.validate, shown)
+        graded = grade_estimate(problem, moved, setup.validate, shown)
     fits, adequacy = list(graded.fits), graded.adequacy
     result = conclude(
         problem, end, graded.values, fits, setup.seed, setup.model.node, setup.optimizer.name

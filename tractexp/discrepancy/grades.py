@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tractexp.identification.grade import GradedModel, grade_playable
+from tractexp.identification.grade import GradedModel, grade_model
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
@@ -72,7 +72,7 @@ class Grader:
                 priors=self.priors,
             )
             start = self._choose_start(problem, found or {})
-            self.known[key] = grade_playable(problem, judged, start, self.shown)
+            self.known[key] = grade_model(problem, judged, start, self.shown)
         return self.known[key]
 
     def _choose_start(self, problem: Problem, found: Mapping[str, float]) -> np.ndarray | None:

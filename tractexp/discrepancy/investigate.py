@@ -211,7 +211,7 @@ class Findings:
         """
         graded = self.final_grade
         own = {p.name: p for p in self.catalogue.parameters(self.names)}
-        values = dict(zip(graded.problem.space.names, graded.values.tolist(), strict=True))
+        values = self._final_values
         told = [
             f"{name} rests on its bound, {values[name]:.4g}"
             for name in at_bound(graded.problem, graded.values)
@@ -227,12 +227,17 @@ class Findings:
         return tuple(told)
 
     @property
+    def _final_values(self) -> dict[str, float]:
+        """The values that the graded model searched, by name."""
+        graded = self.final_grade
+        return dict(zip(graded.problem.space.names, graded.values.tolist(), strict=True))
+
+    @property
     def is_absent(self) -> bool:
         """Whether all sizes of what was added are at their null in the graded model: then that is
         the base model.
         """
-        graded = self.final_grade
-        values = dict(zip(graded.problem.space.names, graded.values.tolist(), strict=True))
+        values = self._final_values
         sizes = self.catalogue.sizes(self.names)
         return all(
             p.name in values and abs(values[p.name] - p.absent) < LEAST_SIZE * np.ptp(p.bounds)

@@ -130,7 +130,8 @@ def grade_model(
     problem : Problem
         The model and the fitted events.
     validate : sequence of Event
-        Events held out, which the grade counts, too.
+        Events held out, which the grade counts, too; one without a steady state makes a wrong
+        model.
     searched : (d,) or None
         Free values that a search ended at; None: there was no search.
     shown : names
@@ -151,47 +152,6 @@ def grade_model(
     return grade_estimate(problem, estimation, validate, shown)
 
 
-def grade_playable(
-    problem: Problem,
-    validate: Sequence[Event] = (),
-    searched: np.ndarray | None = None,
-    shown: Collection[str] = (),
-) -> GradedModel:
-    """As `grade_model`; but a held-out event without a steady state makes a wrong model and no
-    refusal.
-    """
-    estimation = (
-        estimate_without_search(problem) if searched is None else estimate(problem, searched)
-    )
-    return grade_playable_estimate(problem, estimation, validate, shown)
-
-
-def grade_playable_estimate(
-    problem: Problem,
-    estimation: EstimationResult,
-    validate: Sequence[Event] = (),
-    shown: Collection[str] = (),
-) -> GradedModel:
-    """As `grade_estimate`; but a held-out event without a steady state makes a wrong model and no
-    refusal.
-    """
-    shared = problem.full(estimation.uncertainty.values)[0]
-    refusals = {
-        event.record.name: explain_refusal(problem.model, shared, event) for event in validate
-    }
-    playable = [event for event in validate if not refusals[event.record.name]]
-    graded = grade_estimate(problem, estimation, playable, shown)
-    if len(playable) == len(validate):
-        return graded
-    reasons = [f"{name} cannot be simulated ({why})" for name, why in refusals.items() if why]
-    sentence = (
-        f"{graded.adequacy.sentence}; {'; '.join(reasons)}: the model does not describe this load"
-    )
-    return replace(
-        graded, adequacy=replace(graded.adequacy, grade=Grade.WRONG_MODEL, sentence=sentence)
-    )
-
-
 def grade_estimate(
     problem: Problem,
     estimation: EstimationResult,
@@ -199,6 +159,8 @@ def grade_estimate(
     shown: Collection[str] = (),
 ) -> GradedModel:
     """The graded model of an estimate.
+
+    Held-out events that it cannot simulate, for it has no steady state there, make a wrong model.
 
     Parameters
     ----------
@@ -213,6 +175,30 @@ def grade_estimate(
     -------
     GradedModel
     """
+    shared = problem.full(estimation.uncertainty.values)[0]
+    refusals = {
+        event.record.name: explain_refusal(problem.model, shared, event) for event in validate
+    }
+    playable = [event for event in validate if not refusals[event.record.name]]
+    graded = _grade_played(problem, estimation, playable, shown)
+    if len(playable) == len(validate):
+        return graded
+    reasons = [f"{name} cannot be simulated ({why})" for name, why in refusals.items() if why]
+    sentence = (
+        f"{graded.adequacy.sentence}; {'; '.join(reasons)}: the model does not describe this load"
+    )
+    return replace(
+        graded, adequacy=replace(graded.adequacy, grade=Grade.WRONG_MODEL, sentence=sentence)
+    )
+
+
+def _grade_played(
+    problem: Problem,
+    estimation: EstimationResult,
+    validate: Sequence[Event],
+    shown: Collection[str],
+) -> GradedModel:
+    """The graded model of an estimate that can simulate all held-out events."""
     values = estimation.uncertainty.values
     fits = play(problem, values, validate)
     errors = model_errors(fits)

@@ -27,9 +27,8 @@ LONGEST_WINDOW = 2.0  # s about a time stamp: far more than any recorder average
 BEND_SECONDS = 0.05  # s on either side of a window around an edge, in which the voltage may bend
 BENT, CALM = 0.01, 3e-4  # pu: second differences of the voltage there, and elsewhere
 ERROR = 2e-4  # pu: how exactly the average voltage must be the recorded one, if its noise allows
-TURN_OVER_NOISE = (
-    15.0  # times that error [rad], by which an angle turns beside an edge: less is noise
-)
+# times that error [rad]: what an angle turns by beside an edge, and less is noise
+TURN_OVER_NOISE = 15.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +224,7 @@ def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Even
         return u[len(weights) // 2 :][: len(U)]
 
     record = event.record
-    turned = find_turned_angle(event)
+    turned = _find_turned_angle(event)
     if _measure_turn(event, turned, int(near)) <= TURN_OVER_NOISE * error:
         return replace(event, record=replace(record, U=undo(U)))
     u = undo(U * np.cos(turned)) + 1j * undo(U * np.sin(turned))
@@ -235,7 +234,7 @@ def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Even
     return replace(event, record=replace(record, U=np.abs(u), U_angle=angle, f=f))
 
 
-def find_turned_angle(event: "Event") -> np.ndarray:
+def _find_turned_angle(event: "Event") -> np.ndarray:
     """By how much the voltage's angle was recorded to turn, beside what it turned by before the
     dip.
 
