@@ -103,6 +103,11 @@ def test_clipping_at_the_limits_of_the_converter():
     assert of(raw, limits=(-32767, 32767)).clipped > 0.3
 
 
+def test_limits_beyond_the_samples_own_type_bound_nothing():
+    raw = (40 * np.cos(2 * np.pi * 50 * T)).astype(np.float32)
+    assert of(raw, limits=(-1e99, 1e99)).clipped == 0
+
+
 def test_gaps():
     x = CLEAN.copy()
     x[100:103] = np.nan

@@ -171,7 +171,8 @@ def _measure_clipped_share(
         return 0.0
     at = (x >= high - near) | (x <= low + near)
     if channel.limits is not None:
-        (least, most), raw = channel.limits, channel.raw[segment.first : segment.stop]
+        raw = channel.raw[segment.first : segment.stop]
+        least, most = np.float64(channel.limits)  # not cast down to the samples' own type
         at |= (raw <= least) | (raw >= most)
     flat = runs(at, max(CLIPPED, _blunt(x, segment.rate / f, near + step)))
     return sum(run.stop - run.start for run in flat) / len(x)
