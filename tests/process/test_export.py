@@ -17,7 +17,7 @@ from scipy.interpolate import Akima1DInterpolator
 
 import tractexp
 from tractexp.api.export import Exported
-from tractexp.api.identify import Identification
+from tractexp.api.identification import Identification
 from tractexp.configuration.plugin import build, discover
 from tractexp.errors import UserError
 from tractexp.exchange.circuit import TCircuit

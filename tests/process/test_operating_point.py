@@ -10,7 +10,7 @@ import pytest
 from test_export import OMEGA, VALUES, identified
 
 import tractexp
-from tractexp.api.identify import Identification
+from tractexp.api.identification import Identification
 from tractexp.errors import UserError
 from tractexp.exchange.circuit import TCircuit
 from tractexp.exchange.operating_point import OperatingPoint

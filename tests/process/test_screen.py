@@ -12,7 +12,7 @@ from screens import LINES, WIDTH, count_rows
 from test_export import identified
 
 import tractexp
-from tractexp.api.identify import Identification
+from tractexp.api.identification import Identification
 from tractexp.blocks import Table
 from tractexp.blocks.block import Report
 from tractexp.blocks.terminal import fold, show

@@ -23,6 +23,7 @@ from tractexp.inference.multistart import distinct
 from tractexp.inference.observed import Observed
 from tractexp.inference.problem import Problem
 from tractexp.noise import Noise
+from tractexp.report.fit_sentences import describe_search_end
 from tractexp.report.fit_tables import tabulate_search_end
 
 TRUTH = study.TYPICAL
@@ -123,7 +124,7 @@ def test_the_end_of_a_search_and_the_estimate_stand_in_one_table_with_a_word_whe
     table = tabulate_search_end(fit)
     by_name = {row[0]: row for row in table.rows}
     assert by_name["objective"][1:3] == [fit.result.search["objective"], fit.result.objective]
-    assert {n for n in fit.result.verdicts if by_name[n][4]} == {*fit.outside_interval}
+    assert {n for n in fit.result.verdicts if by_name[n][4]} == {*fit.parameters.outside_interval}
     far = replace(
         fit.result,
         search=fit.result.search
@@ -134,8 +135,8 @@ def test_the_end_of_a_search_and_the_estimate_stand_in_one_table_with_a_word_whe
     )
     away = replace(fit, result=far, behind=fit.behind)
     assert {row[0] for row in tabulate_search_end(away).rows if row[4]} >= {"T_m"}
-    assert "T_m" in away.end_of_search
-    assert "it stopped short of the minimum, at 2 times its objective" in away.end_of_search
+    assert "T_m" in describe_search_end(away)
+    assert "it stopped short of the minimum, at 2 times its objective" in describe_search_end(away)
 
 
 def test_equal_numbers_have_equal_digests_and_others_have_not():

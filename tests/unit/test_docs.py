@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tractexp.api.discrepancy import Misfit
+from tractexp.api.gap import Misfit
 from tractexp.configuration.plugin import discover
 from tractexp.exchange.operating_point import OperatingPoint
 from tractexp.identification.result import Result

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tractexp.api.arguments import public
-from tractexp.api.identify import Identification
+from tractexp.api.identification import Identification
 from tractexp.api.job import Job
 from tractexp.api.task import Task
 from tractexp.blocks import Report, Table

@@ -33,7 +33,7 @@ def load(path: str | Path) -> Outcome:
         Where the file is missing, damaged or of no kind known.
     """
     if Path(path).is_dir() or _is_bare_result(path):
-        from tractexp.api.identify import Identification
+        from tractexp.api.identification import Identification
         from tractexp.identification.result import load as read_result
 
         return Identification(read_result(Path(path)))

@@ -15,7 +15,8 @@ from tractexp.identification.search import REFUSED
 from tractexp.text import quoting
 
 if TYPE_CHECKING:
-    from tractexp.api.identify import Estimate, Identification
+    from tractexp.api.estimate import Estimate
+    from tractexp.api.identification import Identification
     from tractexp.api.job import Job
     from tractexp.identification.result import Result
 

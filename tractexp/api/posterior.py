@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tractexp.api.arguments import public
-from tractexp.api.identify import Identification
+from tractexp.api.identification import Identification
 from tractexp.api.job import Job
 from tractexp.api.task import Task
 from tractexp.blocks import Report, Table

@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
-from tractexp.api.identify import Identification
+from tractexp.api.identification import Identification
 from tractexp.api.job import Job
 from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
@@ -22,9 +22,9 @@ from tractexp.identification.result import load
 from tractexp.outcome import Drawing, Written
 
 if TYPE_CHECKING:
-    from tractexp.api.discrepancy import Investigation
     from tractexp.api.given import ModelGiven, Records
-    from tractexp.api.identify import Identification
+    from tractexp.api.identification import Identification
+    from tractexp.api.investigation import Investigation
 
 # a dip by hand, where nothing else is known
 BEFORE = {"U0": 1.0, "P0": 1.0, "Q0": 0.5, "frequency": 50.0}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
-from tractexp.api.identify import UNUSABLE, Identification
+from tractexp.api.identification import UNUSABLE, Identification
 from tractexp.api.job import Job
 from tractexp.api.listed import Listed
 from tractexp.api.station_load import LoadJob, fit_load, read_files

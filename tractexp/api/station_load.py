@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.api.compose import LoadModel, Portable
-from tractexp.api.identify import Identification
+from tractexp.api.identification import Identification
 from tractexp.api.read import record_from_dict, record_to_dict
 from tractexp.errors import UserError
 from tractexp.identification.composition import (

@@ -172,7 +172,9 @@ def _measure_clipped_share(
     at = (x >= high - near) | (x <= low + near)
     if channel.limits is not None:
         raw = channel.raw[segment.first : segment.stop]
-        least, most = np.float64(channel.limits)  # not cast down to the samples' own type
+        least, most = np.array(
+            channel.limits, dtype=float
+        )  # not cast down to the samples' own type
         at |= (raw <= least) | (raw >= most)
     flat = runs(at, max(CLIPPED, _blunt(x, segment.rate / f, near + step)))
     return sum(run.stop - run.start for run in flat) / len(x)

@@ -28,7 +28,7 @@ from tractexp.report.proposal import add_proposal_section, headlines
 from tractexp.text.wording import alternatives, as_sentence, count_noun, epsilon, join_words
 
 if TYPE_CHECKING:
-    from tractexp.api.discrepancy import Investigation as Outcome
+    from tractexp.api.investigation import Investigation as Outcome
 
 KIND = {
     "none": "good",

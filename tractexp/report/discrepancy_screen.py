@@ -11,7 +11,7 @@ from tractexp.report.screen import describe_load
 from tractexp.text.wording import alternatives, shorten
 
 if TYPE_CHECKING:
-    from tractexp.api.discrepancy import Investigation
+    from tractexp.api.investigation import Investigation
 
 MOST_SIZES = 3  # parameters of the effects named that the screen has room for
 

@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, Any
 from tractexp.blocks import Report
 from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.identification.yardstick import poles_in_words
+from tractexp.report.fit_sentences import describe_rivals, describe_search_end
 from tractexp.report.fit_tables import digits, errors, parameters
 from tractexp.report.race import tabulate_race
 from tractexp.text.wording import as_sentence, shown_in_words
 
 if TYPE_CHECKING:
-    from tractexp.api.identify import Identification
+    from tractexp.api.identification import Identification
 
 
 def summary(fit: "Identification") -> Report:
@@ -24,7 +25,7 @@ def summary(fit: "Identification") -> Report:
     if fit.headline:
         report.text(as_sentence(fit.headline))
     report.add(parameters(fit), *tabulate_race(result.race))
-    report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(
+    report.text(*machine(fit), *describe_rivals(fit), *filter(None, [result.on_given_base()])).add(
         errors(fit)
     )
     return report.text(
@@ -36,7 +37,7 @@ def summary(fit: "Identification") -> Report:
         *([headline(result)] if verdicts else []),
         *(f"  {sentence}" for sentence in poor),
         *notes,
-        *filter(None, [fit.end_of_search]),
+        *filter(None, [describe_search_end(fit)]),
         *(f"next: {sentence}" for sentence in fit.next_steps),
     )
 

@@ -11,7 +11,7 @@ from tractexp.report.fitted_curves import ROLES
 from tractexp.text.wording import epsilon
 
 if TYPE_CHECKING:
-    from tractexp.api.identify import Identification
+    from tractexp.api.identification import Identification
 
 EXACT = (
     "Nothing but noise is left: the estimate is the most likely set, noise whitened, the power"
@@ -69,13 +69,13 @@ def parameters(fit: "Identification") -> Table:
         fit.model.model.title,
         caption,
         words=(1, 3, 7),
-        detail=(1, 5) if fit.outside_interval else (1, 5, 6),
+        detail=(1, 5) if fit.parameters.outside_interval else (1, 5, 6),
     )
 
 
 def tabulate_search_end(fit: "Identification") -> Table:
     """Where the search ended beside the estimate, and a word where they differ."""
-    search, result, away = fit.result.search, fit.result, fit.outside_interval
+    search, result, away = fit.result.search, fit.result, fit.parameters.outside_interval
     keys = [("objective", "pu²"), ("epsilon_p", "1"), ("epsilon_q", "1")] if search else []
     rows = [[key, search[key], getattr(result, key), unit, ""] for key, unit in keys]
     rows += [

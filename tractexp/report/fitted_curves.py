@@ -22,7 +22,7 @@ from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, spectru
 from tractexp.text.wording import as_sentence, epsilon, join_words
 
 if TYPE_CHECKING:
-    from tractexp.api.identify import Identification
+    from tractexp.api.identification import Identification
 
 ROLES = {"train": "fitted", "validate": "held out"}
 MOST_OPEN_EVENTS = 4  # events whose curves are not folded away

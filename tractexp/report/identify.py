@@ -18,6 +18,7 @@ from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.record.identity import describe_identities, title
+from tractexp.report.fit_sentences import describe_rivals, describe_search_end
 from tractexp.report.fit_summary import headline, machine, samples, yardstick
 from tractexp.report.fit_tables import digits, errors, list_origin, parameters, tabulate_search_end
 from tractexp.report.fitted_curves import MOST_OPEN_EVENTS, ROLES, add_curves, add_next_dip
@@ -26,7 +27,7 @@ from tractexp.report.sliders import add_sliders
 from tractexp.text.wording import as_sentence, in_words
 
 if TYPE_CHECKING:
-    from tractexp.api.identify import Identification
+    from tractexp.api.identification import Identification
 
 KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
 CHANNELS = (style.ACTIVE, style.REACTIVE, style.PALETTE[2])  # of what is compared
@@ -66,7 +67,7 @@ def report(fit: "Identification") -> Report:
     if together is not None:
         _events(page, uncertainty, together)
     page.heading("The search and the estimate").add(tabulate_search_end(fit)).text(
-        as_sentence(fit.end_of_search)
+        as_sentence(describe_search_end(fit))
     )
     page.chart(
         _fitness(fit.search_result.history, result),
@@ -116,7 +117,7 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
     poor = [
         f"{name}: {v}." for name, v in verdicts if v.word != IDENTIFIED and name not in nuisances
     ]
-    page.items([*map(as_sentence, fit.structures), *poor])
+    page.items([*map(as_sentence, describe_rivals(fit)), *poor])
 
 
 def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:

@@ -26,7 +26,7 @@ from tractexp.text.wording import (
 )
 
 if TYPE_CHECKING:
-    from tractexp.api.identify import Identification
+    from tractexp.api.identification import Identification
 
 MOST_PARAMETERS = 10  # rows of the table of parameters
 MOST_EVENTS = 2  # events that a line names

@@ -14,13 +14,14 @@ from tractexp.exchange.format import choose_format
 from tractexp.exchange.rating import SOURCE, rate_machine
 from tractexp.identification.verdict import brief
 from tractexp.record.identity import describe_identities, title
+from tractexp.report.fit_sentences import describe_rivals
 from tractexp.report.fit_summary import name_verdicts
 from tractexp.report.fit_tables import error_rows, list_origin
 from tractexp.report.screen import choose_units, describe_load
 from tractexp.text.wording import as_sentence, count_noun, with_error
 
 if TYPE_CHECKING:
-    from tractexp.api.identify import Identification
+    from tractexp.api.identification import Identification
 
 PANEL_HEIGHTS = (0.8, 1.3, 1.3)
 CHART_PIXELS = 430
@@ -168,7 +169,7 @@ def _list_limits(fit: "Identification") -> list[str]:
     """The limits of the model's use, a sentence each."""
     said = [as_sentence(doubt) for doubt in fit.doubts]
     said += [f"{name} is {verdict}." for name, verdict in name_verdicts(fit.result).items()]
-    said += map(as_sentence, fit.structures)
+    said += map(as_sentence, describe_rivals(fit))
     if not fit.result.model_error.get("held_out"):
         said.append("No event was held out: how it predicts another dip is not known.")
     if not fit.result.base.in_mva:

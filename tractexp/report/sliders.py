@@ -17,7 +17,7 @@ from tractexp.text import quoting
 from tractexp.text.wording import as_sentence
 
 if TYPE_CHECKING:
-    from tractexp.api.identify import Identification
+    from tractexp.api.identification import Identification
 
 MOST_PAGE_STEPS = 20_000  # Runge-Kutta steps of the event: a browser takes some ten milliseconds
 

@@ -1,0 +1,27 @@
+"""The call of an identification, and the search that it asks for."""
+
+from dataclasses import dataclass
+
+from tractexp.api.arguments import Choice
+from tractexp.api.setup import Setup
+from tractexp.identification.search import SearchResult
+from tractexp.text.progress import Progress, tell
+
+# Hz: how far the frequency of a network strays around a fault, where nobody recorded it
+FREQUENCY_SWING = 0.2
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FitSpec(Setup):
+    """The records, the model and the settings of an identification."""
+
+    optimizer: Choice
+    check_intervals: bool = True
+    frequency_swing: float = FREQUENCY_SWING
+
+    def search_end(self, progress: Progress) -> SearchResult:
+        """Where the search ends; raises `UserError` where the input is wrong, before anything is
+        told.
+        """
+        tell(progress, [*self.lines(), f"optimizer: {self.optimizer.name}, seed {self.seed}"])
+        return self.search(self.optimizer, self.seed, progress)
