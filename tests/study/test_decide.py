@@ -78,6 +78,20 @@ def test_a_set_without_a_size_in_the_graded_model_is_the_base_model_whose_grade_
     assert word(row("a", is_absent=True), grade="adequate") == ("none", ())
 
 
+@pytest.mark.parametrize(
+    ("fitted", "held_out", "told"),
+    [(0.009, 0.009, "none"), (0.009, 0.011, "unexplained"), (0.011, 0.009, "unexplained")],
+)
+def test_a_base_model_that_leaves_less_than_matters_of_all_events_lacks_nothing(
+    fitted, held_out, told
+):
+    """A held-out dip too mild for what the fitted ones show does not hide that."""
+    base = off(error=held_out, deviance=100.0)
+    base = replace(base, fitted_error=off(error=fitted, deviance=0.0).prediction)
+    verdict = decide(Evidence(base, ()), Criteria())
+    assert (verdict.word, verdict.complete) == (told, False)
+
+
 def test_of_one_family_the_best_member_is_kept():
     member = replace(row("a_member", behind=2.0, gap=CONFIRMED), family=("a",))
     assert word(row("a", gap=CONFIRMED), member) == ("named", (("a",),))

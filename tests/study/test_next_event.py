@@ -19,14 +19,10 @@ import tractexp
 from hidden_effects import Case, Noise
 from hidden_effects.generator import scene
 from independent import Dip
-from tractexp.discrepancy.classes import (
-    LEAST_PARTING,
-    compare_predictions,
-    describe_classes,
-    group_alike,
-)
+from tractexp.discrepancy.classes import compare_predictions, describe_classes, group_alike
 from tractexp.discrepancy.decide import CONFIRMED_SHARE
 from tractexp.discrepancy.discrepancy_json import content
+from tractexp.discrepancy.evidence import SLIGHT_ERROR
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_event import rivals
 from tractexp.discrepancy.next_event.choose import DECIDED, LEAST_CHANCE, next_event
@@ -160,7 +156,7 @@ def test_what_is_recommended_stands_in_what_machines_read(tied):
 def test_what_is_tied_is_classes_with_the_dip_from_which_they_part(tied):
     told = content(tied)["classes"]
     assert [tuple(names) for one in told for names in one["sets"]] == [*tied.verdict.sets]
-    assert len(told) == 1 or all(one["by"] > LEAST_PARTING for one in told)
+    assert len(told) == 1 or all(one["by"] > SLIGHT_ERROR for one in told)
     assert tied.reason.endswith(describe_classes(tied.effect_classes))
     assert f"; {len(told)} class" in tied.reason or "; one class" in tied.reason
 
@@ -174,7 +170,7 @@ def test_sets_that_are_one_function_of_the_voltage_are_one_class(alike):
     pair = [every[0], every[2]]
     (one,) = compare_predictions(bench, pair, [fit.names for fit in pair], 0.0)
     assert one.part_at is None
-    assert one.by < LEAST_PARTING
+    assert one.by < SLIGHT_ERROR
     assert describe_classes([one]).startswith("one class: they predict alike within ")
     both, other = compare_predictions(bench, every, [fit.names for fit in every], 0.0)
     assert both.sets == (("stator_resistance",), ("leakage_loss",))

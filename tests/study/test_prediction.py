@@ -14,7 +14,7 @@ from hidden_effects import Case, Recorder, make
 from tractexp.blocks import Report
 from tractexp.configuration.plugin import get
 from tractexp.discrepancy.decide import decide, find_predicting
-from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
+from tractexp.discrepancy.evidence import SLIGHT_ERROR, Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.explain import explain, find_nearest_sets
 from tractexp.discrepancy.explanations import search_effect_sets
 from tractexp.discrepancy.investigate import investigate, is_end_of_range
@@ -207,9 +207,9 @@ def test_contributions_begin_with_the_member_that_helps_most():
 # a motor whose law nobody has
 
 
-def dips(depths=(0.5, 0.35, 0.6)):
-    """Dips of a load with a stator resistance and, unknown to all, a torque that swings with the
-    flux's history.
+def dips(depths=(0.5, 0.35, 0.6), share=0.25, swing=0.01):
+    """Dips of a load of which a share trips, with a stator resistance and, unknown to all, a torque
+    that swings with the flux's history.
     """
     rng, made = np.random.default_rng(11), []
     motor = compose(
@@ -225,7 +225,7 @@ def dips(depths=(0.5, 0.35, 0.6)):
         "T_m": 0.55,
         "p_v": 1.4,
         "q_v": 3.0,
-        "tripped_share": 0.25,
+        "tripped_share": share,
         "trip_level": 0.75,
         "trip_delay": 0.05,
         "reconnect_delay": 0.3,
@@ -242,7 +242,7 @@ def dips(depths=(0.5, 0.35, 0.6)):
         )
         response = motor.simulate(drive, row, 8).outputs[:, 0]
         unknown = (
-            0.01
+            swing
             * np.sin(2 * np.pi * 3.1 * (t - 0.1))
             * (t > 0.1)
             * depth
@@ -429,6 +429,19 @@ def test_by_the_size_of_the_error_the_same_family_is_chosen(inexact):
     assert (
         best[0].prediction.error * inexact.context.criteria.divides < evidence.base.prediction.error
     )
+
+
+@pytest.mark.long
+def test_what_is_less_than_matters_is_not_missing_though_noise_leaves_less():
+    """A swing of fifty times the noise beside nothing else."""
+    events = dips(share=0.0)
+    only = ("dc_link_lag",)
+    found = tractexp.investigate(events[:2], validate=events[2:], effects=only, progress=False)
+    assert found.verdict == "none", found.reason
+    base = found.steps.evidence.base
+    assert base.prediction.error < SLIGHT_ERROR
+    assert base.p_left < 1e-3
+    assert f"{in_percent(base.prediction.error)} of the held-out ones: more than" in found.reason
 
 
 def test_where_noise_hides_what_the_base_model_misses_no_set_can_divide_it():

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.discrepancy.evidence import SLIGHT_ERROR
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit
@@ -24,7 +25,6 @@ GRID_DEPTHS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
 GRID_DURATIONS = (0.04, 0.1, 0.2, 0.5, 1.0)  # s
 GRID_JUMPS = (0.0, 20.0)  # degrees
 GRID_UNBALANCES = (0.0, 0.5)  # of the depth
-LEAST_PARTING = 0.01  # of the response: less is no difference to anyone
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def compare_predictions(
         for fit in fits
     ]
     apart = np.array([measure_parting(power, drive, e) for e in range(len(dips))])
-    is_parted = apart > max(error, LEAST_PARTING)
+    is_parted = apart > max(error, SLIGHT_ERROR)
     classes = group_alike(np.logical_or.reduce(is_parted, axis=0))
     if len(classes) == 1:
         known = apart[np.isfinite(apart)]

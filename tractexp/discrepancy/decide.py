@@ -15,7 +15,9 @@ Several sets kept are tied. One is *named* where an event confirms it that took 
 it, or each of several that was left out in turn, where it has one or two effects, whose sizes are
 known within their bounds, and the model with it is not graded a wrong model; else it is a
 *candidate*. A set that has no size in the model that is graded is the base model, whose grade
-decides. Where none is kept the records agree with the base model, or they do not.
+decides. Where none is kept the records agree with the base model, or they do not. They do as well
+where it leaves more than noise, but less than matters: below `SLIGHT_ERROR` of the response, of the
+fitted and of the held-out events.
 """
 
 from collections.abc import Sequence
@@ -90,8 +92,9 @@ def decide(evidence: Evidence, criteria: Criteria) -> Verdict:
     elif kept:
         word = NAMED if is_sound(kept[0]) and is_confirmed(kept[0], evidence) else CANDIDATE
     else:
-        agrees = least_p >= criteria.adequate_p and find_adequate(evidence, criteria)
-        word = NONE if agrees or evidence.base.grade == ADEQUATE else UNEXPLAINED
+        agrees = least_p >= criteria.adequate_p and bool(find_adequate(evidence, criteria))
+        suffices = evidence.base.is_slight or evidence.base.grade == ADEQUATE
+        word = NONE if agrees or suffices else UNEXPLAINED
     return Verdict(word, tuple(kept), word != UNEXPLAINED and not evidence.is_predicted)
 
 

@@ -90,6 +90,8 @@ def recommendation(investigation: Findings) -> str:
         return recommend_confirmation(investigation)
     if investigation.verdict.word in (NAMED, CANDIDATE):
         return _recommend_use(investigation)
+    if investigation.evidence.is_predicted:
+        return "use the base model: what it misses is no difference to anyone"
     return (
         "use the base model; what is missing, if anything, is below the limits given for each"
         " effect"

@@ -24,6 +24,7 @@ from tractexp.noise import Noise
 
 FINEST = 0.1  # of the noise: a model's squared error is told no finer
 LEAST_SQUARED_ERROR = 1e-12  # pu^2, the least squared error of a model without noise
+SLIGHT_ERROR = 0.01  # of the response: less is no difference to anyone
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +108,7 @@ class SetEvidence:
     behind_of_all: float = 0.0  # the best fit to all events, of Akaike's criterion
     is_fitted_to_all: bool = False  # whether `final` is the fit to all events
     prediction: PredictedError | None = None
+    fitted_error: PredictedError | None = None  # the base model's on the fitted events
     grade: str = ""  # of the model with it, where one set alone is kept
     is_absent: bool = False  # whether all its sizes are at their null in the model that is graded
     # of its sizes: on a bound, or not known within their bounds, in words
@@ -129,6 +131,13 @@ class SetEvidence:
         """What it leaves of the held-out events, where that was asked."""
         assert self.prediction is not None
         return self.prediction
+
+    @property
+    def is_slight(self) -> bool:
+        """Whether it leaves less than matters of the fitted and of the held-out events."""
+        if self.prediction is None or self.fitted_error is None:
+            return False
+        return max(self.prediction.error, self.fitted_error.error) < SLIGHT_ERROR
 
     @property
     def reported_fit(self) -> Refit:

@@ -19,7 +19,7 @@ from tractexp.discrepancy.decide import (
     find_adequate,
     is_confirmed,
 )
-from tractexp.discrepancy.evidence import Evidence, SetEvidence
+from tractexp.discrepancy.evidence import SLIGHT_ERROR, Evidence, SetEvidence
 from tractexp.discrepancy.gap import DENIED, MILD, SHOWN, Curves, curves
 from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
@@ -181,6 +181,8 @@ def _explain_word(
     """Why the verdict is what it is, in a sentence."""
     sets = verdict.sets
     if evidence.is_predicted:
+        if verdict.word == NONE:
+            return _explain_slight(evidence.base)
         if not sets:
             return explain_distance(evidence, context)
         return describe_prediction(verdict, evidence, context)
@@ -206,6 +208,16 @@ def _explain_none(
     return (
         "no disagreement above the noise, at a false-alarm rate of"
         f" {context.criteria.false_alarms:.0%}"
+    )
+
+
+def _explain_slight(base: SetEvidence) -> str:
+    """How little the base model leaves, though more than noise."""
+    assert base.fitted_error is not None
+    return (
+        f"the base model misses {in_percent(base.fitted_error.error)} of the response of the fitted"
+        f" events and {_size(base)} of the held-out ones: more than noise, but no effect is sought"
+        f" in less than {SLIGHT_ERROR:.0%}"
     )
 
 

@@ -265,7 +265,8 @@ class Findings:
         beside them.
         """
         if not self.names:  # a window is part of the model where nothing is missing behind it
-            return self.grader.grade((), self.window) if self.verdict.complete else self.base_grade
+            is_none = self.verdict.word == NONE
+            return self.grader.grade((), self.window) if is_none else self.base_grade
         if not names:
             return self.base_grade
         held = self._select_held(names)

@@ -13,10 +13,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.discrepancy.classes import LEAST_PARTING
 from tractexp.discrepancy.decide import find_predicting
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
+from tractexp.discrepancy.evidence import (
+    SLIGHT_ERROR,
+    Evidence,
+    PredictedError,
+    SetEvidence,
+)
 from tractexp.discrepancy.explanations import (
     WIDELY,
     Explanations,
@@ -79,7 +83,8 @@ def predict_held_out(
 def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence | None:
     """The table of single effects, of sets of two, of a third beside the best two, and of what the
     search by likelihood ended with, by the model's error on the held-out events. The powers before
-    events are those measured, as in an identification. None as of `predict_held_out`.
+    events are those measured, as in an identification. Of the base model alone where it leaves less
+    than matters. None as of `predict_held_out`.
     """
     plain = explained.base.context.with_measured_power
     context, noise = plain.held_to_usual, residual_noise(plain, explained.chosen)
@@ -103,6 +108,9 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
 
     bare = _fit_base(context, explained, noise)
     (alone,) = fill(_fit_without_faults(context, noise, [bare]))
+    alone = replace(alone, fitted_error=predict(context, alone.fit))
+    if alone.is_slight:
+        return Evidence(alone, (), noise=noise, there=there)
     if alone.held_out_prediction.largest_factor <= criteria.divides:
         return None
     ground, refits = _search_all_sets(context, explained, noise, bare)
@@ -166,7 +174,7 @@ def search_third(
         return []
     pair = refits.get(best[0].fit.names, best[0].fit)
     families, of_load = context.catalogue.textbook(pair.names), context.catalogue.of_load
-    if best[0].held_out_prediction.error < LEAST_PARTING or not {*families} <= {*of_load}:
+    if best[0].held_out_prediction.error < SLIGHT_ERROR or not {*families} <= {*of_load}:
         return []
     beside = ground.score_fit(context, pair, ground.noise)
     return search_effect_sets([ground, beside], refits, len(pair.names) + 1, _say(context))
