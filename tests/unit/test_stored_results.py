@@ -11,7 +11,8 @@ import pytest
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.identification.result import load
+from tractexp.identification.result import load, parse_history, write_history
+from tractexp.identification.search import History
 from tractexp.tracking.model import Predictor, _load_pyfunc
 
 SENTENCES = {
@@ -122,3 +123,15 @@ def test_a_prediction_is_finite_and_as_before(sound):
     assert np.isfinite(answer.to_numpy()).all()
     assert answer["P"][0] == pytest.approx(0.8)
     assert np.array_equal(answer["P"], tractexp.load(sound).predict(**DIP).P)
+
+
+def test_a_history_is_read_as_it_was_written_and_one_without_rows_is_none(tmp_path):
+    """Without a warning: it is read in a thread, whose filters are those of all threads."""
+    history = History(np.array([10, 20]), np.array([0.5, 0.25]), np.zeros((2, 1)), np.ones(2))
+    text = write_history(tmp_path / "history.csv", history).read_text()
+    simulations, seconds, objective = parse_history(text)
+    assert (simulations.tolist(), seconds.tolist()) == ([10, 20], [1, 1])
+    assert objective.tolist() == [0.5, 0.25]
+    for without_rows in ("", text.partition("\n")[0] + "\n\n"):
+        with pytest.raises(ValueError, match="no row"):
+            parse_history(without_rows)

@@ -406,9 +406,10 @@ def parse_history(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What `write_history` wrote: simulations, seconds and the best objective so far [pu²], (n,)
     each. Raises `ValueError` for a text that is none.
     """
-    _, simulations, seconds, objective = np.loadtxt(
-        text.splitlines(), delimiter=",", skiprows=1, ndmin=2
-    ).T
+    rows = [line for line in text.splitlines()[1:] if line.strip()]
+    if not rows:
+        raise ValueError("the text has no row")
+    _, simulations, seconds, objective = np.loadtxt(rows, delimiter=",", ndmin=2).T
     return simulations, seconds, objective
 
 

@@ -8,7 +8,6 @@ sweep has ended loads no more.
 import contextlib
 import threading
 import time
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -231,9 +230,7 @@ def _read_curve(folder: Path) -> Curve | None:
 
     try:
         text = files.read_text(folder / "history.csv", files.RESULT)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # NumPy's about a file without a row
-            simulations, _, objective = parse_history(text)
+        simulations, _, objective = parse_history(text)
     except (OSError, ValueError, UserError):
         return None
     valid = objective < REFUSED
