@@ -1,42 +1,15 @@
-"""docs/start.md, docs/python.md and the notebook run as they stand, and what they show is what they
-say.
-"""
+"""docs/python.md and the notebook run as they stand, and what they show is what they say."""
 
-import json
 import re
 import shutil
 import warnings
 from pathlib import Path
 
 import pytest
-from test_tutorial import follow
 
 from tractexp import PUBLIC
 
 ROOT = Path(__file__).parents[2]
-
-
-def test_the_tutorial_prints_what_it_quotes_and_names_what_is_missing(tmp_path):
-    """Of the investigation three effects of the catalogue; .ci/run has one of all of them."""
-    only = ["task.effects=[stator_transients,stator_resistance,dc_link_lag]"]
-    printed, quotations = "", 0
-    for quoted, text in follow(tmp_path, {"model=auto": [], "task=discrepancy": only}):
-        words = " ".join(text.split())
-        if quoted:
-            assert words in printed
-            quotations += 1
-        else:
-            printed += " " + words
-    assert quotations == 2
-    for name in ("report.html", "discrepancy.html", "extended.yaml"):
-        assert list(tmp_path.glob(f"outputs/**/{name}")), name
-    (path,) = tmp_path.glob("outputs/runs/*/discrepancy.json")
-    made = json.loads(path.read_text())
-    # and no skew that the recorder's window looks like
-    assert (made["verdict"], made["effects"]) == ("named", ["stator_transients"])
-    gap = made["gap"]["validate"]
-    assert gap["closed"] > 0.9
-    assert gap["after"]["epsilon_p"] < 0.5 * gap["before"]["epsilon_p"]
 
 
 def test_the_examples_of_the_python_page_run(resistive_dips, tmp_path, monkeypatch):
