@@ -40,6 +40,28 @@ T_M = Parameter(
     power_exponent=1,
     physical=(0.05, 0.9),
 )
+MILANO = "Milano 2010, Power System Modelling and Scripting, ch. 15"
+T_SECOND = Parameter(
+    0.01, (0.001, 0.05), "s", "subtransient time constant X''/X' T0''", MILANO, "T''"
+)
+X_SECOND = Parameter(
+    0.2,
+    (0.03, 1.2),
+    "pu",
+    "subtransient reactance on the record's base",
+    MILANO,
+    "X''",
+    power_exponent=-1,
+)
+R_S = Parameter(
+    0.02,
+    (0.001, 0.2),
+    "pu",
+    "stator resistance on the record's base",
+    "Krause, Wasynczuk, Sudhoff 2002, ch. 4",
+    "R_s",
+    power_exponent=-1,
+)
 
 
 def usual(T_prime, X_prime, C, M, T_m):
@@ -94,6 +116,75 @@ def rotor(eq, E, inner, omega, current, T_prime, X_prime, C, T_m):
     load_torque = eq.place(sites.load_torque, T_m)
     flux = (I * X_prime * coupling * current - (1 - coupling) * E) / time_constant
     return flux + I * (omega - eq.omega_s) * E, electrical_torque - load_torque
+
+
+def two_cages(eq, draw, parameters):
+    """Declare two rotor circuits, the torque of both and the speed.
+
+    Parameters
+    ----------
+    eq : Equations
+    draw : callable
+        Gives the stator current for the voltage E'' behind the rotor's circuits.
+    parameters : 7 symbols
+        T', X', C, M, T_m, T'', X''.
+
+    Returns
+    -------
+    Symbol
+        The stator current.
+    """
+    from sympy import I
+
+    T_prime, X_prime, C, M, T_m, T_second, X_second = parameters
+    E, D, omega = eq.flux("E", "E"), eq.flux("D", "D"), eq.speed(r"\omega")
+    inner = eq.place(sites.internal_voltage, E + D, "E''")
+    current = eq.place(sites.stator_current, draw(inner))
+    flux, excess = rotor(eq, E, inner, omega, current, T_prime, X_prime, C, T_m)
+    open_second = T_second * X_prime / X_second  # T_0''
+    E_0, D_0, slip = _guess(eq, T_prime, X_prime, C, T_m, open_second, X_second)
+    second = (I * (X_prime - X_second) * current - D) / open_second
+    eq.moves(E, flux, E_0)
+    eq.moves(D, second + I * (omega - eq.omega_s) * D, D_0)
+    eq.moves(omega, excess / M, eq.omega_s0 - slip)
+    require_physical(eq, (T_prime, X_prime, M, T_second, X_second), C)
+    eq.require(
+        X_prime - X_second,
+        "X'' must be at most X', of which it exceeds {value:g} pu",
+        X_second - X_prime,
+    )
+    return current
+
+
+def _guess(eq, T_prime, X_prime, C, T_m, open_second, X_second):
+    """Voltages and slip [rad/s] near the steady state: what both cages carry at a slip just below
+    it.
+    """
+    from sympy import I
+
+    first, second = X_prime * C, X_prime - X_second  # X - X' over X/X', and X' - X''
+    slip = T_m * X_prime**2 / eq.U0**2 / (first * T_prime + second * open_second * (1 - C) ** 2)
+
+    def impedance(k, slip):
+        """What both cages put in a slip's way, and R + jX of the motor there."""
+        n_1, n_2 = (1 - C) ** 2 + (slip * T_prime) ** 2, 1 + (slip * open_second) ** 2
+        R = eq.define(
+            f"R_{k}", slip * (first * T_prime / n_1 + second * open_second / n_2), f"R_{k}"
+        )
+        return (
+            n_1,
+            n_2,
+            R,
+            eq.define(f"X_{k}", X_second + first * (1 - C) / n_1 + second / n_2, f"X_{k}"),
+        )
+
+    n_1, n_2, R, X = impedance(0, slip)
+    for k in range(3):
+        slip = eq.define(f"slip_{k}", slip * T_m * (R**2 + X**2) / (eq.U0**2 * R), f"s_{k}")
+        n_1, n_2, R, X = impedance(k + 1, slip)
+    current = eq.U0 * (R - I * X) / (R**2 + X**2)
+    E_0 = I * first * current * (1 - C - I * slip * T_prime) / n_1
+    return E_0, I * second * current * (1 - I * slip * open_second) / n_2, slip
 
 
 def at_rest(eq, T_prime, X_prime, C, T_m):

@@ -1,10 +1,8 @@
 """Fifth-order induction motor: two rotor cages, no stator transients."""
 
-from tractexp.extend import Motor, Parameter, plugin, sites
+from tractexp.extend import Motor, plugin, sites
 
 from . import _machine
-
-SOURCE = "Milano 2010, Power System Modelling and Scripting, ch. 15"
 
 
 @plugin
@@ -27,8 +25,8 @@ class DoubleCage(Motor):
     torque, which only a crawling motor carries on its second cage, may be refused.
 
     Not to be confused with `stator_flux`, the "fifth order" of machine textbooks, which has one
-    cage and stator transients; nor with `second_motor_group`, which is two machines with a speed
-    each.
+    cage and stator transients; nor with `double_cage_stator_flux`, which has both; nor with
+    `second_motor_group`, which is two machines with a speed each.
 
     Source: Milano 2010, ch. 15 (double-cage, fifth order); ANDES Motor5 for the same equations in d
     and q.
@@ -42,18 +40,7 @@ class DoubleCage(Motor):
         _machine.M,
         _machine.T_M,
     )
-    T_second = Parameter(
-        0.01, (0.001, 0.05), "s", "subtransient time constant X''/X' T0''", SOURCE, "T''"
-    )
-    X_second = Parameter(
-        0.2,
-        (0.03, 1.2),
-        "pu",
-        "subtransient reactance on the record's base",
-        SOURCE,
-        "X''",
-        power_exponent=-1,
-    )
+    T_second, X_second = _machine.T_SECOND, _machine.X_SECOND
 
     def usual(self, T_prime, X_prime, C, M, T_m):
         return _machine.usual(T_prime, X_prime, C, M, T_m)
@@ -61,53 +48,10 @@ class DoubleCage(Motor):
     def declare(self, eq, T_prime, X_prime, C, M, T_m, T_second, X_second):
         from sympy import I
 
-        E, D, omega = eq.flux("E", "E"), eq.flux("D", "D"), eq.speed(r"\omega")
         V = eq.V
         Z = eq.place(sites.stator_impedance, I * X_second, "Z''")
-        inner = eq.place(sites.internal_voltage, E + D, "E''")
-        current = eq.place(sites.stator_current, eq.branch("psi", r"\psi", V, Z, behind=inner))
-        flux, excess = _machine.rotor(eq, E, inner, omega, current, T_prime, X_prime, C, T_m)
-        open_second = T_second * X_prime / X_second  # T_0''
-        E_0, D_0, slip = self._guess(eq, T_prime, X_prime, C, T_m, open_second, X_second)
-        second = (I * (X_prime - X_second) * current - D) / open_second
-        eq.moves(E, flux, E_0)
-        eq.moves(D, second + I * (omega - eq.omega_s) * D, D_0)
-        eq.moves(omega, excess / M, eq.omega_s0 - slip)
-        _machine.require_physical(eq, (T_prime, X_prime, M, T_second, X_second), C)
-        eq.require(
-            X_prime - X_second,
-            "X'' must be at most X', of which it exceeds {value:g} pu",
-            X_second - X_prime,
+        return _machine.two_cages(
+            eq,
+            lambda inner: eq.branch("psi", r"\psi", V, Z, behind=inner),
+            (T_prime, X_prime, C, M, T_m, T_second, X_second),
         )
-        return current
-
-    @staticmethod
-    def _guess(eq, T_prime, X_prime, C, T_m, open_second, X_second):
-        """Voltages and slip [rad/s] near the steady state: what both cages carry at a slip just
-        below it.
-        """
-        from sympy import I
-
-        first, second = X_prime * C, X_prime - X_second  # X - X' over X/X', and X' - X''
-        slip = T_m * X_prime**2 / eq.U0**2 / (first * T_prime + second * open_second * (1 - C) ** 2)
-
-        def impedance(k, slip):
-            """What both cages put in a slip's way, and R + jX of the motor there."""
-            n_1, n_2 = (1 - C) ** 2 + (slip * T_prime) ** 2, 1 + (slip * open_second) ** 2
-            R = eq.define(
-                f"R_{k}", slip * (first * T_prime / n_1 + second * open_second / n_2), f"R_{k}"
-            )
-            return (
-                n_1,
-                n_2,
-                R,
-                eq.define(f"X_{k}", X_second + first * (1 - C) / n_1 + second / n_2, f"X_{k}"),
-            )
-
-        n_1, n_2, R, X = impedance(0, slip)
-        for k in range(3):
-            slip = eq.define(f"slip_{k}", slip * T_m * (R**2 + X**2) / (eq.U0**2 * R), f"s_{k}")
-            n_1, n_2, R, X = impedance(k + 1, slip)
-        current = eq.U0 * (R - I * X) / (R**2 + X**2)
-        E_0 = I * first * current * (1 - C - I * slip * T_prime) / n_1
-        return E_0, I * second * current * (1 - I * slip * open_second) / n_2, slip

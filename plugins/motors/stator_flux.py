@@ -1,10 +1,8 @@
 """Fifth-order induction motor: single cage with stator transients."""
 
-from tractexp.extend import Motor, Parameter, plugin, sites
+from tractexp.extend import Motor, plugin, sites
 
 from . import _machine
-
-SOURCE = "Krause, Wasynczuk, Sudhoff 2002, ch. 4"
 
 
 @plugin
@@ -41,14 +39,7 @@ class StatorFlux(Motor):
         _machine.M,
         _machine.T_M,
     )
-    R_s = Parameter(
-        0.02,
-        (0.001, 0.2),
-        "pu",
-        "stator resistance on the record's base",
-        SOURCE,
-        power_exponent=-1,
-    )
+    R_s = _machine.R_S
     within_a_cycle = True
 
     def usual(self, T_prime, X_prime, C, M, T_m, R_s):

@@ -14,7 +14,14 @@ from tractexp.configuration.plugin import discover, get
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 
-MOTORS = ("mechanical", "voltage", "electromechanical", "stator_flux", "double_cage")
+MOTORS = (
+    "mechanical",
+    "voltage",
+    "electromechanical",
+    "stator_flux",
+    "double_cage",
+    "double_cage_stator_flux",
+)
 STATICS = (
     "exponential",
     "zip",
@@ -189,7 +196,7 @@ def test_input_power_is_losses_and_shaft_power_and_what_is_stored(motor):
     e/(jx), of which the rotor supplies i_r = i - I through its resistance x/(T omega_n). What is
     stored, x |i|^2/(2 omega_n), changes at the rate x Re(i' i*)/omega_n; without stator transients
     the stator does not see the voltage i' induces, and only the rotor's share of that rate, x Re(i'
-    i_r*)/omega_n, is left. `stator_flux` also stores X' |I|^2/(2 omega_n).
+    i_r*)/omega_n, is left. With stator transients the leakage also stores X' |I|^2/(2 omega_n).
     """
     of, excitation = model(motor, "none"), dip(length=0.4)
     p = dict(zip(of.names, values(of), strict=True))
@@ -211,21 +218,23 @@ def test_input_power_is_losses_and_shaft_power_and_what_is_stored(motor):
         circuits = [(p["C"] * excitation.U / (1 - 1j * state["omega"] * p["T_prime"]), 0.0, x, T)]
     else:
         circuits = [(phasor(state, "E"), phasor(slope, "E"), x, T)]
-    if motor == "double_cage":
+    if motor in ("double_cage", "double_cage_stator_flux"):
         leakage, T = p["X_second"], p["T_second"] * p["X_prime"] / p["X_second"]
         circuits.append((phasor(state, "D"), phasor(slope, "D"), p["X_prime"] - leakage, T))
     E = sum(e for e, *_ in circuits)
-    psi = phasor(state, "psi") if motor == "stator_flux" else excitation.U / 1j
+    moves = motor in ("stator_flux", "double_cage_stator_flux")  # the stator's flux
+    psi = phasor(state, "psi") if moves else excitation.U / 1j
     current = (psi + 1j * E) / leakage
     lost = p.get("R_s", 0.0) * np.abs(current) ** 2
     stored = 0.0
     for e, rate, x, T in circuits:
         rotor = e / (1j * x) - current
         lost = lost + x / (T * OMEGA) * np.abs(rotor) ** 2
-        seen = e / (1j * x) if motor == "stator_flux" else rotor
+        seen = e / (1j * x) if moves else rotor
         stored = stored + x * (rate / (1j * x) * np.conj(seen)).real / OMEGA
-    if motor == "stator_flux":
-        change = (phasor(slope, "psi") + 1j * phasor(slope, "E")) / leakage
+    if moves:
+        rates = sum(rate for _, rate, *_ in circuits)
+        change = (phasor(slope, "psi") + 1j * rates) / leakage
         stored = stored + leakage * (change * np.conj(current)).real / OMEGA
     assert np.abs(stored).max() > 1e-4 or motor == "mechanical"
     assert pytest.approx(torque * (1 + state["omega"] / OMEGA) + lost + stored, abs=1e-9) == P
@@ -311,6 +320,28 @@ def test_fifth_order_at_slow_inputs_becomes_third_order():
     assert gaps[0] > 0.05
     assert gaps[1] < 0.2 * gaps[0]
     assert gaps[2] < 0.02 * gaps[0]
+
+
+def test_seventh_order_with_an_open_second_cage_is_fifth_order():
+    both = ({"X_second": VALUES["X_prime"]}, {})
+    assert gap("double_cage_stator_flux", "stator_flux", dip(swing=2.0), *both) < 1e-7
+
+
+def test_seventh_order_at_slow_inputs_becomes_a_double_cage():
+    """Without resistance the stator flux follows the voltage up to the offset an edge leaves."""
+    gaps = [
+        gap(
+            "double_cage_stator_flux",
+            "double_cage",
+            dip(length=4, duration=1, edge=e),
+            {"R_s": 1e-9},
+            {},
+            8,
+        )
+        for e in (0.02, 0.8)
+    ]
+    assert gaps[0] > 0.05
+    assert gaps[1] < 0.02 * gaps[0]
 
 
 def test_fifth_order_without_inputs_to_excite_it_is_third_order_with_resistance():

@@ -4,7 +4,7 @@ to dip, and how well each dip was predicted by those before it.
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from tractexp.cache.store import Store, environment, key
 from tractexp.configuration.overrides import format_assignment, survey_of
 from tractexp.configuration.plugin import get, plugin
 from tractexp.configuration.run_command import find_folder
+from tractexp.domain.averaging import RECORDED, check_window
 from tractexp.errors import DATA, UserError, among, check_choice, check_range
 from tractexp.exchange.format import choose_format
 from tractexp.identification.result import Result
@@ -172,6 +173,7 @@ def fit_station(
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
     physical: bool | None = None,
+    window: float | str | None = RECORDED,
     cores: int | None = None,  # processes; null: all cores
     backend: str = "loky",  # of joblib: processes of this computer, or dask
     address: str | None = None,  # of a Dask scheduler; null: a cluster of its own
@@ -190,6 +192,9 @@ def fit_station(
         A model with a motor; "auto" races structures on the dips of a load that tell most.
     bounds, fixed, substeps, physical : as in `tractexp.identify`
         Bounds of impedances and inertia are those of motors that draw the torque's default.
+    window : float [s], name, "recorded" or None
+        Over which the recorder averages phasors, as in `tractexp.compose`, where the model says
+        none; None: no model is looked at through it but those of what happens within a cycle.
     cores : int
         Processes that read and fit; None: all cores.
     backend, address : str
@@ -215,6 +220,9 @@ def fit_station(
     workers = Workers(cores or -1, backend, address, where="task")
     chosen = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "physical": physical}
     load = model_of(model).with_(**chosen)
+    if load.window is None:
+        load = replace(load, window=window)
+    check_window(load.window, load.domain)
     place = Path(folder)
     surveyed = call(survey, folder, cores=cores, keep=keep, progress=progress)
     rows = [row for row in surveyed.content["rows"] if row["worth"]]
@@ -317,7 +325,7 @@ def _fit_loads(
 
 
 @plugin
-class StationTask(Task, call=fit_station, given=("folder", "keep")):
+class StationTask(Task, call=fit_station, given=("folder", "keep", "window")):
     """Fit every load of a recorder to all dips in the folder `data.path`: constants of machines,
     shares of the motors by dip, hour, weekday and season, and how well dips were predicted.
 
@@ -342,7 +350,8 @@ class StationTask(Task, call=fit_station, given=("folder", "keep")):
                 f"{DATA.path} is missing: give the folder of the recordings, e.g."
                 f" {DATA.path}=recordings"
             )
-        return super().perform(job, folder=node["path"], keep=job.folder, **instead)
+        window = job.config["model"]["window"]
+        return super().perform(job, folder=node["path"], keep=job.folder, window=window, **instead)
 
     def collect_log(self, job: Job, result: Station) -> dict[str, Any]:
         """How many loads were fitted to how many dips, for MLflow."""

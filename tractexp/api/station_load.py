@@ -4,7 +4,7 @@ data.
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -38,11 +38,12 @@ from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
 from tractexp.inference.model_error import model_error
 from tractexp.process.workers import Workers
 from tractexp.record import Event, OwnBase, Record, detect
+from tractexp.record.thinning import thin_record
 from tractexp.recording import archive
 from tractexp.storage import files, time_limit
 
 KEPT_BEFORE, KEPT_AFTER = 0.6, 1.5  # s of a record before its dip and after it
-KEPT_RATE = 400.0  # Hz: phasors are means over a cycle, and years of dips are kept in memory
+KEPT_RATE = 400.0  # Hz, of phasors: years of dips are kept in memory
 MOST_RACED = 4  # dips on which structures are raced
 MOST_CURVES = 6  # dips that are drawn: the last ones that were predicted
 
@@ -82,7 +83,7 @@ def _cut_out(record: Record) -> Record:
     first = max(0, event.start - round(KEPT_BEFORE * rate))
     stop = min(record.samples, event.end + round(KEPT_AFTER * rate))
     every = max(1, round(rate / KEPT_RATE))
-    return replace(record.part(slice(first, stop, every)), waves=None)
+    return thin_record(record, every).part(slice(first // every, -(-stop // every)))
 
 
 def read_files(

@@ -510,15 +510,16 @@ class Equations:
         voltage: sympy.Expr,
         impedance: sympy.Expr,
         behind: sympy.Expr = NOTHING,
+        flux_moves: bool = False,
     ) -> sympy.Expr:
         """The current [pu] through a resistance and a reactance in series, R + jX, from `voltage`
         to that `behind`.
 
-        Phasors: (V - E)/(R + jX). Waves: (psi + jE)/X, where the flux linkage psi, a state of that
-        name, follows dpsi/dt = omega_n (V - R i) - j (omega_n + omega_s) psi, which at rest and at
-        nominal frequency is the same.
+        Phasors: (V - E)/(R + jX). Waves, and phasors where `flux_moves`: (psi + jE)/X, where the
+        flux linkage psi, a state of that name, follows dpsi/dt = omega_n (V - R i) - j (omega_n +
+        omega_s) psi, which at rest and at nominal frequency is the same.
         """
-        if not self.waves:
+        if not (self.waves or flux_moves):
             return (voltage - behind) / impedance
         R = re(impedance)
         X = im(impedance)
