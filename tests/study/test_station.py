@@ -17,6 +17,7 @@ from tractexp.api import station as station_call
 from tractexp.api import station_load
 from tractexp.errors import UserError
 from tractexp.identification.station import Dip, LoadSpec, fit_dips, predict_in_turn
+from tractexp.inference.sized_problem import SizedProblem
 from tractexp.record import OwnBase
 from tractexp.report import station
 
@@ -45,6 +46,14 @@ def test_the_constants_of_each_load_are_found_within_three_percent(fitted):
             assert found[name]["value"] == pytest.approx(truth, rel=0.03), name
         assert found["H"]["value"] == pytest.approx(machine["M"] * 50 * np.pi, rel=0.03)
         assert not any(row["spread"] for row in found.values())
+
+
+def test_through_the_recorders_window_constants_are_found_within_half_a_percent(fitted):
+    for load, machine in zip(fitted.content["loads"], MACHINES, strict=False):
+        assert load["model"]["window"] == "recorded"
+        found = {row["name"]: row for row in load["constants"]}
+        for name, truth in machine.items():
+            assert found[name]["value"] == pytest.approx(truth, rel=0.005), name
 
 
 def test_the_share_of_each_dip_is_found(fitted, made):
@@ -107,6 +116,23 @@ def test_a_motor_of_another_size_has_the_same_constants():
     assert found["X_prime"] == pytest.approx(0.15, rel=0.05)
     assert found["M"] == pytest.approx(0.011, rel=0.05)
     assert fit.torques == pytest.approx([0.4, 0.6], abs=0.01)
+
+
+def test_a_stator_resistance_goes_with_the_size_of_the_motors_and_a_capacitor_does_not():
+    effects = ["stator_resistance", "shunt_capacitor"]
+    model = tractexp.compose(effects=effects).model
+    problem = SizedProblem(model, [draw_dip(k).event for k in (0, 5)], {}, {})
+    values = (problem.lower + problem.upper) / 2
+    values[problem.shares] = 0.25, 0.75
+    first, second = (
+        dict(zip(model.names, row, strict=True)) for row in problem.by_event(values)[:, 0]
+    )
+    (capacitor,) = (
+        p.name for e in model.effects if e.name == "shunt_capacitor" for p in e.parameters
+    )
+    assert first["R_s"] == pytest.approx(3 * second["R_s"])
+    assert first["X_prime"] == pytest.approx(3 * second["X_prime"])
+    assert first[capacitor] == second[capacitor]
 
 
 def test_tables_of_one_folder_are_of_one_load(tmp_path, monkeypatch):
@@ -245,9 +271,13 @@ def test_a_load_that_no_dip_predicts_is_told(fitted):
     load["error"] = {"value": None, "interval": [None, None], "of_S": None, "stalls": ["a dip"]}
     for event in load["events"]:
         event |= {"predicted": None, "expected": None, "error": None}
+    row = station.tell_load(load)
+    assert (row["share"], row["spread"]) == (None, None)
     for text in (station.report(content).html, str(station.screen(content))):
         assert "the motor stalls" in text
         assert "unusable" in text
+        assert "not told" in text
+        assert "unusable: it stalls; so its dips tell nothing of the motors" in text
 
 
 def test_a_load_whose_dips_are_missed_is_unusable(tmp_path):

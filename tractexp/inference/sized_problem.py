@@ -14,7 +14,9 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.inference.problem import Problem, narrow_bounds
 from tractexp.inference.separable import SeparableColumns
+from tractexp.model import sites
 from tractexp.model.model import Model
+from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 from tractexp.record import Event
 
@@ -46,6 +48,14 @@ def find_torque(model: Model) -> Parameter:
     )
 
 
+def acts_on_motors(effect: Effect) -> bool:
+    """Whether every place where an effect acts is the motor's own, so that its parameters go with
+    the motor's size.
+    """
+    names = [name for place in effect.places for name in sites.PLACES[place]]
+    return bool(effect.places) and all(sites.SITES[name].owner == "motor" for name in names)
+
+
 class SizedProblem(Problem):
     """A problem whose motors are of another size in each event.
 
@@ -59,7 +69,8 @@ class SizedProblem(Problem):
     reference : float
         Power [pu] that motors draw whose constants are the free values.
     exponents : (p,) ints
-        k of each parameter of the model; 0 of the torque and of what is no motor's.
+        k of each parameter of the model; 0 of the torque and of what is neither a motor's nor an
+        effect's that acts on motors alone, as a stator resistance does.
     """
 
     def __init__(
@@ -90,7 +101,8 @@ class SizedProblem(Problem):
             )
         (torque,) = narrow_bounds([own], {k: v for k, v in bounds.items() if k == own.name})
         self.torque, self.reference = torque.name, torque.default
-        exponents = {p.name: p.power_exponent for p in model.motor.parameters}
+        parts = [model.motor, *filter(acts_on_motors, model.effects)]
+        exponents = {p.name: p.power_exponent for part in parts for p in part.parameters}
         exponents[torque.name] = 0
         self.exponents = np.array([exponents.get(name, 0) for name in model.names])
         self._at = model.names.index(torque.name)

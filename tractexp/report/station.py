@@ -25,7 +25,8 @@ TERM_NAMES = {
     "season": "month",
     "year": "year, from the first dip on",
 }
-VERDICTS = {"usable": "good", "unusable": "bad"}
+UNUSABLE = "unusable"
+VERDICTS = {"usable": "good", UNUSABLE: "bad"}
 ON_OWN = "per unit of what the motors draw"
 CONSTANTS_CAPTION = (
     f"Impedances and inertia are {ON_OWN} before the dip, so that they are the same however many of"
@@ -43,7 +44,8 @@ TIME_CAPTION = (
 def tell_load(load: Mapping[str, Any]) -> dict[str, Any]:
     """The row of a load."""
     constants = {row["name"]: row for row in load["constants"]}
-    share, predicted = load["share"], load["predicted"]
+    predicted = load["predicted"]
+    share = load["share"] if load["usability"] != UNUSABLE else {"value": None, "spread": None}
     return {
         "station": load["station"],
         "load": load["load"],
@@ -68,7 +70,7 @@ def tabulate_loads(content: Mapping[str, Any]) -> Table:
             load["load"] or load["station"],
             load["dips"],
             load["usability"],
-            _tell_share(load["share"]),
+            _tell_share(load),
             tell_error(load["error"]),
             _percent(load["predicted"]["last_half"]),
         ]
@@ -79,7 +81,11 @@ def tabulate_loads(content: Mapping[str, Any]) -> Table:
     return Table(columns, rows, f"loads of {content['folder']}", words=(2, 3, 4, 5))
 
 
-def _tell_share(share: Mapping[str, Any]) -> str:
+def _tell_share(load: Mapping[str, Any]) -> str:
+    """Nothing where the model does not describe the load: then no part of it is a motor's share."""
+    share = load["share"]
+    if load["usability"] == UNUSABLE:
+        return "not told"
     return f"{share['value']:.0%} ± {share['spread']:.1%}"
 
 
@@ -149,6 +155,8 @@ def describe_load(load: Mapping[str, Any]) -> str:
 
 def _tell_variation(load: Mapping[str, Any]) -> str:
     """By what the share differs."""
+    if load["usability"] == UNUSABLE:
+        return "so its dips tell nothing of the motors' share"
     share, terms = load["share"], load["composition"]["terms"]
     spread = f"{share['spread']:.1%} of P"
     if not terms:
