@@ -27,25 +27,15 @@ ROWS = Path(__file__).with_suffix(".json")
 SERIES = "auto"
 
 
-CAGES = "double cage and resistance"  # of Motor5: in no choice of the race
-
-
 def name_truth(truth: dict[str, Any]) -> str:
-    """The choice of model whose motor and effects the load has, or `CAGES`."""
+    """The choice of model whose motor and effects the load has."""
     if truth["kind"] == "Motor5":
-        return CAGES
+        return "fifth_order_double_cage_resistance"
     has_resistance = truth["motor"]["rs"] > 1e-5
     return "third_order_resistance" if has_resistance else "third_order_zip"
 
 
-def compose_truth(name: str) -> Any:
-    """The model of that name."""
-    if name != CAGES:
-        return tractexp.compose(name)
-    return tractexp.compose(motor="double_cage", static="zip", effects=["stator_resistance"])
-
-
-def predict(model: Any, fitted: Sequence[Any], held: Sequence[Any]) -> float:
+def predict(model: str, fitted: Sequence[Any], held: Sequence[Any]) -> float:
     """The model's error of the dips that judge, as a fraction of their response."""
     fit = tractexp.identify(
         fitted,
@@ -85,7 +75,7 @@ def judge(number: int) -> dict[str, Any]:
     if won == true:
         return row | {"verdict": "right"}
     try:
-        errors = {name: predict(compose_truth(name), fitted, held) for name in (won, true)}
+        errors = {name: predict(name, fitted, held) for name in (won, true)}
     except UserError as error:
         return row | {"verdict": "not judged", "why": str(error)}
     equal = errors[won] <= AS_GOOD * errors[true]

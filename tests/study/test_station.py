@@ -3,6 +3,7 @@ motors in each, and each dip predicted by those before it.
 """
 
 import copy
+import importlib.util
 import json
 import shutil
 from pathlib import Path
@@ -150,6 +151,20 @@ def test_tables_of_one_folder_are_of_one_load(tmp_path, monkeypatch):
     assert "dip, by its number" in found.report().html
     monkeypatch.setattr(station_call, "find_folder", lambda: None)  # as from Python
     assert found.next_step.startswith(f"find what {names[0]} lacks at its deepest dips: tractexp")
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("distributed") is None,
+    reason="Dask is not installed: pip install 'tractexp[dask]'",
+)
+def test_a_cluster_fits_the_same(tmp_path):
+    for k in (0, 5):
+        draw_frame(k).to_csv(tmp_path / f"dip{k}.csv", index=False)
+    of_cluster, own = (
+        tractexp.fit_station(tmp_path, cores=1, backend=backend, progress=False)
+        for backend in ("dask", "loky")
+    )
+    assert of_cluster.content == own.content
 
 
 def test_what_was_read_and_fitted_is_not_done_again(fitted, made, monkeypatch):

@@ -99,6 +99,22 @@ def test_a_course_of_the_frequency_that_explains_what_is_left_is_a_candidate(bli
     assert "a candidate of the measurement, and no effect of the load" in told
 
 
+def test_an_investigation_tells_the_course_where_no_effect_explains_what_is_left(swinging):
+    """Here only some effects are tested, none of which swings."""
+    columns = {name: x for name, x in swinging.items() if name != "f"}
+    found = tractexp.investigate(
+        tractexp.read(columns),
+        "third_order_impedance",
+        effects=["stator_resistance"],
+        progress=False,
+    )
+    assert (found.verdict, found.names) == ("unexplained", ())
+    course = found.content["frequency_course"]
+    assert course["error"] < 0.25 * course["error_without"]
+    assert found.content["recommendation"].startswith("record f or U_angle: a frequency that")
+    assert "record f or U_angle" in found.report().html
+
+
 def test_what_a_load_has_and_the_model_lacks_is_no_course_of_the_frequency():
     """A motor whose flux decays, fitted by one whose flux follows at once."""
     plain = {name: x for name, x in record(0.0).items() if name != "f"}

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 
 from tractexp.api.arguments import Choice
 from tractexp.api.setup import Setup
+from tractexp.identification.frequency_course import FREQUENCY_SWING
 from tractexp.identification.search import SearchResult
 from tractexp.text.progress import Progress, tell
-
-# Hz: how far the frequency of a network strays around a fault, where nobody recorded it
-FREQUENCY_SWING = 0.2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

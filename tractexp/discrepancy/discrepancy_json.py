@@ -56,6 +56,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
         "remainder": _remainder(investigation),
+        "frequency_course": _tell_course(investigation),
         "proposal": proposal_dict(investigation.proposed, PLUGIN),
         "no_proposal": investigation.proposed.why or None,
         "recommendation": recommendation(investigation),
@@ -75,9 +76,17 @@ def content(investigation: Findings) -> dict[str, Any]:
     }
 
 
+def _tell_course(investigation: Findings) -> dict[str, Any] | None:
+    """The course of a frequency that nobody recorded, where it explains what no effect does."""
+    course = investigation.frequency_course
+    return None if course is None else course.to_dict()
+
+
 def recommendation(investigation: Findings) -> str:
     """What to do next, one sentence."""
     chosen = investigation.next_event
+    if (course := investigation.frequency_course) is not None:
+        return f"record f or U_angle: {course}"
     if chosen is not None and investigation.verdict.word == TIED:
         return chosen.sentence()
     if (proposal := investigation.proposed.proposal) is not None:

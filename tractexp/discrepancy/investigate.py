@@ -49,6 +49,12 @@ from tractexp.discrepancy.replication import replicate
 from tractexp.discrepancy.rival_sets import compare_rivals
 from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.domain import domain_of
+from tractexp.identification.frequency_course import (
+    FREQUENCY_SWING,
+    FrequencyCourse,
+    find_course,
+    is_frequency_unknown,
+)
 from tractexp.identification.grade import GradedModel
 from tractexp.identification.result import at_bound
 from tractexp.identification.verdict import UNIDENTIFIED, size
@@ -338,6 +344,17 @@ class Findings:
             for name, value in self.undetermined_values.items()
         ]
         return [*self.final_grade.parameters, *held]
+
+    @functools.cached_property
+    def frequency_course(self) -> FrequencyCourse | None:
+        """The course of a frequency that nobody recorded which explains what no effect does; None
+        where there is none, or where an effect explains it.
+        """
+        uncertainty = self.base_grade.uncertainty
+        unknown = is_frequency_unknown(uncertainty.likelihood.problem)
+        if not unknown or self.verdict.word != UNEXPLAINED:
+            return None
+        return find_course(uncertainty, FREQUENCY_SWING)
 
     @functools.cached_property
     def remainder(self) -> list[Remainder]:

@@ -21,6 +21,8 @@ from tractexp.record import Event
 if TYPE_CHECKING:
     from tractexp.identification.uncertainty import Uncertainty
 
+# Hz: how far the frequency of a network strays around a fault, where nobody recorded it
+FREQUENCY_SWING = 0.2
 # Hz: swings of one machine against others, and of areas against each other (Kundur 1994, ch. 12)
 SWINGS = (0.3, 0.7, 1.5)
 FALL = 1.0  # s: within which the frequency follows a lost balance of power
@@ -80,6 +82,12 @@ def drive_by_frequency(problem: Problem, deviations: Sequence[np.ndarray]) -> Pr
         record = replace(event.record, f=nominal + deviation)
         events.append(replace(event, record=record, f0=nominal))
     return problem.driven_by(events)
+
+
+def is_frequency_unknown(problem: Problem) -> bool:
+    """Whether some event of a problem says nothing of the frequency, and may have had another."""
+    shipped = any(event.record.is_shipped for event in problem.events)
+    return problem.domain.lacks_frequency(problem.events) and not shipped
 
 
 def find_course(uncertainty: "Uncertainty", swing: float) -> FrequencyCourse | None:

@@ -17,6 +17,7 @@ from tractexp.identification.frequency_course import (
     FrequencyCourse,
     drive_by_frequency,
     find_course,
+    is_frequency_unknown,
     list_falls,
     list_swings,
 )
@@ -72,8 +73,7 @@ def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
         An identified parameter that the swing moves too far is weakly identified.
     """
     problem = uncertainty.likelihood.problem
-    unknown = problem.domain.lacks_frequency(problem.events)
-    if swing <= 0 or not unknown or any(event.record.is_shipped for event in problem.events):
+    if swing <= 0 or not is_frequency_unknown(problem):
         return uncertainty
     moved = np.abs(_find_moves(uncertainty, swing))
     if not moved.any():
