@@ -25,11 +25,11 @@ class Andes(Format):
     """Tables of an ANDES case in JSON: the bus, the motor, and the static load with the PQ it
     replaces.
 
-    `electromechanical`, and `stator_flux` without its transients, is Motor3 and `double_cage`
-    Motor5, on a machine base equal to that of the export, with constant load torque (c1, which
-    ANDES reads per unit of the system) and the T-circuit of `tractexp.exchange.circuit`;
-    `exponential` and `exponential_frequency` are FLoad, the other static loads ZIP. Add the tables
-    to a case and connect the bus.
+    `electromechanical`, and `stator_flux` without its transients, is Motor3; `double_cage`, and
+    `double_cage_stator_flux` without its transients, is Motor5. Their machine base is that of the
+    export, with constant load torque (c1, which ANDES reads per unit of the system) and the
+    T-circuit of `tractexp.exchange.circuit`; `exponential` and `exponential_frequency` are FLoad,
+    the other static loads ZIP. Add the tables to a case and connect the bus.
 
     Not to be confused with a complete case: there is no source in it.
 
@@ -39,7 +39,7 @@ class Andes(Format):
     """
 
     suffix = ".json"
-    motors = ("electromechanical", "stator_flux", "double_cage", "none")
+    motors = ("electromechanical", "stator_flux", "double_cage", "double_cage_stator_flux", "none")
     statics = (
         "exponential",
         "exponential_frequency",

@@ -36,7 +36,10 @@ class PowerFactory(Format):
 
     suffix = ".dgs"
     motors = ("electromechanical", "stator_flux", "none")
-    lacks = {"double_cage": "no open reader of DGS names the columns of a second cage"}
+    lacks = dict.fromkeys(
+        ("double_cage", "double_cage_stator_flux"),
+        "no open reader of DGS names the columns of a second cage",
+    )
     statics = ("exponential", "zip", "constant_impedance", "branch", "constant_power", "none")
     effects = ("stator_resistance",)
 

@@ -13,7 +13,7 @@ class PsseDyr(Format):
 
     CIM5BL: bus, model, load, IT, RA, XA, XM, R1, X1, R2, X2, E1, S(E1), E2, S(E2), MBASE, PMULT, H,
     VI, TI, TB, D, TNOM. Type 1, no saturation, constant torque (D = 0), no undervoltage trip (VI =
-    0); MBASE is the export's base. R2 = X2 = 0 is a single cage; of `stator_flux` the stator's
+    0); MBASE is the export's base. R2 = X2 = 0 is a single cage; of a stator flux that moves the
     transients are left out. IEELBL: three terms a V^n each for P and for Q, then the frequency
     coefficients, then the exponents, n1..n6; coefficients are divided by U_0^n, because V is the
     bus voltage and not U/U_0.
@@ -27,7 +27,7 @@ class PsseDyr(Format):
     """
 
     suffix = ".dyr"
-    motors = ("electromechanical", "stator_flux", "double_cage", "none")
+    motors = ("electromechanical", "stator_flux", "double_cage", "double_cage_stator_flux", "none")
     statics = ("exponential", "zip", "constant_impedance", "branch", "constant_power", "none")
     effects = ("stator_resistance",)
 

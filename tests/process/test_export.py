@@ -129,6 +129,11 @@ def test_the_andes_tables_hold_the_load(motor, static):
         assert tables["Motor3"][0]["c1"] == pytest.approx(VALUES["T_m"] / 2)
 
 
+def test_of_two_cages_and_a_stator_flux_andes_has_the_cages():
+    tables = json.loads(write("andes", identified("double_cage_stator_flux")))
+    assert tables["Motor5"][0]["rs"] == pytest.approx(VALUES["R_s"])
+
+
 def dyr(text):
     """{model: (bus, load, constants)} of a .dyr file, read by its own rules: free format, records
     end with a slash.
@@ -142,14 +147,14 @@ def dyr(text):
     return records
 
 
-@pytest.mark.parametrize("motor", ["electromechanical", "double_cage"])
+@pytest.mark.parametrize("motor", ["electromechanical", "double_cage", "double_cage_stator_flux"])
 def test_the_dyr_motor_gives_back_what_was_identified(motor):
     bus, load, c = dyr(write("psse_dyr", identified(motor, bus=12)))["CIM5BL"]
     assert (bus, load, len(c), c[0]) == (12, "M", 20, 1)
     circuit = TCircuit(OMEGA, *c[1:6], *([None, None] if motor == "electromechanical" else c[6:8]))
     assert circuit.X_prime == pytest.approx(VALUES["X_prime"], rel=1e-6)
     assert circuit.T0_prime == pytest.approx(VALUES["T_prime"] / (1 - VALUES["C"]), rel=1e-6)
-    if motor == "double_cage":
+    if motor != "electromechanical":
         assert circuit.X_second == pytest.approx(VALUES["X_second"], rel=1e-6)
     assert c[8:12] == [0, 0, 0, 0]
     assert c[12:15] == pytest.approx([100.0, 1.0, 0.006 * OMEGA / 2])
