@@ -153,6 +153,7 @@ def test_tables_of_one_folder_are_of_one_load(tmp_path, monkeypatch):
     assert found.next_step.startswith(f"find what {names[0]} lacks at its deepest dips: tractexp")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(
     importlib.util.find_spec("distributed") is None,
     reason="Dask is not installed: pip install 'tractexp[dask]'",
@@ -267,6 +268,14 @@ def test_a_model_that_cannot_be_shared_is_told_of_each_load(made, settings, sent
 def test_the_spread_of_single_dips_is_told(fitted):
     for load in fitted.loads:
         assert load["spread"] < 6 * SCATTER
+
+
+def test_what_dips_before_stayed_below_is_no_matter_of_odd_or_later_ones():
+    errors = [None, 0.02, 9.0, *([0.01] * 30), 0.5]
+    odd = np.array([error == 9.0 for error in errors])
+    limits = station.find_limits(errors, odd)
+    assert np.isnan(limits[:2]).all()
+    assert limits[2:].tolist() == [0.02] * 21 + [0.01] * 11
 
 
 def test_the_answer_is_one_screen(fitted):

@@ -92,11 +92,9 @@ class Apart:
         """The speed of this group."""
         return self._eq.speed(self._latex(latex), "omega" + self._suffix)
 
-    def branch(
-        self, name: str, latex: str, *circuit: sympy.Expr, **behind: sympy.Expr
-    ) -> sympy.Expr:
+    def branch(self, name: str, latex: str, *circuit: sympy.Expr, **further: Any) -> sympy.Expr:
         """The current of a branch of this group."""
-        return self._eq.branch(name + self._suffix, self._latex(latex), *circuit, **behind)
+        return self._eq.branch(name + self._suffix, self._latex(latex), *circuit, **further)
 
     def require(self, slack: sympy.Expr, sentence: str, shown: sympy.Expr | None = None) -> None:
         """A condition on this group's parameters, whose sentence names the group."""

@@ -9,6 +9,7 @@ is the one it had and this one, so that a model may be looked at through both.
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tractexp.record.angle import integrate
 from tractexp.record.record import Record
@@ -37,7 +38,7 @@ def thin_record(record: Record, every: int) -> Record:
     ramp = np.arange(1, every)
     weights = np.concatenate([ramp, [every], ramp[::-1]]) / every**2
     turned = _find_angle(record)
-    u = record.U * np.exp(1j * turned)
+    u: NDArray[np.complex128] = record.U * np.exp(1j * turned)
     mean = average(u.real, weights) + 1j * average(u.imag, weights)
     P, Q = averaged_power(np.stack([record.P, record.Q]), u, weights)
     averaged = {

@@ -12,6 +12,7 @@ import numpy as np
 from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
 from tractexp.identification.composition import DAYS_A_YEAR, HOUR
+from tractexp.inference.interval import INTERVAL_LEVEL
 from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.text.wording import count_noun, list_first, shorten
 
@@ -36,7 +37,8 @@ CONSTANTS_CAPTION = (
 LEAST_DATED_SPAN = 1.0  # years: dips of a shorter span are drawn by their numbers
 MOST_NUMBERED = 20  # dips, each with a tick of its own
 TIME_CAPTION = (
-    "Above: the model's error on each dip, of its response, as those before it predict it. Below:"
+    "Above: the model's error on each dip, of its response, as those before it predict it, and the"
+    " error that 95 % of the dips predicted until then stayed below. Below:"
     " the motors' share of P in each dip, and what was expected of it. Crosses: left out."
 )
 
@@ -293,12 +295,44 @@ def _draw_years(load: Mapping[str, Any]) -> Chart:
             hover=hover,
         )
 
+    limits = 100 * find_limits([event["predicted"] for event in events], odd)
+    chart.line("95 % of the dips before", x, limits, style.FAINT, 0, step=True)
     add("error as predicted", "predicted", ~odd, 0, style.ACTIVE)
     if odd.any():
         add("left out", "predicted", odd, 0, style.ACTIVE, "x")
     add("motors of each dip", "share", ~odd, 1, style.REACTIVE)
     add("motors expected", "expected", ~odd, 1, style.FAINT, "diamond-open")
     return chart
+
+
+def find_limits(errors: Sequence[float | None], odd: np.ndarray) -> np.ndarray:
+    """The error that 95 % of the dips predicted before each stayed below.
+
+    Parameters
+    ----------
+    errors : E numbers
+        Of dips in order of time; None of one that was not predicted.
+    odd : (E,) bools
+        Dips that set no limit.
+
+    Returns
+    -------
+    (E,) array
+        nan where none was predicted before.
+
+    Examples
+    --------
+    >>> find_limits([None, 0.1, 0.3, 0.2], np.zeros(4, dtype=bool)).tolist()
+    [nan, nan, 0.1, 0.3]
+    """
+    limits = np.full(len(errors), np.nan)
+    seen: list[float] = []
+    for k, error in enumerate(errors):
+        if seen:
+            limits[k] = np.quantile(seen, INTERVAL_LEVEL, method="higher")
+        if error is not None and np.isfinite(error) and not odd[k]:
+            seen.append(error)
+    return limits
 
 
 def _year(when: str) -> float:
