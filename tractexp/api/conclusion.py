@@ -37,76 +37,102 @@ def conclude_identification(
     setup: FitSpec, end: SearchResult, progress: Progress = False
 ) -> tuple[Result, FitDetails]:
     """The estimate that a search led to, and what stands behind it."""
-    from tractexp.identification.advice import advise
     from tractexp.identification.agreement import compare_events
     from tractexp.identification.grade import grade_estimate, grade_model
-    from tractexp.identification.load_drift import with_load_drift
-    from tractexp.identification.physical import find_free_optimum, say_ranges
-    from tractexp.identification.profile import check_by_profiles
-    from tractexp.identification.rivals import with_rivals
-    from tractexp.identification.share import find_share_bound
-    from tractexp.identification.unfinished import with_unfinished
-    from tractexp.identification.unrecorded import with_unrecorded
-    from tractexp.identification.yardstick import yardstick
 
-    problem = setup.problem
+    problem, shown = setup.problem, setup.model.shown
     refuse_failed(problem, end)
-    shown = setup.model.shown
     graded = grade_model(problem, setup.validate, end.values, shown)
-    uncertainty = graded.uncertainty
-    if setup.check_intervals:
-        profiled = check_by_profiles(
-            uncertainty, counter("points at most on the profiles", progress)
-        )
-        uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
-    uncertainty = with_unrecorded(uncertainty, setup.frequency_swing)
-    uncertainty = with_unfinished(with_load_drift(uncertainty))
-    uncertainty = say_ranges(uncertainty, setup.model.held)
+    uncertainty = _complete_uncertainty(setup, graded.uncertainty, progress)
     if not np.array_equal(uncertainty.values, graded.values):  # a profile led to a better optimum
         moved = replace(graded.estimation, uncertainty=uncertainty)
         graded = grade_estimate(problem, moved, setup.validate, shown)
-    fits, adequacy = list(graded.fits), graded.adequacy
-    result = conclude(
-        problem, end, graded.values, fits, setup.seed, setup.model.node, setup.optimizer.name
+    agreement = compare_events(uncertainty) if len(problem.events) > 1 else None
+    details = FitDetails(
+        list(graded.fits), graded.estimation, uncertainty, agreement, graded.adequacy
     )
-    result = replace(result, shown_effects=dict(shown), race=[*setup.model.race])
-    together = compare_events(uncertainty) if len(problem.events) > 1 else None
-    fields = uncertainty.fields()
-    fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
-    fields["uncertainty"]["notes"] += together.notes if together else []
-    share = find_share_bound(uncertainty)
+    result = conclude(
+        problem,
+        end,
+        graded.values,
+        details.fits,
+        setup.seed,
+        setup.model.node,
+        setup.optimizer.name,
+    )
+    result = replace(
+        result,
+        shown_effects=dict(shown),
+        race=[*setup.model.race],
+        adequacy=graded.adequacy.to_dict(),
+        next_dip=graded.next_dip,
+    )
+    return _add_findings(setup, result, details), details
+
+
+def _complete_uncertainty(
+    setup: FitSpec, uncertainty: "Uncertainty", progress: Progress
+) -> "Uncertainty":
+    """The uncertainty with what profiles, rival structures and the records' limits add to it."""
+    from tractexp.identification.load_drift import with_load_drift
+    from tractexp.identification.physical import say_ranges
+    from tractexp.identification.profile import check_by_profiles
+    from tractexp.identification.rivals import with_rivals
+    from tractexp.identification.unfinished import with_unfinished
+    from tractexp.identification.unrecorded import with_unrecorded
+
+    if setup.check_intervals:
+        points = counter("points at most on the profiles", progress)
+        uncertainty = check_by_profiles(uncertainty, points)
+        structures = counter("structures fitted beside", progress)
+        uncertainty = with_rivals(uncertainty, structures)
+    uncertainty = with_unrecorded(uncertainty, setup.frequency_swing)
+    uncertainty = with_unfinished(with_load_drift(uncertainty))
+    return say_ranges(uncertainty, setup.model.held)
+
+
+def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result:
+    """The result with its uncertainty, what was found beside the estimate, and advice."""
+    from tractexp.identification.physical import find_free_optimum
+    from tractexp.identification.share import find_share_bound
+    from tractexp.identification.yardstick import yardstick
+
+    uncertainty, agreement, fits = details.uncertainty, details.agreement, details.fits
     played = {fit.event.record.name for fit in fits}
     validate = [event for event in setup.validate if event.record.name in played]
     free = find_free_optimum(uncertainty, setup.model.held, fits, validate)
-    fields["uncertainty"]["notes"] += [str(free)] if free else []
-    starts = [s.to_dict(problem.space.names) for s in graded.estimation.starts]
-    structures = [rival.to_dict() for rival in uncertainty.rivals]
-    data = set_holding(tuple(event.record.where for event in problem.events))
-    unrecorded = uncertainty.unrecorded
-    odd = together.odd if together else ()
-    advice = [
-        *advise(uncertainty, adequacy, odd, data=data),
-        *_hold_to_machines(setup, result),
-        *_with_frequency(uncertainty),
-    ]
-    beside = yardstick(fits, result.model_error)
-    result = replace(
+    share, unrecorded = find_share_bound(uncertainty), uncertainty.unrecorded
+    fields = uncertainty.fields()
+    told = fields["uncertainty"]
+    told |= agreement.fields() if agreement else {"gains": {}, "odd_events": []}
+    told["notes"] += [*(agreement.notes if agreement else ()), *([str(free)] if free else ())]
+    return replace(
         result,
         **fields,
-        adequacy=adequacy.to_dict(),
-        linear_network=beside,
-        next_dip=graded.next_dip,
-        starts=starts,
-        rival_structures=structures,
+        linear_network=yardstick(fits, result.model_error),
+        starts=[s.to_dict(setup.problem.space.names) for s in details.estimation.starts],
+        rival_structures=[rival.to_dict() for rival in uncertainty.rivals],
         free_optimum=free.to_dict() if free else {},
         share_bound=share.to_dict() if share else {},
         unrecorded=unrecorded.to_dict() if unrecorded else {},
-        advice=advice,
+        advice=_advise(setup, result, details),
     )
-    return result, FitDetails(fits, graded.estimation, uncertainty, together, adequacy)
 
 
-def _with_frequency(uncertainty: "Uncertainty") -> list[str]:
+def _advise(setup: FitSpec, result: Result, details: FitDetails) -> list[str]:
+    """What to do next, the most pressing first."""
+    from tractexp.identification.advice import advise
+
+    data = set_holding(tuple(event.record.where for event in setup.problem.events))
+    odd = details.agreement.odd if details.agreement else ()
+    return [
+        *advise(details.uncertainty, details.adequacy, odd, data=data),
+        *_suggest_machine_ranges(setup, result),
+        *_suggest_frequency(details.uncertainty),
+    ]
+
+
+def _suggest_frequency(uncertainty: "Uncertainty") -> list[str]:
     """To record what moves parameters beyond their intervals, or would explain most of what is
     left; [] where nothing does.
     """
@@ -122,7 +148,7 @@ def _with_frequency(uncertainty: "Uncertainty") -> list[str]:
     ]
 
 
-def _hold_to_machines(setup: FitSpec, result: Result) -> list[str]:
+def _suggest_machine_ranges(setup: FitSpec, result: Result) -> list[str]:
     """The command that holds a motor that no load has to what machines are, or races structures
     where it is held; [] where the motor is one, or by priors.
     """
