@@ -206,11 +206,12 @@ def test_a_step_by_itself_is_found_with_its_time(stepped):
 
 
 def test_the_errors_of_a_proposal_are_those_of_graded_fits_and_less_with_the_term(stepped):
-    _, found = stepped
-    fitted, _ = found.steps.proposed.proposal.changes
-    before = found.gap.train.before.model_error["value"]
-    assert fitted.before.error.value == pytest.approx(before, rel=0.05)
-    assert fitted.after.error.square <= fitted.before.error.square
+    """The likelihood and least squares have different minima here: 3.2 and 1.5 % held out."""
+    findings = stepped[1].steps
+    changes, graded = findings.proposed.proposal.changes, findings.misfits(findings.base_grade)
+    for change, misfit in zip(changes, graded, strict=True):
+        assert change.before.error.value == pytest.approx(misfit.error.value, rel=0.01)
+        assert change.after.error.square <= change.before.error.square
 
 
 def test_what_machines_read(stepped):

@@ -29,18 +29,16 @@ from tractexp.discrepancy.explanations import (
     wide_starts,
 )
 from tractexp.discrepancy.families import member_fits
-from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
+from tractexp.discrepancy.least_squares import fit_base, least_squares_tests, residual_noise
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms
 from tractexp.discrepancy.proposal.library import terms
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, term_fits
 from tractexp.discrepancy.proposal.screen import Ground, screen
 from tractexp.discrepancy.ranking import MOST_NAMED, find_nearest, rank_sets
-from tractexp.inference.base_fit import minima_of
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.inference.fitting import Refit, best_of, refit, wide_refits
-from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import block_sums, noise_variance
 from tractexp.inference.records import Records
 from tractexp.noise import Noise
@@ -106,7 +104,8 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
         fits = refit(context, noise, missing, faults=()) if missing else []
         return replace(table, rows=(*table.rows, *fill(fits)))
 
-    bare = _fit_base(context, explained, noise)
+    known = explained.steps[0].fit.unit, *explained.base.local_minima
+    bare = fit_base(context, noise, known)
     (alone,) = fill(_fit_without_faults(context, noise, [bare]))
     alone = replace(alone, fitted_error=predict(context, alone.fit))
     if alone.is_slight:
@@ -192,17 +191,6 @@ def _fit_without_faults(context: Context, noise: Noise, fits: Iterable[Refit]) -
 def _say(context: Context) -> Callable[[str], None]:
     """Tells what is done, and how."""
     return lambda line: context.effort.say(f"{line}, by least squares")
-
-
-def _fit_base(context: Context, explained: Explanations, noise: Noise) -> Refit:
-    """The base model by least squares, from all over its box, with the faults of the measurement
-    free.
-    """
-    squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0])
-    squares = replace(squares, prior=context.prior)
-    known = explained.steps[0].fit.unit, *explained.base.local_minima
-    units = [*map(context.coordinates.at_measured_power, known), *minima_of(context, squares)]
-    return refit(context, noise, [((), unit) for unit in units])[0]
 
 
 def _search_all_sets(

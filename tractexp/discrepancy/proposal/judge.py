@@ -20,7 +20,7 @@ from tractexp.discrepancy.gap import (
     share_gone,
 )
 from tractexp.discrepancy.held_out import carry_fits
-from tractexp.discrepancy.least_squares import residual_noise
+from tractexp.discrepancy.least_squares import fit_base, residual_noise
 from tractexp.discrepancy.proposal.bed import carried_over
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, TermFits
 from tractexp.inference.context import Context
@@ -133,8 +133,7 @@ def measure_changes(
     at = context.coordinates
     bare, found = (at.without_faults(one.unit, ()) for one in (result.bare, fit))
     noise = residual_noise(context, replace(result.bare, unit=bare))
-    starts = bare, at.remove_effects(found, fit.names)
-    base = refit(context, noise, [((), start) for start in starts], faults=())[0]
+    base = fit_base(context, noise, [bare, at.remove_effects(found, fit.names)], faults=())
     nested = found.copy()  # from the base model's, so that the term leaves no more
     nested[at.base] = base.unit[at.base]
     nested[at.sizes(fit.names)] = at.null[at.sizes(fit.names)]
