@@ -29,7 +29,8 @@ from hidden_effects import Case, Noise
 from hidden_effects.generator import Scene, scene
 from independent import Dip
 from tractexp.configuration.plugin import get
-from tractexp.discrepancy.investigate import Findings, investigate
+from tractexp.discrepancy.findings import Findings
+from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_event import choose
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, imagine_dips

@@ -163,7 +163,7 @@ def test_what_collapses_behind_an_impedance_asks_for_no_shorter_steps(monkeypatc
     not calculate them: an investigation that ended with both was refused at its grade.
     """
     # fewer, since the search up to them takes its time
-    for module in ("model.model", "inference.problem"):
+    for module in ("model.model", "inference.steps"):
         monkeypatch.setattr(f"tractexp.{module}.MOST_SUBSTEPS", 32)
     base = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
     names = ("exponential_recovery", "feeder_impedance")

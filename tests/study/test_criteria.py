@@ -15,8 +15,9 @@ from tractexp.discrepancy.decide import decide, holds, needs_all_events
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.families import worth
+from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.gap import GapTest
-from tractexp.discrepancy.investigate import Findings, investigate
+from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import assessment
 from tractexp.discrepancy.next_event import choose
 from tractexp.discrepancy.next_event.choose import EventTrial, mildest

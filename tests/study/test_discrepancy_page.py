@@ -271,7 +271,7 @@ def test_what_is_not_extended_is_not_called_so(silent, unexplained, tmp_path):
 
 def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path):
     words, _ = page(unexplained, tmp_path)
-    shapes = unexplained.remainder_of_base
+    shapes = unexplained.rest.of_base
     assert {(s.channel, s.kind) for s in shapes} >= {("P", "step")}
     assert unexplained.headline.startswith(
         ("the base model misses this: ", "the nearest candidates miss this: ")

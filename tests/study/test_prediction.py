@@ -17,7 +17,8 @@ from tractexp.discrepancy.decide import decide, find_predicting
 from tractexp.discrepancy.evidence import SLIGHT_ERROR, Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.explain import explain, find_nearest_sets
 from tractexp.discrepancy.explanations import search_effect_sets
-from tractexp.discrepancy.investigate import investigate, is_end_of_range
+from tractexp.discrepancy.findings import is_end_of_range
+from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.precision import estimates, standard_errors
 from tractexp.discrepancy.prediction import (
@@ -285,7 +286,7 @@ def test_a_name_that_leaves_more_than_noise_is_named_and_what_it_leaves_is_told(
     assert inexact.reason.endswith("; each event, left out in turn, confirms it")
     assert not verdict.complete
     assert inexact.validate.closed_share > 1 - 1 / inexact.context.criteria.divides**2
-    assert inexact.remainder
+    assert inexact.rest.of_best
     assert "beside undervoltage_trip this is left" in inexact.headline
 
 
@@ -612,7 +613,7 @@ def test_a_size_that_is_known_no_better_than_its_bounds_is_told(inexact):
 
 def test_what_rests_on_a_bound_is_told_of_the_effects_alone(inexact, monkeypatch):
     rest = ["tripped_share", "T_m"]
-    monkeypatch.setattr("tractexp.discrepancy.investigate.at_bound", lambda *_: rest)
+    monkeypatch.setattr("tractexp.discrepancy.findings.at_bound", lambda *_: rest)
     told = [sentence.partition(" ")[0] for sentence in replace(inexact).open_sizes]
     assert told == ["tripped_share"]
 

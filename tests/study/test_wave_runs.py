@@ -260,7 +260,7 @@ def test_a_step_is_chosen_by_the_circuits_that_last(dip, monkeypatch):
     takes.
     """
     # fewer, since the search up to them takes its time
-    for module in ("model.model", "inference.problem"):
+    for module in ("model.model", "inference.steps"):
         monkeypatch.setattr(f"tractexp.{module}.MOST_SUBSTEPS", 16)
     bounds = {"X_f": (-0.05, 0.0)}
     model = tractexp.compose(

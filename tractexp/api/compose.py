@@ -92,7 +92,7 @@ class LoadModel(Portable, Plain, Tabulated):
         """The parameters by name, with bounds as set here (`Parameter`: default, bounds, unit,
         about, symbol).
         """
-        from tractexp.inference.problem import narrow_bounds
+        from tractexp.inference.bounds import narrow_bounds
 
         return {p.name: p for p in narrow_bounds(self.model.parameters, self.bounds)}
 

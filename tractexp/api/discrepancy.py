@@ -30,7 +30,7 @@ from tractexp.text.progress import Progress, say
 
 if TYPE_CHECKING:
     from tractexp.api.given import ModelGiven, Records
-    from tractexp.discrepancy.investigate import Findings as Steps
+    from tractexp.discrepancy.findings import Findings as Steps
     from tractexp.tracking import TrackedRun
 
 

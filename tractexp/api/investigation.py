@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from tractexp.api.given import Source
-    from tractexp.discrepancy.investigate import Findings as Steps
+    from tractexp.discrepancy.findings import Findings as Steps
     from tractexp.discrepancy.readings import Reading
 
 

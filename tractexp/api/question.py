@@ -16,7 +16,7 @@ from tractexp.text.progress import Progress, tell_stages
 from tractexp.text.wording import shown_in_words
 
 if TYPE_CHECKING:
-    from tractexp.discrepancy.investigate import Findings as Steps
+    from tractexp.discrepancy.findings import Findings as Steps
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

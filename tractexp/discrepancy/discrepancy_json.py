@@ -13,9 +13,9 @@ from tractexp.configuration.run_command import build_again_command, list_setting
 from tractexp.discrepancy.decide import CANDIDATE, NAMED, TIED, UNEXPLAINED, shows_more
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.explain import find_status
+from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.forms import by_name, forms
 from tractexp.discrepancy.gap import SPREAD, Curves
-from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.proposal import generate
@@ -232,7 +232,7 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
         return None
     near = investigation.nearest
     tests = investigation.tests
-    shapes = list(map(asdict, investigation.remainder))
+    shapes = list(map(asdict, investigation.rest.of_best))
     change = investigation.graded_change
     last = change if near is None else near.held_out or near.fitted
     return {
@@ -244,7 +244,7 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
         "best_term": _best_term(investigation),
         "of_names": shapes if investigation.names else [],
         "of_nearest": shapes if near else [],
-        "of_base": list(map(asdict, investigation.remainder_of_base)),
+        "of_base": list(map(asdict, investigation.rest.of_base)),
     }
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.precision import covariance
 from tractexp.inference.interval import interval_factor
 from tractexp.model.parts import Curve, Effect

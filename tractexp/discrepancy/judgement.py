@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.findings import Findings
 from tractexp.inference.catalogue import Candidate
 from tractexp.inference.score_test import Score
 from tractexp.text.wording import in_words

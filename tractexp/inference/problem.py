@@ -2,145 +2,25 @@
 
 import copy
 import hashlib
-import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tractexp.domain import Domain, domain_of
-from tractexp.errors import MODEL, UserError, among, check_range, setting
+from tractexp.errors import MODEL, UserError, check_range
+from tractexp.inference.bounds import check_name, narrow_bounds
 from tractexp.inference.loss import REFUSED, Loss
+from tractexp.inference.records import check_channels, check_power
+from tractexp.inference.steps import Step, choose_steps, count_steps
 from tractexp.model.drive import Drive
-from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
-from tractexp.model.parts import COMPARED, Effect
+from tractexp.model.model import Model
 from tractexp.noise.quiet import quiet_stretches
 from tractexp.noise.random_walk import Load
-from tractexp.parameter import Box, Parameter, spread_evenly
+from tractexp.parameter import Box, spread_evenly
 from tractexp.record import Event
-from tractexp.record.own_base import SMALLEST_BASE
 
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
-# share of them that must be calculated where a model has effects: behind an impedance some loads
-# collapse, which no number of steps calculates
-LEAST_CALCULATED_SHARE = 0.9
-
-
-def narrow_bounds(
-    parameters: Sequence[Parameter], bounds: Mapping[str, Sequence[float]]
-) -> tuple[Parameter, ...]:
-    """The parameters with some of their bounds replaced.
-
-    Parameters
-    ----------
-    parameters : sequence of Parameter
-        Those of a model.
-    bounds : {name: (lower, upper)}
-        New bounds, in the parameter's own unit; parameters that are not named keep theirs.
-
-    Returns
-    -------
-    tuple of Parameter
-        In the order given. A default outside the new bounds moves to the nearer of them.
-
-    Raises
-    ------
-    UserError
-        For a name that no parameter has, for what is not a pair, and for reversed bounds.
-
-    Examples
-    --------
-    >>> inertia = Parameter(1.0, (0.1, 4.0), "s", "inertia constant", "an example", name="H")
-    >>> (narrow,) = narrow_bounds([inertia], {"H": (2.0, 3.0)})
-    >>> narrow.bounds, narrow.default
-    ((2.0, 3.0), 2.0)
-    """
-    by_name = {p.name: p for p in parameters}
-    for name, pair in bounds.items():
-        _check_name(name, by_name, "model.bounds")
-        if len(pair) != 2:
-            raise UserError(
-                f"{MODEL.bounds}.{name}={list(pair)} must be two numbers, [lower, upper]"
-            )
-        low, high = map(float, pair)
-        old = by_name[name]
-        inside = min(max(old.default, low), high) if low < high else old.default
-        by_name[name] = replace(old, default=inside, bounds=(low, high), physical=None)
-        by_name[name].check(f"{MODEL.bounds}.{name}")
-    return tuple(by_name.values())
-
-
-def _check_name(name: str, by_name: Mapping[str, object], where: str) -> None:
-    """Raise `UserError` for a parameter that the model lacks; `where` is the setting that names
-    it.
-    """
-    if name not in by_name:
-        lack = f"this model has no parameter '{name}'{among(name, by_name, 'Parameters')}"
-        raise UserError(f"{setting(where)}.{name}: {lack}")
-
-
-def _check_channels(model: Model, events: Sequence[Event]) -> None:
-    """Raise `UserError` where a part of the model is driven by a channel that an event does not
-    have.
-    """
-    for (channel, part), event in itertools.product(model.reads.items(), events):
-        if channel in event.channels or channel in COMPARED:
-            continue
-        if isinstance(part, Effect):
-            what, mend = f"effect '{part.name}'", f"leave the effect out of {MODEL.effects}"
-        else:
-            what, mend = f"{part.group} '{part.name}'", f"choose another {part.group}"
-        raise UserError(
-            f"the {what} reads {channel}, which {event.record.where} does not have; record"
-            f" {channel}, or {mend}"
-        )
-
-
-def _check_power(events: Sequence[Event]) -> None:
-    """Raise `UserError` for an event in which nothing draws power: every model fits it, so that it
-    tells none from another.
-    """
-    for event in events:
-        drawn = float(np.nanmax(np.hypot(event.record.P, event.record.Q)))
-        if not drawn > SMALLEST_BASE:
-            raise UserError(
-                f"{event.record.where}: P and Q reach {drawn:.3g} pu at most: there is no load in"
-                " this record; "
-                "give one of a feeder that draws power"
-            )
-
-
-@dataclass(frozen=True)
-class Step:
-    """The Runge-Kutta steps of a simulation.
-
-    Attributes
-    ----------
-    substeps : (E,) ints
-        Steps per sample of each event.
-    error : (E,) [pu]
-        The largest error that these steps leave; nan where the number was given by hand.
-    """
-
-    substeps: np.ndarray
-    error: np.ndarray
-
-    def describe(self, events: Sequence[Event]) -> str:
-        """The sentence that a run prints: the steps, their lengths [ms] and the error they leave
-        [pu].
-        """
-        sizes = [1e3 * e.record.step / n for e, n in zip(events, self.substeps, strict=True)]
-        text = ", ".join(
-            f"{n} of {size:g} ms"
-            for n, size in dict(zip(self.substeps.tolist(), sizes, strict=True)).items()
-        )
-        worst = float(np.max(self.error))
-        error = (
-            "with some values in the bounds it diverges"
-            if np.isinf(worst)
-            else f"largest error {worst:.1e} pu"
-        )
-        return f"{text} per sample ({'given' if np.isnan(worst) else error})"
 
 
 class Problem:
@@ -172,19 +52,6 @@ class Problem:
     step : Step
         The Runge-Kutta steps of each event.
     """
-
-    model: Model
-    parameters: tuple[Parameter, ...]
-    fixed: dict[str, float]
-    space: Box
-    defaults: np.ndarray  # (d,)
-    lower: np.ndarray
-    upper: np.ndarray
-    per_event: tuple[str, ...]
-    loss: Loss
-    priors: bool
-    drive: Drive
-    step: Step
 
     def __init__(
         self,
@@ -228,15 +95,15 @@ class Problem:
         """
         self.model, self.priors = model, priors
         self.events = self.domain.events(events)
-        _check_channels(model, self.events)
-        _check_power(events)
+        check_channels(model, self.events)
+        check_power(events)
         self.parameters = narrow_bounds(model.parameters, bounds or {})
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
         for name in self.fixed:
-            _check_name(name, {p.name: p for p in self.parameters}, "model.fixed")
+            check_name(name, {p.name: p for p in self.parameters}, "model.fixed")
             check_range(f"{MODEL.fixed}.{name}", self.fixed[name])
         for name in per_event:
-            _check_name(name, {p.name: p for p in self.parameters}, "model.per_event")
+            check_name(name, {p.name: p for p in self.parameters}, "model.per_event")
             if name in self.fixed:
                 raise UserError(
                     f"{MODEL.per_event} names {name}, which {MODEL.fixed} fixes; it can be only one"
@@ -256,10 +123,8 @@ class Problem:
                 else f"a {model.title} has no parameters"
             )
             raise UserError(f"{why}; leave at least one free to identify")
-        self.space, self.defaults = (
-            Box.from_parameters(tuple(free)),
-            np.array([p.default for p in free]),
-        )
+        self.space = Box.from_parameters(tuple(free))
+        self.defaults = np.array([p.default for p in free])
         self.lower, self.upper = self.space.lower, self.space.upper
         self.per_event = tuple(name for name in model.names if name in own)
         self.loss = loss or Loss()
@@ -273,7 +138,11 @@ class Problem:
         )
         self.drive = self._driven()
         self._scale = self.loss.scales(self.events, self.drive)
-        self.step = self._step(substeps)
+        self.step = (
+            self._choose_steps(self.domain.probed)
+            if substeps is None
+            else Step.from_setting(substeps, len(self.events))
+        )
 
     def with_steps_of(self, share: float) -> "Problem":
         """The problem with as many Runge-Kutta steps as a share of the box needs; the rest is
@@ -292,7 +161,7 @@ class Problem:
         if share >= self.domain.probed:
             return self
         other = copy.copy(self)
-        other.step = self._automatic(share)
+        other.step = self._choose_steps(share)
         return other
 
     def steps_at(self, values: np.ndarray) -> int:
@@ -308,18 +177,12 @@ class Problem:
         int
             The largest number of all events.
         """
-        candidates = self.candidates(values)
-        return int(
-            self.model.substeps(self.drive, candidates, self.domain.finest, until=self._until)[
-                0
-            ].max()
-        )
+        return count_steps(self.model, self.drive, self.events, self.candidates(values))
 
-    @property
-    def _until(self) -> list[float]:
-        """Seconds of each event, from its first sample on, in which the step is judged."""
-        ends = [e.record.t[min(e.end, e.record.samples - 1)] - e.record.t[0] for e in self.events]
-        return [end + self.domain.aftermath for end in ends]
+    def _choose_steps(self, share: float) -> Step:
+        """The fewest Runge-Kutta steps that suffice for a share of candidates all over the box."""
+        probes = self.candidates(self.space.from_unit(spread_evenly(PROBES, self.space.dimension)))
+        return choose_steps(self.model, self.drive, self.events, probes, share)
 
     def digest(self) -> str:
         """The SHA-256 of a problem, as 64 hexadecimal digits: equal problems have the same.
@@ -327,10 +190,8 @@ class Problem:
         It covers the equations, the records, the bounds, the steps and what is known of the
         parameters.
         """
-        drive, free = (
-            self.drive,
-            (self.space.names, sorted(self.fixed.items()), self.per_event, self.priors),
-        )
+        drive = self.drive
+        free = self.space.names, sorted(self.fixed.items()), self.per_event, self.priors
         content = self.model.source, [repr(effect) for effect in self.model.measurements], free
         sha = hashlib.sha256(repr(content).encode())
         arrays = (
@@ -386,15 +247,7 @@ class Problem:
         fixed = {name: value for name, value in self.fixed.items() if name in model.names}
         per_event = [name for name in self.per_event if name in model.names]
         substeps = int(self.step.substeps.max())
-        return Problem(
-            model,
-            self.events,
-            bounds,
-            fixed,
-            substeps,
-            per_event,
-            self.loss,
-        )
+        return Problem(model, self.events, bounds, fixed, substeps, per_event, self.loss)
 
     @property
     def domain(self) -> Domain:
@@ -541,62 +394,3 @@ class Problem:
             return self.drive.weights * self._scale**2 * self.loss.rho(
                 (errors / self._scale) ** 2
             ), miss
-
-    def _find_lasting(self, candidates: np.ndarray) -> np.ndarray:
-        """Which candidates (n, d) stay finite at the finest step, (n,): circuits with a negative
-        reactance grow beyond all bounds at any.
-        """
-        finest = np.full(len(self.events), MOST_SUBSTEPS)
-        outputs = self.model.simulate(self.drive, candidates, finest).outputs
-        return np.all(np.isfinite(outputs), axis=(0, 2))
-
-    def _step(self, substeps: int | None) -> Step:
-        """Substeps per sample of each event (E,), and the errors (E,) that a choice of them was
-        made by; of given ones nan.
-
-        Raises `UserError` for a number out of range.
-        """
-        if substeps is not None:
-            if not 1 <= substeps <= MOST_SUBSTEPS:
-                raise UserError(
-                    f"{MODEL.substeps}={substeps} is out of range: it must be 1 to {MOST_SUBSTEPS}"
-                )
-            given = np.full(len(self.events), substeps)
-            return Step(given, np.full(len(self.events), np.nan))
-        return self._automatic(self.domain.probed)
-
-    def _automatic(self, share: float) -> Step:
-        """The fewest steps that suffice for a share of `PROBES` candidates all over the box.
-
-        Raises `UserError` where the finest step that is allowed leaves too large an error.
-        """
-        fine, probes = (
-            self.domain.finest,
-            self.candidates(self.space.from_unit(spread_evenly(PROBES, self.space.dimension))),
-        )
-        chosen, error = self.model.substeps(self.drive, probes, fine, share, self._until)
-        # Stiff circuits of the box may diverge, and are refused.
-        if (
-            self.domain.stiff
-            and np.isinf(error).any()
-            and (lasting := self._find_lasting(probes)).any()
-        ):
-            chosen, error = self.model.substeps(
-                self.drive, probes[lasting], fine, share, self._until
-            )
-        if self.model.effects and share > LEAST_CALCULATED_SHARE and not (error <= fine).all():
-            chosen, error = self.model.substeps(
-                self.drive, probes, fine, LEAST_CALCULATED_SHARE, self._until
-            )
-        if self.model.integration == CLASSICAL and not (error <= fine).all():
-            worst = int(np.argmax(error))
-            raise UserError(
-                f"{self.events[worst].record.name}: {MOST_SUBSTEPS} Runge-Kutta steps per sample of"
-                f" {1e3 * self.events[worst].record.step:g} ms leave an error of {error[worst]:.1e}"
-                " pu somewhere in"
-                " the bounds; raise the lower bound of the model's time constants"
-                f" ({MODEL.bounds}),"
-                f" or set {MODEL.substeps}; what jumps within a sample in an equation of yours"
-                " belongs in a memory"
-            )
-        return Step(chosen, error)

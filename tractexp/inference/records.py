@@ -6,14 +6,20 @@ voltage from the voltage.
 """
 
 import functools
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from tractexp.domain import domain_of
-from tractexp.errors import DATA, UserError
+from tractexp.errors import DATA, MODEL, UserError
 from tractexp.inference.recorder_window import RecorderWindow
+from tractexp.model.model import Model
+from tractexp.model.parts import COMPARED, Effect
 from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
+from tractexp.record.own_base import SMALLEST_BASE
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,3 +100,34 @@ def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
                     " not: events of one"
                     " investigation need the same channels; remove the column or add it"
                 )
+
+
+def check_channels(model: Model, events: Sequence[Event]) -> None:
+    """Raise `UserError` where a part of the model is driven by a channel that an event does not
+    have.
+    """
+    for (channel, part), event in itertools.product(model.reads.items(), events):
+        if channel in event.channels or channel in COMPARED:
+            continue
+        if isinstance(part, Effect):
+            what, mend = f"effect '{part.name}'", f"leave the effect out of {MODEL.effects}"
+        else:
+            what, mend = f"{part.group} '{part.name}'", f"choose another {part.group}"
+        raise UserError(
+            f"the {what} reads {channel}, which {event.record.where} does not have; record"
+            f" {channel}, or {mend}"
+        )
+
+
+def check_power(events: Sequence[Event]) -> None:
+    """Raise `UserError` for an event in which nothing draws power: every model fits it, so that it
+    tells none from another.
+    """
+    for event in events:
+        drawn = float(np.nanmax(np.hypot(event.record.P, event.record.Q)))
+        if not drawn > SMALLEST_BASE:
+            raise UserError(
+                f"{event.record.where}: P and Q reach {drawn:.3g} pu at most: there is no load in"
+                " this record; "
+                "give one of a feeder that draws power"
+            )

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.inference.problem import Problem, narrow_bounds
+from tractexp.inference.bounds import narrow_bounds
+from tractexp.inference.problem import Problem
 from tractexp.inference.separable import SeparableColumns
 from tractexp.model import sites
 from tractexp.model.model import Model

@@ -9,7 +9,7 @@ import numpy as np
 from tractexp.discrepancy.decide import NONE, TIED, UNEXPLAINED
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.explain import find_status
-from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import effect_sizes
 from tractexp.inference.chance import by_draws

@@ -9,7 +9,7 @@ from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.decide import TIED
 from tractexp.discrepancy.explain import find_status
-from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.inference.chance import by_draws
 from tractexp.report.candidate_rows import (

@@ -1,7 +1,7 @@
 """Where the base model disagrees with the records, and the noise by which that is judged."""
 
 from tractexp.blocks import Report
-from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.findings import Findings
 from tractexp.inference.chance import BLURRED, by_draws
 from tractexp.text.wording import in_words
 

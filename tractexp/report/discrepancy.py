@@ -12,7 +12,7 @@ from tractexp.blocks import Report, Table
 from tractexp.discrepancy.decide import UNEXPLAINED
 from tractexp.discrepancy.discrepancy_json import recommendation
 from tractexp.discrepancy.explain import Nearest
-from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.readings import read_shapes
 from tractexp.discrepancy.remainder import Remainder
@@ -256,7 +256,7 @@ def _off(misfit: Mapping[str, Any], *, waves: bool) -> list[str]:
 def _add_remainder_section(page: Report, findings: Findings) -> None:
     """Add what is left beside the names, or what nothing explains, in words."""
     page.heading("What is left")
-    shapes, near = findings.remainder, findings.nearest
+    shapes, near = findings.rest.of_best, findings.nearest
     whose = (
         "the base model" if near is None else f"{join_words(near.names)}, the nearest candidates,"
     )
@@ -264,7 +264,7 @@ def _add_remainder_section(page: Report, findings: Findings) -> None:
         whose = f"the model with {join_words(findings.names)}"
     _shapes(page, findings, shapes, whose)
     if near is not None:
-        _shapes(page, findings, findings.remainder_of_base, "the base model alone")
+        _shapes(page, findings, findings.rest.of_base, "the base model alone")
         _nearest(page, findings, near)
 
 

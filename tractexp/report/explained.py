@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tractexp.discrepancy.evidence import SetEvidence
-from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.findings import Findings
 from tractexp.inference.goodness_of_fit import residual_windows
 from tractexp.text.wording import join_words
 

@@ -7,8 +7,8 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import use_of
+from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
-from tractexp.discrepancy.investigate import Findings
 from tractexp.identification.verdict import brief
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.model.model import compose

@@ -8,7 +8,7 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.evidence import SetEvidence
-from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.precision import effect_sizes
 from tractexp.discrepancy.proposal.library import term
 from tractexp.inference.interval import ParameterEstimate
