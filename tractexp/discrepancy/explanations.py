@@ -131,7 +131,8 @@ def without_needless(
     A larger set may have led to a better place of its own subset than any start of that. Adds to
     `refits`.
     """
-    fit, context = tests.fit, base.context
+    fit = tests.fit
+    context = base.context
     at = context.coordinates
     if len(fit.names) < 2:
         return tests
@@ -168,7 +169,8 @@ def search_effect_sets(
     """The most promising sets of one size refitted, single effects from all over the base model's
     box, too; the best first. `steps` begin with one without effects.
     """
-    context, noise = steps[0].context, steps[-1].noise
+    context = steps[0].context
+    noise = steps[-1].noise
     if not (wanted := shortlist(steps, size)):
         return []
     one, many = ("effect", "effects") if size == 1 else (f"set of {size}", f"sets of {size}")
@@ -235,7 +237,8 @@ def _every_setting(context: Context, fit: Refit, unit: np.ndarray) -> list[Start
     """Starts for a single effect at coordinates (D,): of the size that it was fitted with, at all
     its settings.
     """
-    at, sized = context.coordinates, unit.copy()
+    at = context.coordinates
+    sized = unit.copy()
     sized[at.sizes(fit.names)] = fit.unit[at.sizes(fit.names)]
     return [
         (fit.names, at.place_values(sized, setting))
@@ -266,7 +269,8 @@ def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
     They begin at the base fit and at sets that have one effect less; of more effects than are
     named, at the latter alone.
     """
-    first, last = steps[0], steps[-1]
+    first = steps[0]
+    last = steps[-1]
     sets: dict[Names, float] = {}
     own = last.context.catalogue.textbook(last.fit.names)
     for score in [s for s in last.scores if s.name not in own][: SHORTLIST[size]]:
@@ -320,7 +324,8 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
     Where an effect is missing, a wrong local minimum of the base model may fit better than the
     right one. There a right effect may have no size at all.
     """
-    at, candidate = context.coordinates, context.catalogue[fit.names[0]]
+    at = context.coordinates
+    candidate = context.catalogue[fit.names[0]]
     points = spread_evenly(BOX_POINTS, len(at.base))
     units = np.repeat(fit.unit[None], BOX_POINTS, axis=0)
     units[:, at.base] = points
@@ -335,7 +340,8 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
 
 def _place_candidate(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndarray:
     """Coordinates (D,) with a candidate at its one-step size and its `rank`-th best setting."""
-    ranked, candidate = at.projection.ranked_scores[name], at.context.catalogue[name]
+    ranked = at.projection.ranked_scores[name]
+    candidate = at.context.catalogue[name]
     score = ranked[min(rank, len(ranked) - 1)]
     values = dict(score.setting)
     for p in candidate.sizes:

@@ -340,7 +340,8 @@ class Findings:
     @functools.cached_property
     def rest(self) -> Rest:
         """What is left where it is more than noise, in shapes."""
-        noise, level = self.last.noise, self.context.criteria.false_alarms
+        noise = self.last.noise
+        level = self.context.criteria.false_alarms
         overlays = [] if self.verdict.complete else self.overlays
         of_best = find_shapes(overlays, noise, level)
         alone: list[Sequence[Overlay]] = []

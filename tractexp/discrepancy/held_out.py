@@ -29,7 +29,9 @@ def judge_held_out(
     """The table with the sets that leave nothing refitted without needless faults of the
     measurement, and judged on held-out events, if any.
     """
-    context, noise, criteria = explained.base.context, explained.last.noise, explained.last.criteria
+    context = explained.base.context
+    noise = explained.last.noise
+    criteria = explained.last.criteria
     at = context.coordinates
     bare = refit(
         context, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=()
@@ -98,7 +100,8 @@ def assess(both: AllEvents, rows: Sequence[SetEvidence], seed: int) -> list[SetE
     than chance does, since the fitted events may leave a part of it open; such a row is judged and
     told as fitted to all.
     """
-    criteria, fits = both.fitted.criteria, [row.reported_fit for row in rows]
+    criteria = both.fitted.criteria
+    fits = [row.reported_fit for row in rows]
     without = {fit.names: both.without_each(fit) for fit in fits}
     judged = judge_fits(both, rows, fits, without)
     if not needs_all_events(judged, criteria):
@@ -142,7 +145,8 @@ def judge_fits(
 
     `without` {names: {member: fit}} are the sets without each member.
     """
-    gaps, judged = compare_on(both.fitted, both.events, both.bare, fits), []
+    gaps = compare_on(both.fitted, both.events, both.bare, fits)
+    judged = []
     for row, fit in zip(rows, fits, strict=True):
         fewer = without[fit.names]
         members = {

@@ -166,7 +166,8 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grade
         return findings
     if evidence.is_predicted or not findings.is_absent:
         return _complete_row(findings, validate)
-    chosen, without = findings.verdict.kept[0], grader.grade((), findings.window)
+    chosen = findings.verdict.kept[0]
+    without = grader.grade((), findings.window)
     rows = [replace(row, is_absent=row is chosen) for row in evidence.rows]
     base_row = replace(evidence.base, grade=str(without.adequacy.grade))
     evidence = replace(evidence, base=base_row, rows=tuple(rows))
@@ -181,7 +182,8 @@ def _conclude(
     grader: Grader,
 ) -> Findings:
     """The findings of a table of evidence."""
-    tests, verdict = evidence.base.tests, decide(evidence, explained.last.criteria)
+    tests = evidence.base.tests
+    verdict = decide(evidence, explained.last.criteria)
     assert tests is not None
     return Findings(
         base=explained.base,
@@ -207,12 +209,10 @@ def _complete_row(findings: Findings, validate: Sequence[Event]) -> Findings:
     grade = str(findings.final_grade.adequacy.grade)
     row = replace(chosen, grade=grade, open_sizes=findings.open_sizes)
     if chose_by_all(chosen, evidence):
-        told = replicate(
+        least = replicate(
             findings.base.context, validate, evidence.base.fit, chosen.reported_fit, evidence.faults
         )
-        if told:
-            least = float(np.min([one.least_share for one in told]))
-            row = replace(row, replicated_share=least)
+        row = replace(row, replicated_share=least)
     rows = tuple(row if one is chosen else one for one in evidence.rows)
     evidence = replace(evidence, rows=rows)
     return replace(findings, evidence=evidence, verdict=decide(evidence, findings.context.criteria))
@@ -220,7 +220,9 @@ def _complete_row(findings: Findings, validate: Sequence[Event]) -> Findings:
 
 def _proposal(findings: Findings, seed: int) -> ProposalResult:
     """The term that an unexplained disagreement asks for."""
-    base, explained, evidence = findings.base, findings.explanations, findings.by_likelihood
+    base = findings.base
+    explained = findings.explanations
+    evidence = findings.by_likelihood
     if findings.verdict.word != UNEXPLAINED:
         return ProposalResult()
     if evidence.is_mild:
@@ -232,7 +234,9 @@ def _proposal(findings: Findings, seed: int) -> ProposalResult:
 
 def _gap(context: Context, evidence: Evidence, verdict: Verdict) -> GapTest:
     """The gap on the fitted events before and after."""
-    at, chosen, base = context.coordinates, verdict.chosen, evidence.base.fit
+    at = context.coordinates
+    chosen = verdict.chosen
+    base = evidence.base.fit
     after = chosen.reported_fit if chosen else base
     tests = (chosen and chosen.tests) or evidence.last
     assert tests is not None

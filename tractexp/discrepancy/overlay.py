@@ -148,7 +148,8 @@ def _each(
     held_out: bool,
 ) -> list[Overlay]:
     """Curves (C, N) of events end to end, cut into events."""
-    deviation, overlays = noise.deviation(context.drive), []
+    deviation = noise.deviation(context.drive)
+    overlays = []
     for e, event in enumerate(context.records.recorded):
         part = context.drive.part(e)
         before, after, nearest = (None if c is None else c[:, part] for c in curves)

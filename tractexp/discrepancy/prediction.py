@@ -61,7 +61,9 @@ def predict_held_out(
     table = predict_errors(explained, events)
     if table is None:
         return None
-    criteria, quiet, noise = explained.last.criteria, explained.base.quiet, table.noise
+    criteria = explained.last.criteria
+    quiet = explained.base.quiet
+    noise = table.noise
     assert noise is not None
     leading = find_predicting(table, criteria) or [find_nearest(table, criteria)]
 
@@ -85,8 +87,10 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
     than matters. None as of `predict_held_out`.
     """
     plain = explained.base.context.with_measured_power
-    context, noise = plain.held_to_usual, residual_noise(plain, explained.chosen)
-    criteria, family = context.criteria, context.catalogue.textbook
+    context = plain.held_to_usual
+    noise = residual_noise(plain, explained.chosen)
+    criteria = context.criteria
+    family = context.catalogue.textbook
     if context.prior:  # its rows stand beside what the base model leaves, as in an identification
         start = plain.coordinates.at_measured_power(explained.steps[0].fit.unit)
         noise = residual_noise(plain, refit(plain, noise, [((), start)], faults=())[0])
@@ -145,7 +149,8 @@ def _find_best_term(context: Context, table: Evidence) -> SetEvidence:
     """The term of the library that predicts best beside the base model, fitted as the sets are
     whose rival it is.
     """
-    noise, there = table.noise, table.there
+    noise = table.noise
+    there = table.there
     assert noise is not None
     assert there is not None
     context.effort.say("looking for a term of the library that predicts better")
@@ -172,7 +177,8 @@ def search_third(
     if not best or len(best[0].fit.names) < MOST_NAMED:
         return []
     pair = refits.get(best[0].fit.names, best[0].fit)
-    families, of_load = context.catalogue.textbook(pair.names), context.catalogue.of_load
+    families = context.catalogue.textbook(pair.names)
+    of_load = context.catalogue.of_load
     if best[0].held_out_prediction.error < SLIGHT_ERROR or not {*families} <= {*of_load}:
         return []
     beside = ground.score_fit(context, pair, ground.noise)
@@ -199,7 +205,8 @@ def _search_all_sets(
     """The tests of the base model by least squares, and the best fits of it and of sets of effects,
     with the faults of the measurement free.
     """
-    at, say = context.coordinates, _say(context)
+    at = context.coordinates
+    say = _say(context)
     ground = explained.steps[0].score_fit(context, bare, noise)
     refits: dict[Names, Refit] = {(): bare}
 
@@ -241,7 +248,9 @@ def predict(there: Context, fit: Refit) -> PredictedError:
         there.domain.comparison(event, calculated[:, there.drive.part(e)])
         for e, event in enumerate(there.events)
     ]
-    left, noise, response = [], [], []
+    left = []
+    noise = []
+    response = []
     for one, sums in zip(played, block_sums(played, SHARING), strict=True):
         own = noise_variance(one.event) * (one.event.record.samples - one.event.start) / len(sums)
         left.append(np.full(len(sums), np.inf) if one.stalls else sums[:, 0] + own)

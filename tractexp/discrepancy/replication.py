@@ -7,7 +7,7 @@ away that noise hides it are not asked.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,41 +23,50 @@ from tractexp.record import Event
 FEWEST_EVENTS = 3  # of which one can be left out
 
 
-@dataclass(frozen=True)
-class Replication:
-    """What a set takes away of the squares of each event (E,) [pu²]: `expected` where that is
-    fitted with all others, `gained` where it is left out. Less than `hidden` noise hides.
+def find_least_share(
+    expected: Sequence[float], gained: Sequence[float], hidden: Sequence[float]
+) -> float:
+    """The least share of what is expected that is gained, of the events that show a set.
+
+    Parameters
+    ----------
+    expected, gained : E floats [pu²]
+        What the set takes away of the squares of each event where that is fitted with all others,
+        and where it is left out.
+    hidden : E floats [pu²]
+        Less than that noise hides.
+
+    Returns
+    -------
+    float
+        nan where no event shows the set.
+
+    Examples
+    --------
+    >>> find_least_share((4.0, 2.0, 0.05), (4.0, 1.5, -9.0), (0.1, 0.1, 0.1))
+    0.75
     """
-
-    expected: tuple[float, ...]
-    gained: tuple[float, ...]
-    hidden: tuple[float, ...]
-
-    @property
-    def least_share(self) -> float:
-        """The least share of what is expected that is gained, of the events that show the set; nan
-        where none does.
-        """
-        rows = zip(self.expected, self.gained, self.hidden, strict=True)
-        shares = [
-            1.0 if gained == expected else gained / expected
-            for expected, gained, hidden in rows
-            if expected > hidden
-        ]
-        return min(shares, default=np.nan)
+    shares = [
+        1.0 if own == most else own / most
+        for most, own, least in zip(expected, gained, hidden, strict=True)
+        if most > least
+    ]
+    return min(shares, default=np.nan)
 
 
 def replicate(
     context: Context, events: Sequence[Event], base: Refit, chosen: Refit, faults: Names = ()
-) -> tuple[Replication, ...]:
-    """What each of the context's and of further `events` says of a set that was fitted to all
-    others by least squares: against the base model, then of several effects against all but each.
+) -> float | None:
+    """The least share of what a set takes away of an event's squares that is left where it was
+    fitted to all others by least squares: against the base model, and of several effects against
+    all but each.
 
-    None of fewer than three events.
+    None of fewer than three events, the context's and further `events`; nan where noise hides the
+    set in each of them.
     """
     every = [*context.records.recorded, *events]
     if len(every) < FEWEST_EVENTS:
-        return ()
+        return None
     context.effort.say("leaving each event out in turn")
     plain = context.with_measured_power.held_to_usual
     at = plain.coordinates
@@ -95,9 +104,8 @@ def replicate(
     expected = zip(*(measure_gains(whole, event) for event in every), strict=True)
     gained = zip(*map(measure_gains, others, every), strict=True)
     hidden = tuple(map(find_hidden, every))
-    return tuple(
-        Replication(most, left, hidden) for most, left in zip(expected, gained, strict=True)
-    )
+    pairs = zip(expected, gained, strict=True)
+    return float(np.min([find_least_share(most, left, hidden) for most, left in pairs]))
 
 
 def find_hidden(event: Event) -> float:

@@ -40,7 +40,8 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
     """The base model's fit and tests behind the recorder's window, where there is one; else those
     given.
     """
-    context, noise = base.context, first.noise
+    context = base.context
+    noise = first.noise
     if not context.domain.windowed:
         return base, first
     # the model is of a kind that is always looked at through what the records say
@@ -76,7 +77,8 @@ def _choose_window(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit
     right one.
     """
     best = max(tried, key=lambda one: one.gained)
-    most, criteria = max((s.drop for s in first.scores), default=0.0), first.criteria
+    most = max((s.drop for s in first.scores), default=0.0)
+    criteria = first.criteria
     window = best.behind.records.window
     if window is not None and window.said:  # that the recorder has a window it says is no guess
         return best if best.gained > 0 else None

@@ -172,7 +172,8 @@ class Context:
         """SHA-256 of all that a fit here depends on beside noise and starts; "" where that is not
         known.
         """
-        load, at = self.load, self.coordinates
+        load = self.load
+        at = self.coordinates
         parts = (load.motor, load.static, *load.effects, *self.catalogue.effects)
         if not all(map(store.is_installed, parts)):
             return ""
@@ -375,7 +376,8 @@ class Context:
             Whitened: the residuals, then their derivatives per range. The first C N columns are
             those of the records, then those of the priors.
         """
-        at, k = self.coordinates, len(columns)
+        at = self.coordinates
+        k = len(columns)
         points, width = two_sided(unit, columns)
         raw = self.residuals(np.concatenate([unit[None], points]), names)
         white = self.whiten(noise, np.concatenate([raw[:1], slopes(raw[1:], width)]))

@@ -332,7 +332,8 @@ def moved_across(
     if not columns:
         return fit.unit
     prior = _with_prior(context, [fit.names], faults)[1]
-    unit, deviance = fit.unit, fit.deviance
+    unit = fit.unit
+    deviance = fit.deviance
     for _ in range(fit_effort.MOST_MOVES):
         trials = np.repeat(unit[None], 2 * len(columns) * len(fit_effort.MOVE_REACHES), axis=0)
         for k, mine in zip(columns, np.split(trials, len(columns)), strict=True):
@@ -343,7 +344,8 @@ def moved_across(
         deviances = np.nan_to_num(np.einsum("nr,nr->n", rows, rows), nan=np.inf)
         if not deviances.min() < deviance - fit_effort.LEAST_GAIN:
             break
-        unit, deviance = trials[deviances.argmin()], float(deviances.min())
+        unit = trials[deviances.argmin()]
+        deviance = float(deviances.min())
     return unit
 
 
@@ -391,7 +393,8 @@ def _run_descents(
     `FITS_AT_ONCE` of them take their steps in the same calls, whatever the number of cores: the
     last bits of a fit hang on it.
     """
-    at, spent = context.coordinates, context.effort.total
+    at = context.coordinates
+    spent = context.effort.total
     measured, prior = _with_prior(context, [names for names, _ in wanted], faults)
     always = [*at.base, *at.before, *measured]
     columns = [
@@ -472,7 +475,8 @@ def off_bounds(context: Context, unit: np.ndarray, to: float | None = None) -> l
     list of (D,) arrays
         One, or none where nothing rests on a bound.
     """
-    moved, base = unit.copy(), context.coordinates.base
+    moved = unit.copy()
+    base = context.coordinates.base
     resting = base[
         (unit[base] <= fit_effort.BOUND_MARGIN) | (unit[base] >= 1 - fit_effort.BOUND_MARGIN)
     ]

@@ -71,7 +71,8 @@ class FreeSet:
         FreeSet
             Its null is the problem's defaults, at the measured power.
         """
-        base, null = np.arange(problem.space.dimension), problem.space.to_unit(problem.defaults)
+        base = np.arange(problem.space.dimension)
+        null = problem.space.to_unit(problem.defaults)
         if not initial_power:
             return cls(problem.space, base, np.array([], dtype=int), null, len(base))
         power = power_before(problem)
@@ -231,7 +232,8 @@ class FreeSet:
         """Coordinates (D,) with all parameters of these effects back at their nulls: the model
         without them.
         """
-        moved, columns = unit.copy(), self.parameters(names)
+        moved = unit.copy()
+        columns = self.parameters(names)
         moved[columns] = self.null[columns]
         return moved
 

@@ -25,8 +25,9 @@ from tractexp.model.parts import Effect
 from tractexp.record import Event
 
 # Runge-Kutta steps of a search: as many as this share of the box needs, for the rest is stiff, and
-# often no machine; and none longer than effects answer in [s].
-STEP_SHARE, LONGEST_STEP = 0.95, 1e-3
+# often no machine
+STEP_SHARE = 0.95
+LONGEST_SEARCH_STEP = 1e-3  # s: effects answer within a millisecond
 Key = tuple[frozenset[str], frozenset[str]]  # load effects, and what is tested beside them
 
 
@@ -148,12 +149,17 @@ class Kernels:
         priors : bool
             Whether there is a prior on the motor.
         """
-        self.family, self.events, self.bounds, self.fixed = family, tuple(events), bounds, fixed
+        self.family = family
+        self.events = tuple(events)
+        self.bounds = bounds
+        self.fixed = fixed
         self.bare = Problem(family.model, events, bounds, fixed, substeps, priors=priors)
         self.substeps = self.box_substeps = int(self.bare.step.substeps.max())
         if substeps is None:
             self.bare = self.bare.with_steps_of(STEP_SHARE)
-            within = math.ceil(max(event.record.step for event in events) / LONGEST_STEP - 1e-9)
+            within = math.ceil(
+                max(event.record.step for event in events) / LONGEST_SEARCH_STEP - 1e-9
+            )
             own = max(int(self.bare.step.substeps.max()), min(within, self.box_substeps))
             self.substeps = max(own, self._fewest())
         # of all coordinates
@@ -172,7 +178,8 @@ class Kernels:
         """Steps that the models need by which effects are tested, every effect at its null: some
         are stiff.
         """
-        domain, family = domain_of(self.family.model), self.family
+        domain = domain_of(self.family.model)
+        family = self.family
         if not domain.stiff:
             return 1
         keys = {family.key((), name) for name in (*family.catalogue.of_load, PUSHES)}

@@ -93,7 +93,8 @@ class Problem:
             For unknown names, values out of range, an event without load, a channel that the model
             needs and an event lacks, and where no parameter is left free.
         """
-        self.model, self.priors = model, priors
+        self.model = model
+        self.priors = priors
         self.events = self.domain.events(events)
         check_channels(model, self.events)
         check_power(events)
@@ -125,7 +126,8 @@ class Problem:
             raise UserError(f"{why}; leave at least one free to identify")
         self.space = Box.from_parameters(tuple(free))
         self.defaults = np.array([p.default for p in free])
-        self.lower, self.upper = self.space.lower, self.space.upper
+        self.lower = self.space.lower
+        self.upper = self.space.upper
         self.per_event = tuple(name for name in model.names if name in own)
         self.loss = loss or Loss()
         self._rest = np.array([self.fixed.get(name, np.nan) for name in model.names])
@@ -347,10 +349,12 @@ class Problem:
         """
         if self.loss.quadratic:
             errors = self.model.errors(self.drive, self.candidates(values), self.step.substeps)
-            f, miss = errors.sums.sum(axis=(0, 1)) / self.drive.samples, errors.miss
+            f = errors.sums.sum(axis=(0, 1)) / self.drive.samples
+            miss = errors.miss
         else:
             rows, misses = self._losses(values)
-            f, miss = rows.sum(axis=(1, 2)) / self.drive.samples, misses.sum(axis=0)
+            f = rows.sum(axis=(1, 2)) / self.drive.samples
+            miss = misses.sum(axis=0)
         f = np.where(f < REFUSED, f, REFUSED)
         return np.where(miss > 0, REFUSED * (1 + miss), f)
 

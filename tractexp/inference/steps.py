@@ -82,7 +82,8 @@ def count_steps(model: Model, drive: Drive, events: Sequence[Event], candidates:
     -------
     int
     """
-    fine, until = domain_of(model).finest, _find_ends(model, events)
+    fine = domain_of(model).finest
+    until = _find_ends(model, events)
     return int(model.substeps(drive, candidates, fine, until=until)[0].max())
 
 
@@ -109,7 +110,8 @@ def choose_steps(
     UserError
         Where the finest step that is allowed leaves too large an error.
     """
-    domain, until = domain_of(model), _find_ends(model, events)
+    domain = domain_of(model)
+    until = _find_ends(model, events)
     fine = domain.finest
     chosen, error = model.substeps(drive, probes, fine, share, until)
     if domain.stiff and np.isinf(error).any():  # stiff circuits of the box may diverge: refused

@@ -29,10 +29,8 @@ def event_for(
     bounds: Mapping[str, Sequence[float]],
     fixed: Mapping[str, float],
     *,
-    substeps: int | None = None,
-    criteria: Criteria | None = None,
-    seed: int = 0,
-    tell: Callable[[str], None] = lambda line: None,
+    substeps: int | None,
+    tell: Callable[[str], None],
 ) -> NextEvent:
     """Fit sets of effects to all events, and choose the event that tells them apart.
 
@@ -44,7 +42,7 @@ def event_for(
         All of them are fitted.
     rivals : sequence of names
         Two sets of effects or more.
-    bounds, fixed, substeps, criteria, seed, tell
+    bounds, fixed, substeps, tell
         As of `tractexp.discrepancy.investigate.investigate`.
 
     Returns
@@ -57,7 +55,6 @@ def event_for(
         For fewer than two sets, and for effects that cannot be told on these events or are no
         load's.
     """
-    criteria = criteria or Criteria()
     sets = list(dict.fromkeys(tuple(sorted(names)) for names in rivals))
     if len(sets) < 2:
         raise UserError(
@@ -72,7 +69,7 @@ def event_for(
     _check(missing, named)
     with Effort(tell).audible() as effort:
         context = Context.from_records(
-            model, missing, Records.from_events(events), bounds, fixed, criteria, effort, substeps
+            model, missing, Records.from_events(events), bounds, fixed, Criteria(), effort, substeps
         )
         base = base_fit(context)
         effort.say(f"fitting {len(sets)} explanations")
@@ -89,7 +86,7 @@ def event_for(
         )
         labels = [join_words(list(fit.names)) for fit in fits]
         error = min(curves(context, f.unit, noise, f.names).error.certain for f in fits)
-        return next_event(context, noise, bare, fits, labels, seed, error)
+        return next_event(context, noise, bare, fits, labels, error=error)
 
 
 def _check(missing: Catalogue, named: Sequence[str]) -> None:

@@ -73,7 +73,8 @@ def term_assessments(
     """
     fits = result.fits[:MOST_JUDGED_TERMS]
     other, units, noise = carry_fits(result.context, events, [result.bare, *reversed(fits)])
-    bare, held = units[0], list(reversed(units[1:]))
+    bare = units[0]
+    held = list(reversed(units[1:]))
     fitted = [*result.context.coordinates.base, *result.context.coordinates.before]
     train = _assess_models(
         original,

@@ -128,7 +128,8 @@ def _proposal(
 ) -> Proposal:
     """The proposal of the best term that stands, with those that it cannot be told from."""
     chosen, *others = standing
-    term, values = result.term(chosen.fit), result.values(chosen.fit)
+    term = result.term(chosen.fit)
+    values = result.values(chosen.fit)
     errors = standard_errors(result, chosen.fit)
     estimates = tuple(
         ParameterEstimate(p, values[p.name], errors[p.name]) for p in term.parameters(values)
@@ -173,7 +174,9 @@ def change(result: TermFits, fit: Refit) -> np.ndarray:
 
 def _find_acting_places(result: TermFits, fit: Refit) -> list[Acting]:
     """Where in each event a term changes a channel by more than a tenth of the most it does."""
-    context, added, terms = result.context, change(result, fit), []
+    context = result.context
+    added = change(result, fit)
+    terms = []
     for e, event in enumerate(context.events):
         own = added[:, context.drive.part(e)]
         channel, _ = np.unravel_index(np.abs(own).argmax(), own.shape)

@@ -31,8 +31,9 @@ from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
 MOST_ALIKE_TERMS = 4  # of one signal and clock at most, so that others are tried, too
-# of the zoom; of the distance to the grid's neighbors
-ROUNDS, FINER = 3, (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)
+ZOOM_ROUNDS = 3
+# of the distance to a setting's neighbors on the grid: where else a zoom looks
+NEIGHBOR_SHARES = (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)
 EXACT_FIT_SHARE = 0.05  # of what the best explains: the terms that are fitted exactly
 MOST_EXACT_FITS = 6  # of them at most
 MOST_JUDGED_TERMS = 5  # of the best, that held-out events are asked about
@@ -107,7 +108,7 @@ def _far(a: TermScore, b: TermScore) -> bool:
 def zoom_settings(ground: Ground, scored: Sequence[TermScore]) -> list[TermScore]:
     """The same terms at better settings, each parameter moved by itself on ever finer grids."""
     best = list(scored)
-    for turn in range(ROUNDS):
+    for turn in range(ZOOM_ROUNDS):
         for k in range(max((len(f.term.signal.shapes) for f in best), default=0)):
             tried = [
                 (i, setting) for i, f in enumerate(best) for setting in _finer(f, k, 4.0**-turn)
@@ -125,10 +126,11 @@ def _finer(scored: TermScore, which: int, scale: float) -> list[dict[str, float]
     if which >= len(shapes) or shapes[which].name == "phase":
         return []
     shape = shapes[which]
-    grid, now = np.array(shape.grid), scored.setting[shape.name]
+    grid = np.array(shape.grid)
+    now = scored.setting[shape.name]
     near = np.sort(np.abs(grid - now))
     reach = scale * (near[near > 0][0] if (near > 0).any() else 0.1 * np.ptp(shape.bounds))
-    moved = (float(np.clip(now + part * reach, *shape.bounds)) for part in FINER)
+    moved = (float(np.clip(now + part * reach, *shape.bounds)) for part in NEIGHBOR_SHARES)
     return [{**scored.setting, shape.name: value} for value in dict.fromkeys(moved) if value != now]
 
 
@@ -217,7 +219,8 @@ def _fit_without_term(
     context: Context, noise: Noise, fit: Refit
 ) -> tuple[Term, dict[str, float], Ground]:
     """The term of a fit, its sizes and setting, and the ground of that fit without it."""
-    chosen, at = term(fit.names[0]), context.coordinates
+    chosen = term(fit.names[0])
+    at = context.coordinates
     values = values_of(at, fit.unit, chosen)
     return (
         chosen,
@@ -244,7 +247,8 @@ def standard_errors(result: TermFits, fit: Refit) -> dict[str, float]:
     """Of a term's parameters, by their own names, all else free beside them; infinite where nothing
     is known.
     """
-    context, chosen = result.context, result.term(fit)
+    context = result.context
+    chosen = result.term(fit)
     at = context.coordinates
     own = at.parameters(fit.names)
     _, rows = context.linearize(fit.unit, result.noise, [*at.nuisances(()), *own], fit.names)

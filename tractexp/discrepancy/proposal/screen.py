@@ -162,8 +162,10 @@ def _kind(members: Members) -> str:
 
 def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermScore, np.ndarray]]:
     """The scores of terms that are simulated together."""
-    at, index = ground.context.coordinates, {}
-    points, spans = [], []
+    at = ground.context.coordinates
+    index = {}
+    points = []
+    spans = []
     blocks = []
     for members in batch:
         for t, s in members:
@@ -184,14 +186,16 @@ def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermSc
             blocks.append((t, s, rows))
     columns = ground.columns(np.array(points), np.array(spans), blocks[0][0].signal.kind)
     seen = columns.shape[1]
-    side, drawn = columns @ ground.r[:seen], columns @ noise[:, :seen].T
+    side = columns @ ground.r[:seen]
+    drawn = columns @ noise[:, :seen].T
     along = columns @ ground.Q[:seen]
     pairs = []
     for t, s, rows in blocks:
         # what the nuisances explain taken away
         gram = columns[rows] @ columns[rows].T - along[rows] @ along[rows].T
         inverse = _inverse(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
-        sizes, chance = -inverse @ side[rows], drawn[rows]
+        sizes = -inverse @ side[rows]
+        chance = drawn[rows]
         drops = (chance * (inverse @ chance)).sum(axis=0)
         pairs.append((_build_term_score(t, s, sizes, float(-sizes @ side[rows])), drops))
     return pairs
