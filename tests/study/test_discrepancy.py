@@ -33,7 +33,7 @@ from tractexp.discrepancy.held_out import assess, carry_fits, compare_on
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.errors import UserError
-from tractexp.inference import goodness_of_fit, kernels, multistart
+from tractexp.inference import kernels, multistart, residual_statistics
 from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.chance import BLURRED, scales
@@ -595,7 +595,7 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
 
 @pytest.mark.parametrize(("events", "asked"), [(1, False), (2, True)])
 def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, asked, monkeypatch):
-    monkeypatch.setattr(goodness_of_fit, "statistics", lambda channels, problem: {})
+    monkeypatch.setattr(residual_statistics, "statistics", lambda channels, problem: {})
     projection = SimpleNamespace(
         variance_component=lambda: np.zeros(1),
         least_p=np.ones(1),

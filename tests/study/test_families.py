@@ -26,14 +26,15 @@ from tractexp.discrepancy.held_out import assess
 from tractexp.discrepancy.investigate import investigate
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
-from tractexp.inference import fit_effort, fitting
+from tractexp.inference import fit_effort, wide_fit
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
-from tractexp.inference.fitting import Refit, scatter_starts
+from tractexp.inference.fitting import Refit
 from tractexp.inference.injection import PUSHES
 from tractexp.inference.kernels import Family, Kernels
 from tractexp.inference.linearization import tangent
+from tractexp.inference.wide_fit import scatter_starts
 from tractexp.model.declaration import Refused
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")
@@ -432,10 +433,10 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
         turns.append(len(wanted))
         return [Refit(names, unit, ways[names[0]][len(turns) - 1], 0) for names, unit in wanted]
 
-    monkeypatch.setattr(fitting, "_run_descents", descended)
-    monkeypatch.setattr(fitting, "_begun", descended)
-    monkeypatch.setattr(fitting, "moved_across", lambda bench, noise, fit, faults: fit.unit)
-    ended = fitting._in_turns(
+    monkeypatch.setattr(wide_fit, "run_descents", descended)
+    monkeypatch.setattr(wide_fit, "_begun", descended)
+    monkeypatch.setattr(wide_fit, "moved_across", lambda bench, noise, fit, faults: fit.unit)
+    ended = wide_fit._in_turns(
         at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None
     )
     assert (ended[0].names, ended[0].deviance) == (("falls",), 60.0)

@@ -15,11 +15,12 @@ from tractexp.blocks import Report
 from tractexp.configuration.plugin import get
 from tractexp.discrepancy.decide import decide, find_predicting
 from tractexp.discrepancy.evidence import SLIGHT_ERROR, Evidence, PredictedError, SetEvidence
-from tractexp.discrepancy.explain import explain, find_nearest_sets
+from tractexp.discrepancy.explain import explain
 from tractexp.discrepancy.explanations import search_effect_sets
 from tractexp.discrepancy.findings import is_end_of_range
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
+from tractexp.discrepancy.nearest import find_nearest_sets
 from tractexp.discrepancy.precision import estimates, standard_errors
 from tractexp.discrepancy.prediction import (
     SHARING,

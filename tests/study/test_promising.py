@@ -35,7 +35,7 @@ def test_the_best_of_all_descents_begins_at_a_start_that_promises(planted):
     assert len(kept) == fit_effort.MOST_STARTS
     best = lambda these: min(  # noqa: E731
         f.deviance
-        for f in fitting._run_descents(
+        for f in fitting.run_descents(
             at, noise, [(TRIP, u) for u in these], None, fit_effort.ROUGH_DESCENT
         )
     )

@@ -16,9 +16,10 @@ from tractexp.inference.base_fit import fitted_from
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.inference.criteria import Criteria
-from tractexp.inference.fitting import Names, Refit, best_of, refit, wide_refit
+from tractexp.inference.fitting import Names, Refit, best_of, refit
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.records import Records
+from tractexp.inference.wide_fit import wide_refit
 from tractexp.noise import Noise
 from tractexp.record import Event
 

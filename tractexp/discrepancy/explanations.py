@@ -34,10 +34,10 @@ from tractexp.inference.fitting import (
     off_bounds,
     refit,
     rough_refit,
-    wide_refits,
 )
 from tractexp.inference.multistart import DISTINCT
 from tractexp.inference.score_test import Score
+from tractexp.inference.wide_fit import wide_refits
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct, spread_evenly
 

@@ -19,7 +19,8 @@ from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.catalogue import Candidate
 from tractexp.inference.context import Context
 from tractexp.inference.fit_effort import NEAR_BEST
-from tractexp.inference.fitting import Names, Refit, Start, off_bounds, wide_refits
+from tractexp.inference.fitting import Names, Refit, Start, off_bounds
+from tractexp.inference.wide_fit import wide_refits
 from tractexp.noise import Noise
 
 NEAREST = 4  # members that are searched to the end

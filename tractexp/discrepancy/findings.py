@@ -15,14 +15,11 @@ from tractexp.discrepancy.decide import (
 )
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.evidence import Evidence
-from tractexp.discrepancy.explain import (
-    Nearest,
-    explain,
-    measure_least_error,
-)
+from tractexp.discrepancy.explain import explain
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.gap import GapTest, gap, share_gone
 from tractexp.discrepancy.grades import Grader
+from tractexp.discrepancy.nearest import Nearest, measure_least_error
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import (
     Overlay,

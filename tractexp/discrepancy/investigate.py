@@ -17,15 +17,13 @@ from tractexp.discrepancy.decide import (
 )
 from tractexp.discrepancy.disagreement import disagreement
 from tractexp.discrepancy.evidence import Evidence
-from tractexp.discrepancy.explain import (
-    choose_next_event,
-    find_nearest_sets,
-)
+from tractexp.discrepancy.explain import choose_next_event
 from tractexp.discrepancy.explanations import Explanations, explanations
 from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.gap import GapTest, gap
 from tractexp.discrepancy.grades import Grader
 from tractexp.discrepancy.held_out import judge_held_out
+from tractexp.discrepancy.nearest import find_nearest_sets
 from tractexp.discrepancy.places import places
 from tractexp.discrepancy.prediction import predict_held_out
 from tractexp.discrepancy.proposal.propose import ProposalResult, propose

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.explain import Nearest
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import carry_fits
+from tractexp.discrepancy.nearest import Nearest
 from tractexp.discrepancy.places import DisagreementInterval
 from tractexp.discrepancy.remainder import Remainder, remainders
 from tractexp.domain import domain_of

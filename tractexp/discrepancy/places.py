@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.inference.goodness_of_fit import (
+from tractexp.inference.goodness_of_fit import extremes
+from tractexp.inference.residual_statistics import (
     LOUDEST,
     ResidualWindow,
-    extremes,
     measure_energies,
     residual_windows,
 )

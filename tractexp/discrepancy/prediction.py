@@ -38,9 +38,10 @@ from tractexp.discrepancy.ranking import MOST_NAMED, find_nearest, rank_sets
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Refit, best_of, refit, wide_refits
+from tractexp.inference.fitting import Refit, best_of, refit
 from tractexp.inference.model_error import block_sums, noise_variance
 from tractexp.inference.records import Records
+from tractexp.inference.wide_fit import wide_refits
 from tractexp.noise import Noise
 from tractexp.record import Event
 

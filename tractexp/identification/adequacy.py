@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.inference import goodness_of_fit
+from tractexp.inference import residual_statistics
 from tractexp.inference.goodness_of_fit import (
     ADEQUATE_P,
-    PER_EVENT,
+    LEAST_DISTINCT_SHARE,
     GoodnessOfFit,
     compare_with_draws,
 )
@@ -29,6 +29,7 @@ from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import ModelError, describe_stall
 from tractexp.inference.observed import Observed
 from tractexp.inference.problem import Problem
+from tractexp.inference.residual_statistics import PER_EVENT
 from tractexp.inference.sandwich import off_walls
 from tractexp.inference.separable import Sensitivities, SeparableBasis
 
@@ -130,7 +131,7 @@ def surprise(
     split = of_each_event(J, steady)
 
     def compute_statistics(rest: np.ndarray) -> dict[str, np.ndarray]:
-        by_test = goodness_of_fit.statistics(
+        by_test = residual_statistics.statistics(
             rest.reshape(len(rest), observed.drive.channels, -1), observed.problem
         )
         return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
@@ -171,7 +172,7 @@ def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
     shared = J.without_own.T
     columns = np.concatenate([shared[~steady], shared[steady]])
     return replace(J, columns=columns, k=int(np.count_nonzero(~steady))).basis(
-        goodness_of_fit.LEAST_DISTINCT_SHARE, 1e-9
+        LEAST_DISTINCT_SHARE, 1e-9
     )
 
 
@@ -273,7 +274,7 @@ def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]
     str
         Where it is: channel, event and times [s].
     """
-    windows = goodness_of_fit.residual_windows(problem)
+    windows = residual_statistics.residual_windows(problem)
     row = problem.drive.labels.index
     level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in windows]
     k = int(np.argmax(level))

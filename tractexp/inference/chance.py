@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from tractexp.cache import store
-from tractexp.inference import goodness_of_fit
+from tractexp.inference import residual_statistics
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.inference.goodness_of_fit import SMALLEST_P, Scale, compare_with_draws
@@ -156,7 +156,9 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         drawn = own.replace_residuals(_white(t, noise, np.random.default_rng((seed, k))))
-        by_test = goodness_of_fit.statistics(drawn.channels(t.context.problem), t.context.problem)
+        by_test = residual_statistics.statistics(
+            drawn.channels(t.context.problem), t.context.problem
+        )
         return {
             name: (values.mean(axis=0), (values**2).mean(axis=0))
             for name, values in by_test.items()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp.inference.goodness_of_fit import windows
+from tractexp.inference.residual_statistics import windows
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 

@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from tractexp.inference import goodness_of_fit
+from tractexp.inference import residual_statistics
 from tractexp.inference.catalogue import Candidate
-from tractexp.inference.goodness_of_fit import LEAST_DISTINCT_SHARE, PER_EVENT, SMALLEST_P
+from tractexp.inference.goodness_of_fit import LEAST_DISTINCT_SHARE, SMALLEST_P
 from tractexp.inference.problem import Problem
+from tractexp.inference.residual_statistics import PER_EVENT
 from tractexp.noise.span import compute_basis
 
 
@@ -185,7 +186,7 @@ class ScoreTest:
         by_test = {
             "pushes into the balances": self.variance_component(),
             "a further effect": -np.log(self.least_p)[:, None],
-            **goodness_of_fit.statistics(self.channels(problem), problem),
+            **residual_statistics.statistics(self.channels(problem), problem),
         }
         if len(problem.events) > 1:
             by_test[PER_EVENT] = (

@@ -11,8 +11,8 @@ import numpy as np
 from tractexp.blocks import Report, Table
 from tractexp.discrepancy.decide import UNEXPLAINED
 from tractexp.discrepancy.discrepancy_json import recommendation
-from tractexp.discrepancy.explain import Nearest
 from tractexp.discrepancy.findings import Findings
+from tractexp.discrepancy.nearest import Nearest
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.readings import read_shapes
 from tractexp.discrepancy.remainder import Remainder

@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.findings import Findings
-from tractexp.inference.goodness_of_fit import residual_windows
+from tractexp.inference.residual_statistics import residual_windows
 from tractexp.text.wording import join_words
 
 MOST_TRIED = 8  # sets, those that lower the deviance most

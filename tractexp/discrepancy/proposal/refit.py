@@ -17,16 +17,9 @@ from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, ter
 from tractexp.discrepancy.proposal.screen import Ground, ScreenResult, TermScore, scores
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import (
-    Refit,
-    Start,
-    best_of,
-    off_bounds,
-    refit,
-    rough_refit,
-    wide_refit,
-)
+from tractexp.inference.fitting import Refit, Start, best_of, off_bounds, refit, rough_refit
 from tractexp.inference.information import free_standard_errors
+from tractexp.inference.wide_fit import wide_refit
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
