@@ -144,7 +144,7 @@ def lengths(series: str, seed: int) -> dict:
 def told_at_truth(event, truth: dict[str, float]) -> dict[str, float]:
     """Relative standard errors at the true values, under the noise that the event shows there."""
     from tractexp.configuration.plugin import get
-    from tractexp.identification.estimate import noise_at
+    from tractexp.identification.residual_noise import noise_at
     from tractexp.identification.uncertainty import conclude
     from tractexp.inference.likelihood import Likelihood
     from tractexp.inference.observed import Observed

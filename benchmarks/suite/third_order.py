@@ -9,7 +9,7 @@ from cases import Event
 
 import tractexp
 from tractexp.configuration.plugin import build
-from tractexp.identification.result import respond
+from tractexp.identification.fit import respond
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
 from tractexp.record import Event as Dip

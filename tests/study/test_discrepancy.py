@@ -27,11 +27,12 @@ from tractexp.discrepancy import explanations
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.decide import holds, needs_all_events
 from tractexp.discrepancy.disagreement import disagreement, examine_fit
-from tractexp.discrepancy.discrepancy_json import content, recommendation, write_left, write_model
+from tractexp.discrepancy.discrepancy_json import content, write_left, write_model
 from tractexp.discrepancy.explanations import beneath, search_effect_sets, without_needless
 from tractexp.discrepancy.held_out import assess, carry_fits, compare_on
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
+from tractexp.discrepancy.recommend import recommendation
 from tractexp.errors import UserError
 from tractexp.inference import kernels, multistart, residual_statistics
 from tractexp.inference.base_fit import base_fit

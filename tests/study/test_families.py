@@ -16,7 +16,6 @@ from tractexp.configuration.plugin import discover, get
 from tractexp.discrepancy import families, held_out, rival_sets
 from tractexp.discrepancy.all_events import AllEvents, JointFit
 from tractexp.discrepancy.decide import Verdict, decide, find_adequate, holds
-from tractexp.discrepancy.discrepancy_json import recommendation
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import worth_another
 from tractexp.discrepancy.families import against_members, open_settings, starts, worth
@@ -24,6 +23,7 @@ from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import assess
 from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.recommend import recommendation
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
 from tractexp.inference import fit_effort, wide_fit

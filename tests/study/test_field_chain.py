@@ -12,7 +12,7 @@ import pytest
 import tractexp
 from tractexp.api.compose import model_of
 from tractexp.filetypes import comtrade
-from tractexp.identification.result import respond
+from tractexp.identification.fit import respond
 from tractexp.inference.problem import Problem
 from tractexp.record.window import average, sharpen_voltage
 

@@ -12,7 +12,7 @@ import uncertainty as study
 from scipy import stats
 
 import tractexp
-from tractexp.identification.result import Fit
+from tractexp.identification.fit import Fit
 from tractexp.inference.model_error import (
     ModelError,
     block_sums,

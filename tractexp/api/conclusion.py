@@ -9,7 +9,8 @@ from tractexp.api.fit_spec import FitSpec
 from tractexp.configuration.choices import set_holding
 from tractexp.configuration.run_command import suggest_run
 from tractexp.identification.adequacy import Adequacy
-from tractexp.identification.result import Result, conclude, refuse_failed
+from tractexp.identification.conclude import conclude, refuse_failed
+from tractexp.identification.result import Result
 from tractexp.identification.search import SearchResult
 from tractexp.text.progress import Progress, counter
 from tractexp.text.wording import join_words
@@ -17,7 +18,7 @@ from tractexp.text.wording import join_words
 if TYPE_CHECKING:
     from tractexp.identification.agreement import EventAgreement
     from tractexp.identification.estimate import EstimationResult
-    from tractexp.identification.result import Fit
+    from tractexp.identification.fit import Fit
     from tractexp.identification.uncertainty import Uncertainty
 
 

@@ -21,7 +21,8 @@ from tractexp.api.setup import describe_records
 from tractexp.api.task import Task, print_result, print_written
 from tractexp.configuration.plugin import plugin
 from tractexp.errors import MODEL, UserError, check_range
-from tractexp.identification.result import Result, conclude
+from tractexp.identification.conclude import conclude
+from tractexp.identification.result import Result
 from tractexp.identification.search import History, SearchResult
 from tractexp.outcome import Written
 from tractexp.storage import files

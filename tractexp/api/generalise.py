@@ -23,7 +23,8 @@ from tractexp.text.progress import Progress, tell
 
 if TYPE_CHECKING:
     from tractexp.api.given import Chosen, ModelGiven, Records, Several
-    from tractexp.identification.result import Fit, Result
+    from tractexp.identification.fit import Fit
+    from tractexp.identification.result import Result
 
 CAPTION = (
     "residuals: mean absolute value of Eq. (21), pu; medians over the seeds. estimate: the most"
@@ -190,8 +191,9 @@ def _run_searches(
     setup: Setup, optimizers: Sequence[Choice], seeds: int, progress: Progress
 ) -> "Iterable[tuple[Result, list[Fit]]]":
     """The estimate, then where each search ended, with the fits of the held-out events."""
+    from tractexp.identification.conclude import conclude, refuse_failed
     from tractexp.identification.estimate import estimate
-    from tractexp.identification.result import conclude, play, refuse_failed
+    from tractexp.identification.fit import play
 
     problem, node, fitted = setup.problem, setup.model.node, len(setup.train)
     for optimizer in optimizers:

@@ -18,7 +18,9 @@ from tractexp.blocks import Report, Table
 from tractexp.configuration.run_command import build_folder_command
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Grade
-from tractexp.identification.result import Result, by_event, conclude, play
+from tractexp.identification.conclude import conclude
+from tractexp.identification.fit import play
+from tractexp.identification.result import Result, by_event
 from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.inference.model_error import ModelError
 from tractexp.outcome import Drawing, Written
@@ -289,8 +291,8 @@ class Identification(Written):
         return Response("prediction", t, U, P, Q, band=band)
 
     def _predict_event(self, event: "Event") -> Response:
+        from tractexp.identification.fit import respond
         from tractexp.identification.forecast import Forecast
-        from tractexp.identification.result import respond
 
         model, base = self.model.model, self.result.base
         values = np.array([self.result.parameters[name] for name in model.names])

@@ -29,8 +29,8 @@ from tractexp.text.progress import Progress, tell
 
 if TYPE_CHECKING:
     from tractexp.api.given import Records, Source
+    from tractexp.identification.fit import Fit
     from tractexp.identification.linear_network import BlackBox
-    from tractexp.identification.result import Fit
 
 MOST_ASKED_POLES = 12  # poles that may be asked for
 
@@ -178,14 +178,14 @@ def _fit_networks(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
 
 def _play(box: "BlackBox", event: Event, role: str) -> "Fit":
     """The response of a network to an event, as a fit of that role."""
-    from tractexp.identification.result import Fit
+    from tractexp.identification.fit import Fit
 
     return Fit(role=role, **vars(box.play(box.domain.event(event))))
 
 
 def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
     """The response of a network to every event, those fitted first."""
-    from tractexp.identification.result import TRAIN, VALIDATE
+    from tractexp.identification.fit import TRAIN, VALIDATE
 
     return [
         _play(box, e, role)
@@ -196,7 +196,7 @@ def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
 
 def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[str, Any]:
     """The content of `linear_network.json`."""
-    from tractexp.identification.result import model_errors
+    from tractexp.identification.fit import model_errors
     from tractexp.identification.yardstick import network_in_words
     from tractexp.inference.model_error import ModelError
 

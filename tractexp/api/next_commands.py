@@ -17,12 +17,8 @@ def list_next_commands(result: Investigation, paths: Mapping[str, Path]) -> list
 
     What is missing still is looked for in the domain that tells more, where there is one.
     """
-    from tractexp.discrepancy.discrepancy_json import (
-        MODEL_FILE,
-        PLUGIN,
-        adopt_term,
-        use_of,
-    )
+    from tractexp.discrepancy.discrepancy_json import MODEL_FILE, adopt_term, use_of
+    from tractexp.discrepancy.proposal.generate import PLUGIN
 
     lines, domain = [], result.question.model.domain
     grade, fit_all = result.content["adequacy"]["grade"], result.gap.fitted_to_both

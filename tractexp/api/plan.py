@@ -22,8 +22,9 @@ from tractexp.configuration.run_command import suggest_run
 from tractexp.errors import MODEL, TASK, UserError, check_range, setting
 from tractexp.identification import plan as planning
 from tractexp.identification.adequacy import Grade
+from tractexp.identification.fit import play
 from tractexp.identification.plan import ChosenEvent, DipShape
-from tractexp.identification.result import Result, load, play
+from tractexp.identification.result import Result, load
 from tractexp.inference.model_error import ModelError, in_percent, model_error
 from tractexp.noise import Noise
 from tractexp.outcome import Written

@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.api.arguments import Choice
 from tractexp.api.setup import Given
-from tractexp.identification.result import refuse_failed
+from tractexp.identification.conclude import refuse_failed
 from tractexp.identification.search import search
 from tractexp.inference.problem import Problem
 from tractexp.text.progress import Progress, tell_stages

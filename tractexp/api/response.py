@@ -16,7 +16,7 @@ from tractexp.text.wording import epsilon
 if TYPE_CHECKING:
     import pandas
 
-    from tractexp.identification.result import Fit
+    from tractexp.identification.fit import Fit
     from tractexp.model.model import Model
 
 
@@ -131,7 +131,7 @@ def respond_to(
     `own` is the base that the values are on, None that of the event. Raises `UserError` where it
     has no steady state there.
     """
-    from tractexp.identification.result import respond
+    from tractexp.identification.fit import respond
 
     return response_of(
         respond(model, values, event if own is None else own.convert_event(event), "validate"),

@@ -32,6 +32,7 @@ from tractexp.discrepancy.places import DisagreementInterval
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult
 from tractexp.discrepancy.rest import Rest, find_shapes, share_of
+from tractexp.identification.conclude import at_bound
 from tractexp.identification.frequency_course import (
     FREQUENCY_SWING,
     FrequencyCourse,
@@ -39,7 +40,6 @@ from tractexp.identification.frequency_course import (
     is_frequency_unknown,
 )
 from tractexp.identification.grade import GradedModel
-from tractexp.identification.result import at_bound
 from tractexp.identification.verdict import UNIDENTIFIED, size
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.catalogue import Catalogue

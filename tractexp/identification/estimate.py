@@ -23,6 +23,7 @@ import numpy as np
 
 from tractexp.errors import MODEL, TASK, UserError
 from tractexp.identification.adequacy import Surprise, surprise
+from tractexp.identification.residual_noise import drop_outliers, noise_at
 from tractexp.identification.uncertainty import LocalMinimum, Uncertainty, conclude, threshold
 from tractexp.inference.blocks import blocks_of, exceeds
 from tractexp.inference.least_squares import Descent
@@ -36,20 +37,12 @@ from tractexp.inference.multistart import (
 from tractexp.inference.observed import Observed
 from tractexp.inference.prior import held_in_words, weigh_prior
 from tractexp.inference.problem import Problem
-from tractexp.noise.color import (
-    FEWEST_NOISE_SAMPLES,
-    fit_autoregression,
-    stretches,
-    white_noise,
-)
-from tractexp.noise.model import Noise, Pair
 
 ESTIMATE_ROUNDS = 2  # of noise and fit in turn
 LARGEST_MINIMUM_RATIO = 1.3  # times the least sum of squares: valleys beyond it are given up
 BEHIND = 25.0  # of the deviance under the noise found: valleys farther behind are
 # of the deviance, by which a search's valley must be better than those of the box
 LEAST_MINIMUM_GAIN = 0.5
-OUTLIER = 5.0  # robust standard deviations from which a robust loss takes a sample for an outlier
 SAME_MINIMUM_DISTANCE = 1e-3  # of a range: ends closer than this are one valley
 REMEMBERED = 4  # problems whose valleys are kept: the jobs of a sweep share one
 
@@ -376,82 +369,6 @@ def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.nda
         order = np.argsort(result.deviance, kind="stable")
         units = result.unit[order[result.deviance[order] <= result.deviance.min() + BEHIND]]
     return likelihood, units
-
-
-def noise_at(
-    observed: Observed,
-    likelihood: Likelihood,
-    unit: np.ndarray,
-    input_modes: np.ndarray | None,
-    whole: bool = False,
-) -> Noise:
-    """The noise that a fit leaves in quiet.
-
-    Where only noise is left the whole residual tells more; and where too little is quiet, it has to
-    do.
-
-    Parameters
-    ----------
-    observed : Observed
-        The problem, driven by smoothed voltages.
-    likelihood : Likelihood
-        Whose residuals they are.
-    unit : (D,)
-        Coordinates of the fit.
-    input_modes : (k, C, N) [pu] or None
-        That of `Observed.input_errors`.
-    whole : bool
-        Whether the whole residual is taken.
-
-    Returns
-    -------
-    Noise
-    """
-    measured = likelihood.problem.drive.measurements
-    rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
-    residual = rows.reshape(measured.shape)
-    values = likelihood.values(unit)
-    return observed.noise(residual, likelihood.valid, J, values, input_modes, whole) or noise_of(
-        likelihood, residual
-    )
-
-
-def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
-    """An autoregression of each event's and channel's residual (2, N); what the fit has absorbed is
-    given back.
-    """
-    drive = likelihood.problem.drive
-    absorbed = likelihood.free + 2 * drive.events
-    back = np.sqrt(likelihood.samples / max(likelihood.samples - absorbed, 1))
-    pairs: list[Pair] = []
-    for e in range(drive.events):
-        part, pair = drive.part(e), []
-        for c in range(drive.channels):
-            pieces = stretches(residuals[c, part], likelihood.valid[c, part])
-            enough = sum(map(len, pieces)) >= FEWEST_NOISE_SAMPLES
-            pair.append(
-                fit_autoregression(pieces).scale_noise(back) if enough else white_noise(1.0)
-            )
-        pairs.append(tuple(pair))
-    return Noise(tuple(pairs))
-
-
-def drop_outliers(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
-    """The likelihood without the samples beyond `OUTLIER` robust standard deviations of the fit at
-    `unit` (1, D).
-    """
-    drive = likelihood.problem.drive
-    valid = drive.weights > 0
-    residuals = np.abs(replace(likelihood, valid=valid).residuals(unit)[0])
-    for e in range(drive.events):
-        for c in range(drive.channels):
-            part = drive.part(e)
-            sample = residuals[c, part][valid[c, part]]
-            if len(sample):
-                valid[c, part] &= residuals[c, part] <= max(
-                    OUTLIER * 1.4826 * float(np.median(sample)), 1e-12
-                )
-    return replace(likelihood, valid=valid)
 
 
 def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertainty:

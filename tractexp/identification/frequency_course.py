@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp.identification.result import play
+from tractexp.identification.fit import play
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import model_error
 from tractexp.inference.prior import weigh_prior

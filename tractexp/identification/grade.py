@@ -13,16 +13,11 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.adequacy import Adequacy, Grade, grade_errors
+from tractexp.identification.conclude import active_bounds
 from tractexp.identification.division import doubt_estimate
 from tractexp.identification.estimate import EstimationResult, estimate, estimate_without_search
+from tractexp.identification.fit import Fit, explain_refusal, model_errors, play
 from tractexp.identification.forecast import forecast_next_dip
-from tractexp.identification.result import (
-    Fit,
-    active_bounds,
-    explain_refusal,
-    model_errors,
-    play,
-)
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.model_error import ModelError

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identification.result import Fit, play
+from tractexp.identification.fit import Fit, play
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import (
     BOUND,

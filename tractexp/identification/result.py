@@ -6,33 +6,30 @@ import functools
 import json
 import math
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tractexp.cache import provenance
 from tractexp.configuration.plugin import build
-from tractexp.domain import DOMAINS, Playback, domain_of
-from tractexp.errors import MODEL, UserError
+from tractexp.domain import DOMAINS, domain_of
+from tractexp.errors import UserError
 from tractexp.identification import stored
 from tractexp.identification.adequacy import ACCEPTED
+from tractexp.identification.fit import TRAIN
 from tractexp.identification.forecast import Forecast
-from tractexp.identification.search import REFUSED, History, SearchResult
-from tractexp.identification.verdict import BOUND_DISTANCE
-from tractexp.inference.model_error import in_percent, model_error, relative_errors
-from tractexp.inference.problem import Problem
-from tractexp.model.drive import PHASORS, Drive
+from tractexp.identification.search import History
+from tractexp.inference.model_error import in_percent
+from tractexp.model.drive import PHASORS
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.outcome import Plain
-from tractexp.record import Event, OwnBase, Record, find_dips
+from tractexp.record import OwnBase, Record, find_dips
 from tractexp.record.identity import Identity
 from tractexp.record.own_base import scale_parameter
 from tractexp.storage import files
 
-TRAIN, VALIDATE = "train", "validate"
 BEFORE = ("U0", "P0", "Q0", "frequency")  # of the first event, what its steady state stands on
 SMALL_Q = 0.3  # of S: with less, an epsilon_q beyond Eq. (20) may be a small error of the load
 FILE = "result.json"  # in the folder of a run
@@ -54,29 +51,6 @@ def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str, float
     )
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Fit(Playback):
-    """Measured and calculated power of one event that was fitted or held out."""
-
-    role: str  # TRAIN or VALIDATE
-
-    def to_dict(self) -> dict[str, Any]:
-        """As `result.json` has it; where Q is a small share of S, Eq. (20) divides its error by
-        little.
-        """
-        record = self.event.record
-        share = float(
-            np.sqrt(np.nansum(record.Q**2) / max(np.nansum(record.P**2 + record.Q**2), 1e-30))
-        )
-        row: dict[str, Any] = {"name": record.name, "role": self.role}
-        row |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q, "Q_over_S": share}
-        return (
-            row
-            if self.epsilon_i is None
-            else row | {"epsilon_i": self.epsilon_i, "unsettled": self.unsettled}
-        )
-
-
 def by_event(
     values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]
 ) -> dict[str, float]:
@@ -87,29 +61,6 @@ def by_event(
         for k, value in enumerate(each, start=1)
     }
     return {**values, **own}
-
-
-def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
-    """Play one event through the model. Raises `UserError` where these parameters have no steady
-    state there.
-    """
-    domain = domain_of(model)
-    event = domain.event(event)
-    drive = Drive.from_events([domain.excitation(event, model)])
-    if refusal := model.refusal(values, drive):
-        raise UserError(f"{event.record.name}: {refusal}")
-    substeps, _ = model.substeps(drive, values)
-    response = model.simulate(drive, values, substeps)
-    return Fit(role=role, **vars(domain.comparison(event, response.outputs[:, 0])))
-
-
-def explain_refusal(model: Model, values: np.ndarray, event: Event) -> str:
-    """Return why an event cannot be played through the model at these values; "" where it can."""
-    domain = domain_of(model)
-    return (
-        model.refusal(values, Drive.from_events([domain.excitation(domain.event(event), model)]))
-        or ""
-    )
 
 
 @dataclass(frozen=True)
@@ -425,148 +376,3 @@ def load(path: Path) -> Result:
         raise UserError(
             f"there is no result file {path}; run an identification first, it writes {FILE}"
         ) from None
-
-
-def conclude(
-    problem: Problem,
-    end: SearchResult,
-    free: np.ndarray,
-    fits: Sequence[Fit],
-    seed: int,
-    settings: Mapping[str, Any],
-    optimizer: str,
-) -> Result:
-    """The result of free values (d,) and what they make of each event, `fits` of `play`; `end` is
-    that of the search.
-
-    Raises `UserError` where no candidate at all had a steady state.
-    """
-    refuse_failed(problem, end)
-    epsilon_p, epsilon_q = relative_errors([fit for fit in fits if fit.role == TRAIN])
-    first, estimates = problem.events[0], _values(problem, free)
-    own = OwnBase.from_record(first.record)
-    exponents = {p.name: p.power_exponent for p in problem.parameters}
-    return Result(
-        **estimates,
-        **_spent(end),
-        objective=float(problem.objective(free[None])[0]),
-        epsilon_p=epsilon_p,
-        epsilon_q=epsilon_q,
-        seed=seed,
-        events=[f.to_dict() for f in fits],
-        model_error=model_errors(fits),
-        at_bound=at_bound(problem, free),
-        units={p.name: p.unit for p in problem.parameters},
-        bounds={p.name: list(p.bounds) for p in problem.parameters},
-        model=dict(settings),
-        before={
-            "U0": first.U0,
-            "P0": first.P0,
-            "Q0": first.Q0,
-            "frequency": first.record.base.frequency,
-        },
-        optimizer=optimizer,
-        search=describe_search(problem, end),
-        notes=[note for f in fits for note in f.event.record.notes],
-        records=[
-            {"name": f.event.record.name, "role": f.role}
-            | Identity.from_record(f.event.record).to_dict()
-            for f in fits
-        ],
-        own_base=asdict(own),
-        parameters_on_given_base={}
-        if own.ratio == 1
-        else own.values(by_event(*estimates.values()), exponents),
-        tractexp_version=provenance.version(),
-        commit=provenance.commit(),
-    )
-
-
-def model_errors(fits: Sequence[Fit]) -> dict[str, Any]:
-    """The model's error on the fitted events together, on those held out, and on each."""
-    held_out = [f for f in fits if f.role != TRAIN]
-    each = [
-        {"name": f.event.record.name, "role": f.role, **model_error([f]).to_dict()} for f in fits
-    ]
-    fitted = model_error([f for f in fits if f.role == TRAIN]).to_dict()
-    return {
-        **fitted,
-        "held_out": model_error(held_out).to_dict() if held_out else None,
-        "events": each,
-    }
-
-
-def refuse_failed(problem: Problem, end: SearchResult) -> None:
-    """Raise `UserError` where no candidate at all had a steady state."""
-    if end.objective >= REFUSED:
-        why = problem.model.refusal(problem.full(end.values)[0], problem.drive) or "all diverged"
-        raise UserError(
-            f"none of the {end.simulations} parameter sets tried could be simulated: {why};"
-            f" widen {MODEL.bounds} or free {MODEL.fixed}{_meant(problem)}"
-        )
-
-
-def _meant(problem: Problem) -> str:
-    """On which base bounds are meant, where that is not the file's."""
-    own = OwnBase.from_record(problem.events[0].record)
-    return "" if own.ratio == 1 else f", which are meant on the record's own base of {own}"
-
-
-def play(problem: Problem, free: np.ndarray, validate: Sequence[Event] = ()) -> list[Fit]:
-    """The fitted events at free values (d,), then those of `validate`, at which
-    nothing was fitted.
-    """
-    own = problem.by_event(free)[:, 0]
-    fits = [
-        respond(problem.model, v, event, TRAIN)
-        for v, event in zip(own, problem.events, strict=True)
-    ]
-    shared = problem.full(free)[0]
-    return fits + [respond(problem.model, shared, event, VALIDATE) for event in validate]
-
-
-def describe_search(problem: Problem, end: SearchResult) -> dict[str, Any]:
-    """Where the optimizer itself end, and what that took: what optimizers are compared by."""
-    epsilon_p, epsilon_q = relative_errors(play(problem, end.values))
-    errors = {"objective": end.objective, "epsilon_p": epsilon_p, "epsilon_q": epsilon_q}
-    return (
-        _values(problem, end.values)
-        | errors
-        | _spent(end)
-        | {"at_bound": at_bound(problem, end.values)}
-    )
-
-
-def _spent(end: SearchResult) -> dict[str, Any]:
-    """What a search took, and the sentence it ended with."""
-    return {
-        name: getattr(end, name)
-        for name in ("simulations", "seconds", "refused", "iterations", "status")
-    }
-
-
-def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
-    """Parameters by name, and those with a value of their own in each event."""
-    names, own = problem.model.names, problem.by_event(free)[:, 0]
-    return {
-        "parameters": {n: float(v) for n, v in zip(names, problem.full(free)[0], strict=True)},
-        "per_event": {name: own[:, names.index(name)].tolist() for name in problem.per_event},
-    }
-
-
-def at_bound(problem: Problem, values: np.ndarray) -> list[str]:
-    """Names of the free parameters within a thousandth of their range of a bound."""
-    unit = problem.space.to_unit(values)
-    return [
-        n
-        for n, z in zip(problem.space.names, unit, strict=True)
-        if z < BOUND_DISTANCE or z > 1 - BOUND_DISTANCE
-    ]
-
-
-def active_bounds(
-    problem: Problem, values: np.ndarray, nuisances: Collection[str] = ()
-) -> list[str]:
-    """The same without nuisances, as a sentence tells them: 'T_m at 1'."""
-    names = [name for name in at_bound(problem, values) if name not in nuisances]
-    return [f"{name} at {values[problem.space.index(name)]:.4g}" for name in names]

@@ -14,7 +14,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.composition import Composition, estimate_composition
-from tractexp.identification.result import TRAIN, VALIDATE, Fit, explain_refusal, respond
+from tractexp.identification.fit import TRAIN, VALIDATE, Fit, explain_refusal, respond
 from tractexp.inference.blocks import blocks_of
 from tractexp.inference.differences import central_differences
 from tractexp.inference.least_squares import descend

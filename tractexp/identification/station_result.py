@@ -10,13 +10,9 @@ import numpy as np
 
 from tractexp.cache import provenance
 from tractexp.identification.adequacy import Adequacy, Grade, Surprise, grade_errors
-from tractexp.identification.result import (
-    Fit,
-    Result,
-    active_bounds,
-    at_bound,
-    model_errors,
-)
+from tractexp.identification.conclude import active_bounds, at_bound
+from tractexp.identification.fit import Fit, model_errors
+from tractexp.identification.result import Result
 from tractexp.identification.station import LoadSpec, SharedFit
 from tractexp.identification.station_constants import Constants
 from tractexp.inference.model_error import model_error, relative_errors

@@ -13,8 +13,8 @@ import numpy as np
 
 from tractexp.domain import domain_of
 from tractexp.errors import UserError
+from tractexp.identification.fit import TRAIN, Fit, model_errors
 from tractexp.identification.linear_network import BlackBox, black_boxes, choose_network
-from tractexp.identification.result import TRAIN, Fit, model_errors
 from tractexp.inference.model_error import STALL, in_percent
 from tractexp.text.wording import count_noun
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from tractexp.blocks import Report, Table
 from tractexp.discrepancy.decide import UNEXPLAINED
-from tractexp.discrepancy.discrepancy_json import recommendation
 from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.nearest import Nearest
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.readings import read_shapes
+from tractexp.discrepancy.recommend import recommendation
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import Identity, describe_identities, title

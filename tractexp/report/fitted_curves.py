@@ -12,8 +12,8 @@ import numpy as np
 from tractexp.blocks import Report, style
 from tractexp.blocks.chart import Chart
 from tractexp.errors import UserError
+from tractexp.identification.fit import play
 from tractexp.identification.forecast import draw_dip
-from tractexp.identification.result import play
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.yardstick import play_network
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart, show_units

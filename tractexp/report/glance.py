@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.blocks import Report, style
 from tractexp.blocks.drawing import draw_chart
-from tractexp.identification.result import Fit
+from tractexp.identification.fit import Fit
 from tractexp.report.events import CalculatedCurve, event_chart
 from tractexp.storage import files
 

@@ -7,9 +7,10 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
-from tractexp.discrepancy.discrepancy_json import PLUGIN, adopt_term
+from tractexp.discrepancy.discrepancy_json import adopt_term
 from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.gap import GapTest
+from tractexp.discrepancy.proposal.generate import PLUGIN
 from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, to_dict

@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.blocks import style
 from tractexp.blocks.chart import Chart
 from tractexp.domain.playback import AFTER
-from tractexp.identification.result import Fit
+from tractexp.identification.fit import Fit
 from tractexp.inference.problem import Problem
 from tractexp.record import WaveEvent
 from tractexp.report.events import BAND_DEVIATIONS, EXCESS, find_base

@@ -13,6 +13,7 @@ from tractexp.discrepancy.proposal.library import Term
 from tractexp.text import quoting
 
 NAME = "proposed_effect"  # of the file, and so of the effect
+PLUGIN = f"{NAME}.py"  # beside the page
 PREFIX = "proposed_"  # of the parameters, which share a model with others
 HELPERS = ("step_at_zero", "round_corner", "step_at_instant")
 CONSTANTS = ("SHARP", "FALLEN", "RISEN")

@@ -214,7 +214,7 @@ def _describe_run(setup: Setup, choice: Choice, seed: int, end: Any) -> "SearchR
     `end` is what the search returned, or a `FailedSearch`. A search in which no point could be
     simulated is a record with its reason as `failure`, not an error.
     """
-    from tractexp.identification.result import describe_search, refuse_failed
+    from tractexp.identification.conclude import describe_search, refuse_failed
     from tractexp.studies.comparison.load import parameters_of
     from tractexp.studies.comparison.runs import SearchRun
     from tractexp.studies.searches import FailedSearch

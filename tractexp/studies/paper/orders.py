@@ -9,7 +9,8 @@ import numpy as np
 
 from tractexp.configuration.plugin import build
 from tractexp.identification.estimate import estimate
-from tractexp.identification.result import Fit, parts, respond
+from tractexp.identification.fit import Fit, respond
+from tractexp.identification.result import parts
 from tractexp.identification.search import search
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import DATA, TASK, UserError
+from tractexp.identification.fit import Fit, respond
 from tractexp.identification.generalization import by_depth, mean_residual
-from tractexp.identification.result import Fit, respond
 from tractexp.identification.search import Limits, SearchResult
 from tractexp.inference.problem import Problem
 from tractexp.record import Event
