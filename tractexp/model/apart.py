@@ -92,7 +92,7 @@ class Apart:
         """The speed of this group."""
         return self._eq.speed(self._latex(latex), "omega" + self._suffix)
 
-    def branch(self, name: str, latex: str, *circuit: sympy.Expr, **further: Any) -> sympy.Expr:
+    def branch(self, name: str, latex: str, *circuit: Any, **further: Any) -> sympy.Expr:
         """The current of a branch of this group."""
         return self._eq.branch(name + self._suffix, self._latex(latex), *circuit, **further)
 
