@@ -42,6 +42,7 @@ PAGE, MARK = STORED.with_suffix(".md"), "benchmarks/strangers.py --docs"
 SERIES = "strangers"
 DIPS = 3
 LEVELS = (0.0005, 0.01)  # pu, of the noise of P and Q
+MOST_TOLD = 8  # sets whose errors a row holds
 RIGHT, CLASS, SILENT, WRONG = "right", "class", "silent", "wrong"
 RIGHTLY_SILENT, DOUBTED = "rightly silent", "doubted"
 OUTCOMES = (RIGHT, CLASS, RIGHTLY_SILENT, SILENT, DOUBTED, WRONG)
@@ -125,17 +126,21 @@ def judge_stranger(number: int, simulator: str) -> dict[str, Any]:
     """A row: what is said of the load of this number and what that is worth, or why there is
     none.
     """
-    import tractexp
-
     row: dict[str, Any] = {"number": number, "simulator": simulator, "version": find_version()}
     try:
         stranger = make_stranger(number, simulator)
     except (andes_loads.StalledMotor, RuntimeError, ArithmeticError) as error:
         return row | {"refused": f"{type(error).__name__}: {error}"}
-    rng = andes_loads.generator(SERIES, number, f"{simulator} noise")
+    return row | judge_load(stranger, andes_loads.generator(SERIES, number, f"{simulator} noise"))
+
+
+def judge_load(stranger: Stranger, rng: np.random.Generator) -> dict[str, Any]:
+    """What is said of a load under drawn noise and what that is worth, or why nothing is."""
+    import tractexp
+
     level = float(np.exp(rng.uniform(*np.log(LEVELS))))
-    row |= {"kind": stranger.kind, "model": stranger.model, "truth": list(stranger.truth)}
-    row |= {"outside": stranger.outside, "noise": level}
+    row: dict[str, Any] = {"kind": stranger.kind, "model": stranger.model}
+    row |= {"truth": list(stranger.truth), "outside": stranger.outside, "noise": level}
     begun = sum(os.times()[:4])
     try:
         dips = [
@@ -149,8 +154,19 @@ def judge_stranger(number: int, simulator: str) -> dict[str, Any]:
         return row | {"refused": f"UserError: {error}"}
     told = {"verdict": found.verdict, "sets": found.content["name_sets"], "reason": found.reason}
     told["error"] = found.content["gap"]["validate"]["before"]["model_error"]["value"]
+    told["nearest"] = rank_nearest(found.steps.evidence)
     row |= told | {"outcome": rate(told, stranger.truth, stranger.outside)}
     return row | {"seconds": sum(os.times()[:4]) - begun}
+
+
+def rank_nearest(evidence: Any) -> list[tuple[list[str], float]]:
+    """The sets that predict best and the base model, each with its error on the held-out dip; none
+    where names went by the likelihood.
+    """
+    if not evidence.is_predicted:
+        return []
+    every = sorted(evidence.every, key=lambda row: row.prediction.excess)
+    return [([*row.family], row.prediction.error) for row in (*every[:MOST_TOLD], evidence.base)]
 
 
 def find_version() -> str:
@@ -182,11 +198,13 @@ def make_tables(rows: list[dict[str, Any]]) -> str:
     lines = [[*group, len(own), *count_outcomes(own)] for group, own in sorted(groups.items())]
     lines.append(["all", "", len(judged), *count_outcomes(judged)])
     wrong = sum(row["outcome"] == WRONG for row in judged)
+    named = sum(row["outcome"] == WRONG and row["verdict"] == "named" for row in judged)
     doubted = sum(row["outcome"] == DOUBTED for row in judged)
     shares = (
         ("right, class or silent", len(judged) - wrong - doubted),
         ("no wrong name", len(judged) - wrong),
         ("wrong", wrong),
+        ("wrong, and named instead of a candidate or tied", named),
     )
     told = [f"{what}: {evidence.share(count, len(judged))}" for what, count in shares]
     table = marked.table(["simulator", "load", "sets", *OUTCOMES], lines)

@@ -2,6 +2,7 @@
 
 import itertools
 
+import behind_flux
 import marked
 import numpy as np
 import pytest
@@ -78,12 +79,13 @@ def test_a_load_beside_a_machine_rests_before_the_dip_and_returns(module, packag
 
 def test_tables_tell_shares_with_intervals():
     rows = [
-        {"simulator": "DPsim", "kind": "core", "outcome": outcome}
+        {"simulator": "DPsim", "kind": "core", "outcome": outcome, "verdict": "candidate"}
         for outcome in ("right", "right", "doubted", "wrong")
     ] + [{"simulator": "DPsim", "refused": "UserError: no"}]
     told = strangers.make_tables(rows)
     assert "right, class or silent: 50.0% (7%-93%)" in told
     assert "wrong: 25.0% (1%-81%)" in told
+    assert "wrong, and named instead of a candidate or tied: 0.0% (0%-60%)" in told
 
 
 def test_the_page_holds_what_the_stored_rows_hold():
@@ -92,3 +94,29 @@ def test_the_page_holds_what_the_stored_rows_hold():
     assert made.strip() == strangers.make_tables(rows)
     of_each = [(row["number"], row["simulator"]) for row in rows]
     assert len({*of_each}) == len(of_each)
+
+
+@pytest.mark.parametrize(
+    ("sets", "nearest", "told"),
+    [
+        ([["stator_transients"]], ["stator_transients"], ["strongest alone"]),
+        ([["stator_transients"]], ["a", "stator_transients"], ["strongest alone"]),
+        (
+            [["stator_transients", "speed_dependent_torque"]],
+            ["stator_transients", "speed_dependent_torque"],
+            ["in the nearest set", "hidden one told"],
+        ),
+        ([["stator_transients"], ["a"]], ["a"], ["strongest alone", "false"]),
+        ([], ["speed_dependent_torque"], ["in the nearest set"]),
+    ],
+)
+def test_what_is_told_of_an_effect_behind_stator_flux(sets, nearest, told):
+    truth = ["speed_dependent_torque", "stator_transients", "stator_resistance"]
+    row = {"sets": sets, "truth": truth, "nearest": [[nearest, 0.01], [[], 0.1]]}
+    assert [what for what, is_so in behind_flux.find_told(row).items() if is_so] == told
+
+
+def test_the_page_holds_what_the_rows_behind_stator_flux_hold():
+    page = strangers.PAGE.read_text(encoding="utf-8")
+    _, made, _ = marked.parted(page, behind_flux.MARK)
+    assert made.strip() == behind_flux.make_table(behind_flux.read_rows())
