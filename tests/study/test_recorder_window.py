@@ -3,6 +3,7 @@ what is said of it.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ import tractexp
 from tractexp.configuration.plugin import build_chosen
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.window_search import WindowFit, _choose_window
 from tractexp.domain.excitation import phasors
 from tractexp.errors import UserError
+from tractexp.inference.criteria import Criteria
 from tractexp.inference.recorder_window import RecorderWindow, windows_of
 from tractexp.model.drive import Drive
 from tractexp.record.window import average, averaged_power
@@ -169,6 +172,21 @@ def test_a_window_of_phasors_is_no_missing_effect():
     assert any("60 ms" in line for line in told)
     assert "60 ms" in found.reason
     assert "though no record says so: ask whether it does" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("gained", "said", "believed"),
+    [(0.5, True, False), (20.0, True, True), (20.0, False, False), (2000.0, False, True)],
+)
+def test_a_window_must_show_whether_or_not_the_records_say_it(gained, said, believed):
+    """By a gain of 0.5 of a deviance of 9,000 the order of two dips decided, where it was 57 less
+    in the other. One that is a guess must explain half as much as the best effect, too.
+    """
+    window = SimpleNamespace(said=said)
+    behind = SimpleNamespace(records=SimpleNamespace(window=window))
+    first = SimpleNamespace(scores=[SimpleNamespace(drop=3000.0)], criteria=Criteria())
+    tried = WindowFit(behind, None, gained)
+    assert _choose_window([tried], first) is (tried if believed else None)
 
 
 def test_no_window_is_found_where_there_is_none(planted):

@@ -3,7 +3,7 @@
 It is looked for before any effect is, among whole cycles where the records do not say what it is. A
 window that the recorder does not have makes the voltage bend where the power does not: that costs
 much, with effects in the load or without. So one is believed that explains half as much as the best
-effect; one that the records say, where it helps at all. A model that lacks something large may gain
+effect; one that the records say, where it shows. A model that lacks something large may gain
 nothing by the right window. So where an explanation has faults of the measurement beside it, it is
 fitted behind each window, too: one that leaves no such fault takes their place.
 """
@@ -80,9 +80,10 @@ def _choose_window(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit
     most = max((s.drop for s in first.scores), default=0.0)
     criteria = first.criteria
     window = best.behind.records.window
-    if window is not None and window.said:  # that the recorder has a window it says is no guess
-        return best if best.gained > 0 else None
-    return best if best.gained > max(criteria.shown, WINDOW_SHARE * most) else None
+    least = criteria.shown
+    if window is None or not window.said:  # that the recorder has a window it says is no guess
+        least = max(least, WINDOW_SHARE * most)
+    return best if best.gained > least else None
 
 
 def behind_window(
