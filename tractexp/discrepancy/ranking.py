@@ -29,8 +29,7 @@ def find_leading(evidence: Evidence, criteria: Criteria, factor: float) -> list[
     common = frozenset.intersection(*(frozenset(row.family) for row in alike))
     shared = [row for row in ahead if frozenset(row.family) == common][:1]
     shared = [row for row in shared if needs_all(row, evidence, criteria)]
-    if not any(len(row.fit.names) <= MOST_NAMED for row in dividing):
-        shared = []  # three and more that divide together bear out no member
+    shared = [row for row in shared if stands_alone(row, dividing, criteria, factor)]
     if shared and not find_rivals(shared[0], ahead, criteria):
         return shared
     needed = [row for row in dividing if row in alike and needs_all(row, evidence, criteria)]
@@ -38,6 +37,21 @@ def find_leading(evidence: Evidence, criteria: Criteria, factor: float) -> list[
         return []
     chosen = min(needed, key=lambda row: len(row.fit.names))
     return [chosen, *find_rivals(chosen, ahead, criteria)]
+
+
+def stands_alone(
+    shared: SetEvidence, dividing: Sequence[SetEvidence], criteria: Criteria, factor: float
+) -> bool:
+    """Whether what sets that divide the base model's error share is told without the rest of them.
+
+    Not where three and more divide together alone, which bear out no member; nor where a set of no
+    more effects than are named divides what it leaves by the factor again: then one of several is
+    missing beside it, as surely as it was itself.
+    """
+    few = [row for row in dividing if len(row.fit.names) <= MOST_NAMED]
+    if not few:
+        return False
+    return not (compute_factor(few[0], shared) > factor and beats(few[0], shared, criteria))
 
 
 def find_nearest(evidence: Evidence, criteria: Criteria) -> SetEvidence:
