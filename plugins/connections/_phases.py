@@ -35,15 +35,13 @@ def check_pairs(pairs: Sequence[str], count: int, such: str) -> None:
 
 
 def from_lines(pairs: Sequence[str]) -> np.ndarray:
-    """(3, pairs): the phase voltages of no zero sequence that these line voltages are differences
-    of.
-    """
+    """The matrix (3, pairs) from line voltages to phase voltages without zero sequence."""
     inverse = np.linalg.pinv(np.array([line(pair) for pair in pairs]))
     return np.where(np.abs(inverse) < 1e-12, 0.0, inverse)
 
 
 def from_two(phases: str) -> np.ndarray:
-    """(3, 2): three currents of no zero sequence from those of two phases."""
+    """The matrix (3, 2) from currents of two phases to three without zero sequence."""
     return np.array(
         [[float(p == phase) if phase in phases else -1.0 for p in phases] for phase in PHASES]
     )

@@ -59,11 +59,14 @@ class LimitedLink(Effect):
             smaller(demand, link_most, LINK_CORNER) / smaller(1, link_most, LINK_CORNER),
             "i_l",
         )
-        square = lambda v: v**2 / larger(v**2, EMPTY**2, LINK_CORNER)  # noqa: E731
+        drive_power = lambda v: (  # noqa: E731
+            v**2 / larger(v**2, EMPTY**2, LINK_CORNER)
+        )
         eq.moves(
             v,
-            (u * current - square(v) / square(1)) / (link_storage * larger(v, 0.1, LINK_CORNER)),
-            1,
+            (u * current - drive_power(v) / drive_power(1))
+            / (link_storage * larger(v, 0.1, LINK_CORNER)),
+            initial=1,
         )
         drawn = eq.P_s0 * u * current
         eq.edit(sites.P_static, lambda P: (1 - link_share) * P + link_share * drawn)

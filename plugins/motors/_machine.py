@@ -198,7 +198,7 @@ def at_rest(eq, T_prime, X_prime, C, T_m):
     return C * eq.U0 / 2 * (1 + cosine - I * sine), -sine / (1 + cosine) / T_prime
 
 
-def require(eq, positive, X_prime, C, T_m):
+def require(eq, positive_symbols, X_prime, C, T_m):
     """State what the steady state of Eq. (3) needs: a real angle, a C between 0 and 1, the others
     positive.
     """
@@ -209,12 +209,12 @@ def require(eq, positive, X_prime, C, T_m):
         " is {value:.3g}; lower T_m or X', or raise C",
         abs(sine),
     )
-    require_physical(eq, positive, C)
+    require_physical(eq, positive_symbols, C)
 
 
-def require_physical(eq, positive, C):
+def require_physical(eq, positive_symbols, C):
     """State that C lies between 0 and 1 and that the other parameters are positive."""
-    for symbol in positive:
+    for symbol in positive_symbols:
         eq.require(symbol, f"{symbol.name} must be positive and is {{value:g}}", symbol)
     eq.require(C * (1 - C), "C = (X - X')/X must lie between 0 and 1 and is {value:g}", C)
 

@@ -52,6 +52,6 @@ class DoubleCage(Motor):
         Z = eq.place(sites.stator_impedance, I * X_second, "Z''")
         return _machine.two_cages(
             eq,
-            lambda inner: eq.branch("psi", r"\psi", V, Z, behind=inner),
+            lambda E_second: eq.branch("psi", r"\psi", V, Z, behind=E_second),
             (T_prime, X_prime, C, M, T_m, T_second, X_second),
         )

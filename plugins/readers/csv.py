@@ -179,7 +179,7 @@ class CSV(Tabular, Reader):
         )
         raw = self._raw_record(path, sidecar, quantities, table.numbers(sidecar.more))
         even = raw if sidecar.uniform else raw.uniform(table.place)
-        base, note = self._base(even, quantities, sidecar, base)
+        base, note = self._choose_base(even, quantities, sidecar, base)
         voltage = _one_of(quantities.absolute["U"], base.voltage, given)
         power = _one_of(quantities.absolute["P"], base.power, self.base_power or sidecar.base)
         arrays: Any = Base(voltage, power).per_unit(even.channels)
@@ -213,11 +213,13 @@ class CSV(Tabular, Reader):
         ]
         return sidecar.name or stem if self.path or stems.count(stem) == 1 else path
 
-    def _base(
+    def _choose_base(
         self, record: Record, quantities: Powers, sidecar: Sidecar, same: Base | None
     ) -> tuple[Base, list[str]]:
-        """The base of per-unit values: given, that of the record before, or the steady state of
-        values in kV and MW.
+        """The base of per-unit values and notes on it: the base given, else the previous record's,
+        else (of values in kV and MW) the steady state.
+
+        `absolute` of a quantity is None where no unit is told.
         """
         earlier = sidecar.base or same
         voltage = self.base_voltage or (earlier and earlier.voltage)

@@ -283,6 +283,6 @@ def test_a_verdict_repeats_no_interval():
 def test_places_that_fit_are_looked_for_beside_an_interval_without_ends():
     region = Region(np.array([[0.2], [0.9]]), np.array([[0.5], [2.0]]))
     with np.errstate(all="raise"):
-        assert region.outermost(0, -np.inf, np.inf) == []
-    assert region.outermost(0, 0.3, 0.4) == [0]
-    assert region.outermost(0, 0.0, 0.1) == [0]
+        assert region.find_outermost(0, -np.inf, np.inf) == []
+    assert region.find_outermost(0, 0.3, 0.4) == [0]
+    assert region.find_outermost(0, 0.0, 0.1) == [0]

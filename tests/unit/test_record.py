@@ -8,7 +8,7 @@ import pytest
 from tractexp.errors import UserError
 from tractexp.record import Record
 from tractexp.record.dips import cut_dips
-from tractexp.record.direction import direction
+from tractexp.record.direction import explain_negative_power
 
 N = 100
 
@@ -55,14 +55,16 @@ def test_too_few_samples_of_low_voltage_tell_no_direction():
     exponent.
     """
     U = spoiled(np.ones(N), slice(40, 42), 0.6)
-    assert "the voltage is never disturbed" in direction(U, -0.8 * U**2, np.full(N, -0.3))
+    assert "the voltage is never disturbed" in explain_negative_power(
+        U, -0.8 * U**2, np.full(N, -0.3)
+    )
     long = spoiled(np.ones(N), slice(40, 60), 0.6)
-    assert "|P| goes as U^2" in direction(long, -0.8 * long**2, -0.4 * long**2)
+    assert "|P| goes as U^2" in explain_negative_power(long, -0.8 * long**2, -0.4 * long**2)
 
 
 def test_one_sample_tells_no_direction():
     one = np.ones(1)
-    assert direction(one, one, one) == ""
+    assert explain_negative_power(one, one, one) == ""
 
 
 def test_gaps_in_P_and_Q_are_allowed():

@@ -234,7 +234,7 @@ def _content(thing: Any) -> bytes:
 
 
 def environment() -> str:
-    """A digest of what every number computed here hangs on: the code of all plugins, libraries,
+    """What every number computed here depends on, as one text: the code of all plugins, libraries,
     interpreter, processor.
     """
     versions = [f"{name} {version(name)}" for name in LIBRARIES]

@@ -231,31 +231,33 @@ def remainders(
         for e, (event, part) in enumerate(zip(events, parts, strict=True))
     ]
     excess = sum(float(np.sum(s.white_residual**2)) - s.size for s in stretches)
-    loudest = [_loudest(s, false_alarms / len(stretches)) for s in stretches]
+    loudest = [_find_loudest(s, false_alarms / len(stretches)) for s in stretches]
     shapes: list[Remainder] = []
     while len(shapes) < MOST_SHAPES and (
         candidates := [(one, e) for e, one in enumerate(loudest) if one]
     ):
-        (gain, shape, channel), e = max(candidates, key=lambda f: f[0][0])
+        (gain, shape, channel), e = max(candidates, key=lambda found: found[0][0])
         sizes, stretches[e] = stretches[e].take_away(shape, channel)
         shapes.append(
             _describe_shape(stretches[e], shape, channel, sizes, gain / max(excess, gain))
         )
-        loudest[e] = _loudest(stretches[e], false_alarms / len(stretches))
+        loudest[e] = _find_loudest(stretches[e], false_alarms / len(stretches))
     return shapes
 
 
-def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int] | None:
-    """The shape that lowers the deviance of an event most, by how much, and its channel; None where
-    chance does so.
+def _find_loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int] | None:
+    """(gain in deviance, shape, channel) of the shape that lowers the deviance of an event most;
+    None where its gain is within chance.
 
     The bound on chance is that of as many independent tries as there are starts, decays and
     frequencies.
     """
     white = stretch.white_residual
     tried, candidates = _search_shapes(white, max(stretch.event.start - 2, 0))
-    sparing = SPARING * np.log(white.size)
-    gain, shape, channel = max(candidates, key=lambda f: f[0] - sparing * bool(f[1].frequency))
+    ringing_penalty = SPARING * np.log(white.size)
+    gain, shape, channel = max(
+        candidates, key=lambda found: found[0] - ringing_penalty * (found[1].frequency > 0)
+    )
     limit = 2 * np.log(tried / false_alarms)
     if gain < LEAST_UNPOLISHED_GAIN * limit:
         return None

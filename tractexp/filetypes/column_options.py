@@ -109,8 +109,9 @@ def _named_column(number: int, name: str, key: str, by_name: Role) -> MappedColu
 
 
 def _chosen_column(table: TableFile, key: str, number: int, order: str) -> MappedColumn:
-    """The column that the user chose for a key; its name says whether a voltage is line to line,
-    and that of a phase is not unless it says so.
+    """The column that the user chose for a key.
+
+    A phase voltage counts as phase to ground unless its name says line to line.
     """
     unit = table.heading.units[number]
     named = role(table.heading.names[number], unit, order)

@@ -71,11 +71,11 @@ def find_filled_rows(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, tuple[s
 def _read_marks(cells: Sequence[Any], name: str) -> np.ndarray | None:
     """Which cells (N,) mark their row as bad; None where they are no marks."""
     texts = [str(cell).strip().lower() for cell in cells]
-    if not any(text[:1].isdigit() for text in texts):
+    if not any(text[:1].isdigit() for text in texts):  # words
         return np.array([text in BAD for text in texts])
-    if "stat" in name.lower():
+    if "stat" in name.lower():  # status words of IEEE C37.118
         return np.array([bool(word & DATA_ERROR) for word in _read_status_words(texts)])
-    codes = list(map(_read_code, texts))
+    codes = list(map(_read_code, texts))  # quality codes of OPC
     if Counter(codes).most_common(1)[0][0] != OPC_GOOD:
         return None
     return np.array([code is not None and not code & OPC_QUALITY for code in codes])

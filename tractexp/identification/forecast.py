@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 TOLD_DEPTH = 0.4  # of the dip that is told of
 CALCULATED_BEFORE, CALCULATED_AFTER = 0.3, 1.5  # s calculated before and after it
 EDGE = 0.02  # s of its fall and of its recovery
-UNIFORM = 12.0  # squares of a range over the variance of what is as likely everywhere in it
+UNIFORM = 12.0  # a range squared over the variance of a flat distribution in it
 
 Calculate = Callable[[np.ndarray], np.ndarray]  # values (d,) -> P and Q (2, N) [pu]
 
@@ -133,7 +133,10 @@ def forecast_next_dip(graded: "GradedModel") -> dict[str, Any]:
         return {}
     problem, information = graded.problem, graded.uncertainty.information
     values = problem.full(graded.values)[0]
-    root = problem.full(graded.values + _find_root(information.J) * information.width) - values
+    root = (
+        problem.full(graded.values + _find_covariance_root(information.J) * information.width)
+        - values
+    )
     duration = float(np.mean([fit.event.duration for fit in graded.fits]))
     half, sentence = tell_of_dip(
         problem.model, problem.events[0], Forecast(values, root, band), duration
@@ -198,9 +201,9 @@ def tell_of_dip(
     return [P, Q], f"{dip}: P within {in_percent(P)} and Q within {in_percent(Q)} of S"
 
 
-def _find_root(J: np.ndarray) -> np.ndarray:
-    """Rows (d, d), in ranges, whose products add up to the covariance, by sensitivities J (R, d)
-    within a box that is as likely everywhere.
+def _find_covariance_root(J: np.ndarray) -> np.ndarray:
+    """Rows r (d, d) with sum r^T r = (J^T J + 12 I)^-1: the covariance in the unit box, where each
+    parameter is a priori as likely everywhere (variance 1/12). J: sensitivities (R, d) over noise.
     """
     d = J.shape[1]
     stacked = np.vstack([J, np.sqrt(UNIFORM) * np.eye(d)])

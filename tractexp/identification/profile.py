@@ -74,7 +74,9 @@ class Profiles:
             strict=True,
         )
         units = [_in_range(uncertainty, c, interval) for c, interval in enumerate(ends)]
-        return np.array([bool(self.region.outermost(c, *unit)) for c, unit in enumerate(units)])
+        return np.array(
+            [bool(self.region.find_outermost(c, *unit)) for c, unit in enumerate(units)]
+        )
 
     @property
     def notes(self) -> list[str]:
@@ -297,7 +299,9 @@ class _Drawing:
         where = [
             (int(c), k)
             for c, p in zip(self.column, self.curves, strict=True)
-            for k in self.region.outermost(int(c), *_in_range(self.uncertainty, int(c), p.interval))
+            for k in self.region.find_outermost(
+                int(c), *_in_range(self.uncertainty, int(c), p.interval)
+            )
         ]
         if where:
             c, k = np.array(where).T
@@ -320,7 +324,7 @@ class _Drawing:
         lanes.run(points, ended)
         self.simulations += lanes.simulations
         self.better = lanes.better
-        self.region = self.region.join_region(lanes.region)
+        self.region = self.region.concatenate(lanes.region)
 
 
 def _in_range(

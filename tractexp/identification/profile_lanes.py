@@ -58,24 +58,29 @@ class LikelihoodProfile:
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Points of lanes: coordinates (n, D), and by what share of what it may rise by each
-    parameter's deviance is up.
+    """Points of lanes.
 
-    That is `rise` (n, d).
+    Attributes
+    ----------
+    unit : (n, D)
+        Coordinates.
+    rise : (n, d)
+        By how much the deviance is up, over the limit of each parameter's interval: below 1 the
+        point lies within it.
     """
 
     unit: np.ndarray
     rise: np.ndarray
 
-    def join_region(self, other: "Region") -> "Region":
-        """What both regions hold."""
+    def concatenate(self, other: "Region") -> "Region":
+        """The points of both."""
         return Region(
             np.concatenate([self.unit, other.unit]), np.concatenate([self.rise, other.rise])
         )
 
-    def outermost(self, c: int, low: float, high: float) -> list[int]:
-        """Which points lie farthest below and above an interval of the c-th parameter and fit; []
-        where none does.
+    def find_outermost(self, c: int, low: float, high: float) -> list[int]:
+        """Rows, at most two: of the points that fit, the farthest below and the farthest above an
+        interval of the c-th parameter.
         """
         values = np.where(self.rise[:, c] < 1.0, self.unit[:, c], low)
         if not len(values):

@@ -15,7 +15,12 @@ from tractexp.cache import store
 from tractexp.inference import residual_statistics
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.goodness_of_fit import SMALLEST_P, Scale, compare_with_draws
+from tractexp.inference.goodness_of_fit import (
+    ADEQUATE_P,
+    SMALLEST_P,
+    Scale,
+    compare_with_draws,
+)
 from tractexp.inference.linearization import Linearization, rich_residuals
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.score_test import ScoreTest
@@ -36,14 +41,17 @@ def by_draws(p: float) -> str:
     """A probability as a sentence tells it, no finer than 199 draws can.
 
     The tail of the statistics is extrapolated, so that a smaller number would say more than is
-    known.
+    known; but that it is below the threshold of a decision is told.
 
     Examples
     --------
-    >>> by_draws(0.03), by_draws(1e-6)
-    ('0.03', 'less than 0.005')
+    >>> by_draws(0.03), by_draws(0.004), by_draws(1e-6)
+    ('0.03', 'less than 0.005', 'less than 0.001')
     """
-    return in_words(p) if p >= 1 / (NULL_DRAWS + 1) else f"less than {1 / (NULL_DRAWS + 1):g}"
+    least = 1 / (NULL_DRAWS + 1)
+    if p >= least:
+        return in_words(p)
+    return f"less than {ADEQUATE_P if p < ADEQUATE_P else least:g}"
 
 
 @dataclass(frozen=True, eq=False)

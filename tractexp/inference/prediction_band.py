@@ -54,7 +54,7 @@ class PredictionBand:
         change : float [pu]
             The largest change of S that is calculated.
         samples : int
-            From the dip on.
+            Number of samples from the dip on.
         scatter : (2,) [pu]
             Standard error of what is calculated, where it is largest.
 
@@ -63,7 +63,7 @@ class PredictionBand:
         (2,) array [pu]
         """
         noise = find_noise_peak(samples) * np.array(self.noise)
-        model = _find_reserve(self.events) * np.array(self.share) * change
+        model = _find_next_event_factor(self.events) * np.array(self.share) * change
         return np.sqrt(noise**2 + model**2 + (interval_factor() * scatter) ** 2)
 
 
@@ -177,8 +177,8 @@ def find_scatter(
     return np.sqrt(squares.max(axis=1))
 
 
-def _find_reserve(events: int) -> float:
-    """How many times as much as of so many known events the model misses of the next, at most in
+def _find_next_event_factor(events: int) -> float:
+    """Factor by which the model misses more of the next event than of the known ones, at most in
     95 % of cases.
     """
     from scipy.special import ndtri

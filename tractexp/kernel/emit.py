@@ -326,17 +326,20 @@ class _Emitter:
         before = f.fresh(f"load i64, ptr {self.reachable}, align 8")
         f.do(f"store i64 {f.fresh(f'or i64 {before}, {good}')}, ptr {self.reachable}, align 8")
 
-    def _copy_candidates(self, e: str, first: str) -> None:
-        """Copy the parameters of as many candidates as there are lanes; the last one fills lanes
-        that are over.
+    def _copy_candidates(self, event: str, first_candidate: str) -> None:
+        """Copy one candidate's parameters to each lane; surplus lanes repeat the last candidate.
+
+        Both arguments are names of LLVM values.
         """
         f = self.f
         count = len(self.given)
         last = f.integer("sub", "%n", 1)
-        source = f.offset_address("%candidates", f.integer("mul", f.integer("mul", e, count), "%n"))
+        source = f.offset_address(
+            "%candidates", f.integer("mul", f.integer("mul", event, count), "%n")
+        )
         with f.loop(0, self.width, always=True) as lane:
             candidate, target = (
-                f.offset_address(source, f.smaller(f.integer("add", first, lane), last)),
+                f.offset_address(source, f.smaller(f.integer("add", first_candidate, lane), last)),
                 f.offset_address(self.copied, lane),
             )
             for k in range(count):

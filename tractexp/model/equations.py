@@ -510,6 +510,7 @@ class Equations:
         voltage: sympy.Expr,
         impedance: sympy.Expr,
         behind: sympy.Expr = NOTHING,
+        *,
         flux_moves: bool = False,
     ) -> sympy.Expr:
         """The current [pu] through a resistance and a reactance in series, R + jX, from `voltage`

@@ -10,7 +10,7 @@ import numpy as np
 
 from tractexp.cache.provenance import digest
 from tractexp.errors import DATA, UserError
-from tractexp.record.direction import OUTWARD, direction
+from tractexp.record.direction import OUTWARD, explain_negative_power
 from tractexp.record.event import Event, detect, steady
 from tractexp.record.fall import find_dips
 from tractexp.record.reader import Events
@@ -196,7 +196,7 @@ def signs(record: Record) -> list[str]:
         float(np.nanmedian(x[calm])) if np.isfinite(x[calm]).any() else 0.0
         for x in (record.P, record.Q)
     )
-    reason = direction(record.U, record.P, record.Q, calm=calm)
+    reason = explain_negative_power(record.U, record.P, record.Q, calm=calm)
     if OUTWARD in reason:
         raise UserError(
             f"{record.where}: P is {record.base.power * P:.4g} before the first dip: {reason}"

@@ -31,10 +31,10 @@ def at_level(x: np.ndarray, share: float) -> np.ndarray:
     return np.abs(x - level) <= share * level
 
 
-def direction(
+def explain_negative_power(
     U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, calm: np.ndarray | None = None
 ) -> str:
-    """Why P is negative before a disturbance.
+    """Explain why P is negative before a disturbance.
 
     A passive load draws negative-sequence current whatever its power does. Where there is none the
     answer of P and Q to the voltage decides: a load's |P| falls with U and returns, and so does its
@@ -59,11 +59,14 @@ def direction(
     if not valid.any() or (calm is not None and not (calm & valid).any()):
         return ""
     U, P, Q = U[valid], P[valid], Q[valid]
-    near = max(LARGEST_CALM_DEVIATION, 3 * _usual_step(U) / max(float(np.median(U)), 1e-12))
-    calm = at_level(U, near) if calm is None else calm[valid]
+    calm_deviation = max(
+        LARGEST_CALM_DEVIATION, 3 * _usual_step(U) / max(float(np.median(U)), 1e-12)
+    )
+    calm = at_level(U, calm_deviation) if calm is None else calm[valid]
     level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
-    normal = np.abs(U - level) <= near * level
-    if not -LEAST_SIGN_RATIO * _usual_step(P) > P0:
+    normal = np.abs(U - level) <= calm_deviation * level
+    least_power = LEAST_SIGN_RATIO * _usual_step(P)
+    if -least_power <= P0:
         return ""
     if np.count_nonzero(P[normal] > -TURNS * P0) > max(FEWEST_STATE_SAMPLES, 0.02 * len(P)):
         return (

@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.cache.provenance import digest
 from tractexp.errors import UserError
 from tractexp.record.aftermath import loss, until_change
-from tractexp.record.direction import direction
+from tractexp.record.direction import explain_negative_power
 from tractexp.record.fall import FEWEST_BEFORE, STEADY, falls
 from tractexp.record.no_dip import no_dip, no_such_dip
 from tractexp.record.record import Record
@@ -267,7 +267,7 @@ def describe(event: Event) -> str:
         calm = np.zeros(record.samples, bool)
         calm[event.steady] = True
         reason = (
-            direction(record.U, record.P, record.Q, calm=calm)
+            explain_negative_power(record.U, record.P, record.Q, calm=calm)
             or "no more than noise, so this is no load"
         )
         odd.append(f"P is {event.P0:.3g} before the dip: {reason}")

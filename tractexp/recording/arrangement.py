@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import UserError, setting
-from tractexp.record.direction import direction
+from tractexp.record.direction import explain_negative_power
 from tractexp.record.phasor import sequences
 from tractexp.recording.channel_order import (
     OtherOrder,
@@ -130,7 +130,7 @@ def _note_direction(feeder: Feeder, live: LivePhasors) -> Feeder:
     else:
         V1, I1, polarity = live.V[0], live.I[0], 0
     S = len(live.V) * V1 * I1.conj()
-    reason = direction(np.abs(V1), S.real, S.imag, polarity, live.calm)
+    reason = explain_negative_power(np.abs(V1), S.real, S.imag, polarity, live.calm)
     if not reason:
         return feeder
     middle = complex(np.median(S[live.calm].real), np.median(S[live.calm].imag))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.record.direction import direction
+from tractexp.record.direction import explain_negative_power
 from tractexp.record.fall import FEWEST_BEFORE, REFERENCE, SHALLOWEST
 from tractexp.record.no_dip import UNFINISHED
 from tractexp.recording.event_kind import CARRIES, find_clean_currents
@@ -125,7 +125,7 @@ def _explain_negative_power(trace: Trace) -> str:
         "power is fed back, or the current is counted out of the load (then"
         " data.reverse_current=true makes it one)"
     )
-    return direction(trace.U, trace.P, trace.Q) or usual
+    return explain_negative_power(trace.U, trace.P, trace.Q) or usual
 
 
 NEGATIVE = "P is negative before it: "  # then its cause

@@ -178,18 +178,20 @@ def _read_side(recording: Recording, numbers: Sequence[int]) -> float | None:
 
 
 def _has_high_voltage(recording: Recording, phasors: Snapshots, high: Feeder, low: Feeder) -> bool:
-    """Whether the voltages are those of the high side: by names, else by which voltage the other
-    side has then.
+    """Whether the one recorded voltage is the high side's: by the channels' names, else by whether
+    the voltage over the ratio or times the ratio is nearer a nominal one.
     """
     U, ratio = _measure_voltage(phasors, high), _size(phasors, low) / _size(phasors, high)
     sides, own = _find_sides(recording, high, low), _read_side(recording, high.voltages)
-    if sides is not None and sides[1] > 0:  # kV
+    if (
+        sides is not None and sides[1] > 0
+    ):  # both told in kV, not as 1 of the high and 0 of the low side
         return abs(np.log(sides[0] / U)) < abs(np.log(sides[1] / U))
     if sides is not None and own in sides:
         return own == sides[0]
-    below, above = off_nominal(U / ratio), off_nominal(U * ratio)
-    if max(below, above) > LARGEST_OFF_NOMINAL:
-        return below < above
+    off_if_high, off_if_low = off_nominal(U / ratio), off_nominal(U * ratio)
+    if max(off_if_high, off_if_low) > LARGEST_OFF_NOMINAL:
+        return off_if_high < off_if_low
     return U > LARGEST_DISTRIBUTION
 
 

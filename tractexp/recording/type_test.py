@@ -87,8 +87,8 @@ class TypeTest:
         reactance = by_name.get("X_locked", by_name.get("X_2"))
         found = {} if reactance is None else {"X_prime": [reactance.low, reactance.high]}
         if (H := by_name.get("H")) is not None:
-            per_speed = 1 / (np.pi * self.frequency)
-            found["M"] = [H.low * per_speed, H.high * per_speed]
+            omega_n = 2 * np.pi * self.frequency
+            found["M"] = [2 * H.low / omega_n, 2 * H.high / omega_n]  # M = 2 H/omega_n, pu s²/rad
         return found
 
 

@@ -49,7 +49,7 @@ def screen(content: Entry) -> Report:
         if notes := entry["notes"]:
             page.items([shorten(f"note: {notes[0]}", ONE_LINE)])
         buses = _buses(entry["feeders"])
-        told = [_bus(entry, n, bus) for n, bus in enumerate(buses, 1) if _is_loaded(bus)]
+        told = [_describe_bus(entry, n, bus) for n, bus in enumerate(buses, 1) if _is_loaded(bus)]
         page.items([shorten(bus, TWO_LINES) for bus in told[:MOST_BUSES]])
         if buses:
             _add_loads(page, entry, _loads(entry, buses))
@@ -84,7 +84,9 @@ def summary(content: Entry) -> Report:
         if len(entry["notes"]) > NOTES:
             page.text(f"  note: {len(entry['notes']) - NOTES} more")
         buses = _buses(entry["feeders"])
-        page.text(*(f"  {_bus(entry, number, bus)}" for number, bus in enumerate(buses, 1)))
+        page.text(
+            *(f"  {_describe_bus(entry, number, bus)}" for number, bus in enumerate(buses, 1))
+        )
         if buses:
             page.add(_loads(entry, buses))
         unloaded = [feeder["name"] for feeder in entry["feeders"] if not feeder["loaded"]]
@@ -291,19 +293,17 @@ def _overlap(a: Entry, b: Entry) -> bool:
     return a["start"] <= b["end"] and b["start"] <= a["end"]
 
 
-def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
+def _describe_bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     """The voltages of a bus, their size, and what happened to them, in one line."""
     names = ", ".join(entry["channels"][k]["name"] for k in bus[0]["voltages"])
     happened = [_event(event) for event in _of_voltage(bus)]
     told = happened[:MOST_LINE_EVENTS]
     if len(happened) > MOST_LINE_EVENTS:
         told.append(f"{len(happened) - MOST_LINE_EVENTS} more")
-    events = join_words(told) or (
-        explain_no_event(bus[0])
-        if any(feeder["loaded"] or not feeder["currents"] for feeder in bus)
-        else ""
-    )
-    dead = "" if not happened else describe_dead_phases(bus[0].get("dead_phases"))
+    events = join_words(told)
+    if not happened and any(feeder["loaded"] or not feeder["currents"] for feeder in bus):
+        events = explain_no_event(bus[0])  # which tells dead phases, too
+    dead = describe_dead_phases(bus[0].get("dead_phases")) if happened else ""
     parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), dead, events])
     return f"bus {number}: {'; '.join(parts)}"
 

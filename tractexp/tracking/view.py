@@ -87,8 +87,10 @@ def _chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
 
 
 def _list_charts() -> list[dict[str, Any]]:
-    """The charts of the page of runs, as MLflow wants them: the best objective so far by
-    simulations and by iterations, where searches ended, and what they cost.
+    """The charts of the page of runs, as MLflow wants them.
+
+    The best objective so far by simulations and by iterations, objectives and errors run by run,
+    where searches ended, and what they cost.
     """
     curves = [
         _chart(

@@ -52,7 +52,10 @@ def answer(comparison: Comparison) -> str:
 
 
 def _best_tested(comparison: Comparison) -> str:
-    """The best of the variants that had seeds enough for a test; of all where none had."""
+    """The best of the variants that had seeds enough for a test; of all where none had.
+
+    Summaries stand best first.
+    """
     tested = {name for pair in comparison.pairs for name in (pair.first, pair.second)}
     return next(
         (s.name for s in comparison.summaries if s.name in tested), comparison.summaries[0].name

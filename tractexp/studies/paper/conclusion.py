@@ -211,19 +211,21 @@ def valley(study: Study) -> list[str]:
         " of the bounds descend there."
     ]
     if at_bound and second < LARGEST_NEAR_RATIO * lowest and right[column] > other[column]:
-        paragraphs += _attraction(study, lowest, right, other)
+        paragraphs += _explain_attraction(study, lowest, right, other)
     return [*paragraphs, _bounds(study, (low, high), lowest)]
 
 
-def _attraction(study: Study, lowest: float, right: np.ndarray, other: np.ndarray) -> list[str]:
-    """Why the lower bound attracts: what lies between it and the lowest valley, and what trades
-    along its own.
+def _explain_attraction(
+    study: Study, lowest: float, lowest_valley: np.ndarray, second_valley: np.ndarray
+) -> list[str]:
+    """Why the lower bound attracts: what lies between the two valleys, bottoms (d,) in physical
+    units, and which parameters trade along the second.
     """
     grid, path = study.path
     column = study.problem.space.names.index(TRADED)
-    between = np.flatnonzero((grid > other[column]) & (grid < right[column]))
+    between = np.flatnonzero((grid > second_valley[column]) & (grid < lowest_valley[column]))
     ridge = int(between[np.argmax(path.objective[between])])
-    static = static_reactive(study, np.stack((right, other)))
+    static = static_reactive(study, np.stack((lowest_valley, second_valley)))
     remark = (
         " There the static load's part of the reactive power, Q_s0 = Q0 - Q_d0, changes its sign:"
         f" {static[0]:+.2f} pu in the lowest valley, {static[1]:+.2f} pu in the other, which stands"
@@ -238,7 +240,9 @@ def _attraction(study: Study, lowest: float, right: np.ndarray, other: np.ndarra
     along = np.flatnonzero((grid < grid[ridge]) & (path.objective < LARGEST_NEAR_RATIO * lowest))
     if len(along) > 1 and (np.diff(path.objective[along]) > 0).all():
         paragraphs.append(
-            _describe_trade(study, along, int(np.abs(grid - other[column]).argmin()), lowest)
+            _describe_trade(
+                study, along, int(np.abs(grid - second_valley[column]).argmin()), lowest
+            )
         )
     return paragraphs
 

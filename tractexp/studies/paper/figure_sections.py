@@ -99,12 +99,12 @@ def figure9(sheet: Report, study: Study) -> None:
     """Add the searches."""
     sheet.heading("Figure 9: the searches")
     floor = Floor(study.floor, "")
-    one = [_variant(study, name, "iterations", 1) for name in COMPARED]
+    one = [_collect_variant(study, name, "iterations", 1) for name in COMPARED]
     sheet.chart(
         charts.fitness(one, "iterations", floor)[0], "One run, seed 0, as the paper shows it."
     )
     for by in BUDGETS:
-        all_ = [_variant(study, name, by, study.seeds) for name in COMPARED]
+        all_ = [_collect_variant(study, name, by, study.seeds) for name in COMPARED]
         sheet.chart(
             charts.fitness(all_, by, floor)[0],
             f"Median and quartiles of {study.seeds} seeds, by {by}; the line is the lowest"
@@ -129,8 +129,8 @@ def figure9(sheet: Report, study: Study) -> None:
         _valleys(sheet, study)
 
 
-def _variant(study: Study, name: str, by: str, seeds: int) -> Variant:
-    """The searches of an optimizer as a variant of a comparison."""
+def _collect_variant(study: Study, name: str, by: str, seeds: int) -> Variant:
+    """The searches of an optimizer, laid out by one of `BUDGETS`, as a variant to compare."""
     data = study.train[0].record.name
     return Variant(
         label(name),
