@@ -183,10 +183,10 @@ def averaged_power(power: np.ndarray, u: NDArray[np.complex128], weights: np.nda
     """
     back: NDArray[np.complex128] = 1 / u
     P, Q = power
-    real = average(P * back.real - Q * back.imag, weights)
-    imag = average(P * back.imag + Q * back.real, weights)
-    shown = average(u.real, weights) + 1j * average(u.imag, weights)
-    return np.stack([real * shown.real - imag * shown.imag, real * shown.imag + imag * shown.real])
+    current = np.stack([P * back.real - Q * back.imag, P * back.imag + Q * back.real])
+    real, imag = average(current, weights)
+    u_real, u_imag = average(np.stack([u.real, u.imag]), weights)
+    return np.stack([real * u_real - imag * u_imag, real * u_imag + imag * u_real])
 
 
 def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Event":
