@@ -81,6 +81,9 @@ def _run_with_refusals(arguments: list[str]) -> int:
     except Exception as error:
         if traceback:
             raise
+        if mark := getattr(error, "problem_mark", None):  # of a YAML file that Hydra read
+            problem = getattr(error, "problem", None) or type(error).__name__
+            return _print_refusal(f"{mark.name}: line {mark.line + 1}: not valid YAML ({problem})")
         from tractexp.configuration.plugin import place_in_plugin
 
         place = place_in_plugin(error)

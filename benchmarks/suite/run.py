@@ -63,7 +63,7 @@ def run_method(path: Path, case: SuiteCase) -> dict[str, Any]:
         method = read_method(path)
         model = method.fit(list(case.fitted))
         row["seconds"] = measure_spent_time() - begun
-        row["named"] = sort_sets(method.name(model)) if hasattr(method, "name") else None
+        row["named"] = read_names(method, model)
     except Exception as error:  # a method of others may raise anything
         return row | {"failed": describe_error(error)}
     return row | {"dips": [judge_dip(method, model, event) for event in case.unused]}
@@ -79,8 +79,8 @@ def judge_dip(method: ModuleType, model: Any, event: Event) -> dict[str, Any]:
     band of P and of Q held its worst sample (None without a band).
     """
     try:
-        P, Q, *band = method.predict(model, event.hide())
-        left = np.stack([np.subtract(P, event.P), np.subtract(Q, event.Q)])[:, event.start :]
+        powers, band = read_powers(method.predict(model, event.hide()), len(event.P))
+        left = (powers - np.stack([event.P, event.Q]))[:, event.start :]
     except Exception as error:
         return {"error": None, "held": None, "failed": describe_error(error)}
     response = (event.P + 1j * event.Q - event.power_before)[event.start :]
@@ -88,9 +88,41 @@ def judge_dip(method: ModuleType, model: Any, event: Event) -> dict[str, Any]:
     left = left[:, known]
     error = float(np.linalg.norm(left) / np.linalg.norm(response[known]))
     held = None
-    if band and band[0] is not None:
-        held = (np.abs(left).max(axis=1) <= np.asarray(band[0], dtype=float)).tolist()
+    if band is not None:
+        held = (np.abs(left).max(axis=1) <= np.asarray(band, dtype=float)).tolist()
     return {"error": error if np.isfinite(error) else None, "held": held}
+
+
+def read_names(method: ModuleType, model: Any) -> list[list[str]] | None:
+    """Sets of effects that a method names as missing; None where it says nothing of that.
+
+    Raises `TypeError` for what is no list of lists of names.
+    """
+    if not hasattr(method, "name"):
+        return None
+    sets = method.name(model)
+    well_formed = not isinstance(sets, str) and all(
+        not isinstance(names, str) and all(isinstance(name, str) for name in names)
+        for names in sets
+    )
+    if not well_formed:
+        raise TypeError(
+            f"name() returned {sets!r}, but must return lists of names, such as [['a']]"
+        )
+    return sort_sets(sets)
+
+
+def read_powers(given: Any, samples: int) -> tuple[np.ndarray, Any]:
+    """P and Q (2, samples) that a method predicts, and its band, None without one.
+
+    Raises `TypeError` for what is none.
+    """
+    if not isinstance(given, tuple | list) or len(given) not in (2, 3):
+        raise TypeError(f"predict() returned {type(given).__name__}, but must return P, Q[, band]")
+    powers = np.array([np.asarray(one, dtype=float) for one in given[:2]])
+    if powers.shape != (2, samples):
+        raise TypeError(f"predict() returned {len(powers[0])} samples, but the event has {samples}")
+    return powers, given[2] if len(given) == 3 else None
 
 
 def sort_sets(sets: Sequence[Sequence[str]]) -> list[list[str]]:
@@ -105,13 +137,17 @@ def describe_error(error: Exception) -> str:
 
 
 def read_numbers(text: str) -> list[int]:
-    """ "1-20,51" as numbers. Raises `ValueError` for what is none."""
+    """ "1-20,51" as numbers. Raises `argparse.ArgumentTypeError` for what is none."""
     numbers: list[int] = []
     for part in text.split(","):
         first, _, last = part.partition("-")
+        if not (first.isdecimal() and (last or first).isdecimal()):
+            raise argparse.ArgumentTypeError(f"'{part}' is no case; give numbers, such as 1-20,51")
         numbers += range(int(first), int(last or first) + 1)
     if wrong := [n for n in numbers if n not in MADE and n not in RECORDS]:
-        raise ValueError(f"there is no case {wrong[0]}; there are 1 to {RECORDS[-1]}")
+        raise argparse.ArgumentTypeError(
+            f"there is no case {wrong[0]}; there are 1 to {RECORDS[-1]}"
+        )
     return numbers
 
 
@@ -169,12 +205,21 @@ def collect_rows(
             if rows:
                 spent = sum(row.get("seconds", 0.0) for row in rows)
                 print(f"case {rows[0]['case']}: {spent:.0f} s", flush=True)
+            for row in rows:
+                for why in list_failures(row):
+                    print(f"  {row['method']}: {why}", flush=True)
     wanted = {
         (digest(one), number, seed if number in DRAWN else None)
         for one in methods
         for number in numbers
     }
     return [row for row in kept if (row["file"], row["case"], row["seed"]) in wanted]
+
+
+def list_failures(row: Row) -> list[str]:
+    """Why a method has no prediction of a case: what its fit or its predictions raised."""
+    dips = [dip["failed"] for dip in row.get("dips", ()) if "failed" in dip]
+    return list(dict.fromkeys([*([row["failed"]] if "failed" in row else []), *dips]))
 
 
 def log_rows(rows: Sequence[dict[str, Any]], seed: int, uri: str) -> None:

@@ -208,6 +208,14 @@ def test_a_law_that_is_none_is_refused_when_the_model_is_composed(stranger, law,
         _ = loads.with_part(stranger(Static, law=law)).equations
 
 
+def test_a_law_with_parameters_that_returns_nothing_is_refused(stranger):
+    """As one does who forgets the `return`; it would be a load without its static part."""
+    slope = Parameter(1.0, (0.0, 3.0), "1", "slope", "here")
+    made = stranger(Static, slope=slope, law=lambda self, u, slope: None)
+    with pytest.raises(UserError, match="returns nothing, so that no equation has its slope"):
+        _ = loads.with_part(made).equations
+
+
 @pytest.mark.parametrize(
     ("edit", "sentence"),
     [

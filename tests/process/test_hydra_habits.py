@@ -275,3 +275,12 @@ def test_jobs_are_composed_once_a_choice_and_as_hydra_composes_each(monkeypatch)
         for number, (one, overrides) in enumerate(zip(composed, jobs, strict=True)):
             whole = compose._as_hydra_composes(overrides, number)
             assert (one.config, one.choices) == (whole.config, whole.choices)
+
+
+def test_a_choice_of_ones_own_that_is_no_yaml_is_told_with_its_line(tmp_path):
+    path = tmp_path / "conf" / "optimizer" / "mine.yaml"
+    path.parent.mkdir(parents=True)
+    path.write_text("defaults: [pso]\niterations: [5\n")
+    done = run_command("--config-dir", "conf", "optimizer=mine", cwd=tmp_path)
+    assert done.returncode == 2
+    assert f"{path}: line 3: not valid YAML" in done.stderr

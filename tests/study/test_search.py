@@ -335,6 +335,18 @@ def test_an_optimizer_that_never_yields_is_refused(limits, polish):
         search(Watched(), Yieldless(polish=polish), 0, limits)
 
 
+@pytest.mark.parametrize("iterations", [0, 3])
+def test_an_optimizer_that_never_evaluates_is_refused(iterations):
+    class Idle(Yieldless):
+        name = "idle"
+
+        def search(self, evaluate, box, rng):
+            yield from [None] * iterations
+
+    with pytest.raises(UserError, match=r"optimizer 'idle': .* never called `evaluate`"):
+        search(Watched(), Idle(), 0)
+
+
 def test_polish_leaves_a_reached_target_alone():
     optimizer = build("optimizer", {"name": "random_search", "polish": True})
     found = search(Watched(), optimizer, 3, Limits(target=0.1))

@@ -1,5 +1,6 @@
 """The benchmark that others can enter: what a method sees, what is counted, and what fails."""
 
+import argparse
 import sqlite3
 
 import numpy as np
@@ -93,6 +94,24 @@ def test_what_a_method_raises_is_a_row_and_no_end(tmp_path, case):
     assert "TypeError" in dip["failed"]
 
 
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ("def predict(m, e): ...", "predict() returned NoneType, but must return P, Q[, band]"),
+        ("def predict(m, e): return e.U[:5], e.U[:5]", "predict() returned 5 samples, but"),
+        ("def predict(m, e): return e.U, e.U\ndef name(m): return 'ab'", "name() returned 'ab'"),
+        (
+            "def predict(m, e): return e.U, e.U\ndef name(m): return ['ab']",
+            "name() returned ['ab']",
+        ),
+    ],
+)
+def test_what_is_returned_in_another_form_is_a_sentence(body, sentence, tmp_path, case):
+    path = write(tmp_path, "formless", f"def fit(events): ...\n\n{body}\n")
+    (why,) = run.list_failures(run.run_method(path, case))
+    assert sentence in why
+
+
 def test_a_file_that_is_no_method_is_told_before_anything_runs(tmp_path):
     with pytest.raises(SystemExit, match="a method needs a function predict"):
         run.read_method(write(tmp_path, "half", "def fit(events): ...\n"))
@@ -102,8 +121,10 @@ def test_a_file_that_is_no_method_is_told_before_anything_runs(tmp_path):
 
 def test_numbers_are_those_of_cases():
     assert run.read_numbers("1-3,51") == [1, 2, 3, 51]
-    with pytest.raises(ValueError, match="there is no case 61"):
+    with pytest.raises(argparse.ArgumentTypeError, match="there is no case 61"):
         run.read_numbers("61")
+    with pytest.raises(argparse.ArgumentTypeError, match=r"'1\.\.3' is no case"):
+        run.read_numbers("1..3")
 
 
 def test_a_public_case_is_the_same_each_time_and_others_follow_their_seed():

@@ -286,7 +286,8 @@ def search(
     Stopped
         At Ctrl-C, with what was found so far.
     UserError
-        For an optimizer that never yields, or that proposes what is not a number.
+        For an optimizer that never yields or never evaluates, or that proposes what is not a
+        number.
     """
     counter = _Counter(problem, optimizer.space == "unit", limits)
     rows: list[tuple[int, float, np.ndarray, float]] = []
@@ -299,6 +300,11 @@ def search(
     try:
         for _ in _iterations(counter, optimizer, np.random.default_rng(seed)):
             note()
+        if not counter.simulations:
+            raise UserError(
+                f"optimizer '{optimizer.name}': its search ended and never called `evaluate`; give"
+                " it points of the box, (n, d), and it gives their objectives, (n,)"
+            )
         status = f"finished its {max(len(rows) - 1, 0)} iterations"
     except _Stop as stop:
         status = str(stop)

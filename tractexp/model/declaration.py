@@ -15,6 +15,7 @@ from tractexp.model.drive import PHASORS
 from tractexp.model.equations import Equations
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
 from tractexp.model.signature import select_arguments
+from tractexp.text.wording import join_words
 
 LAW_ROUNDING = 1e-9  # how far from 1 a law may be before the event
 
@@ -105,6 +106,7 @@ def _static(eq: Equations, static: Static) -> None:
     ):
         eq.require(*requirement)
     if law is None:
+        _refuse_forgotten_law(static)
         return
     _check_law(static, law, {u: 1, f: 1, **{own[p.name]: p.default for p in static.parameters}})
     eq.place(sites.static_voltage, eq.U / eq.U0)
@@ -113,6 +115,16 @@ def _static(eq: Equations, static: Static) -> None:
     P, Q = law
     powers = eq.place(sites.P_static, eq.P_s0 * P), eq.place(sites.Q_static, eq.Q_s0 * Q)
     eq.consume(*powers, static.compute_damping(**select_arguments(static.compute_damping, own)))
+
+
+def _refuse_forgotten_law(static: Static) -> None:
+    """Raise `UserError` for a static load that has parameters and no law: no record tells them."""
+    names = [p.name for p in static.parameters]
+    if names:
+        raise UserError(
+            f"law() of the static load '{static.name}' returns nothing, so that no equation has its"
+            f" {join_words(names)}; return two expressions, P/P_s0 and Q/Q_s0"
+        )
 
 
 def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -> None:
