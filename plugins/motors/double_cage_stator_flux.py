@@ -50,6 +50,6 @@ class DoubleCageStatorFlux(Motor):
         V, Z = eq.V, R_s + I * X_second
         return _machine.two_cages(
             eq,
-            lambda inner: eq.branch("psi", r"\psi", V, Z, behind=inner, flux_moves=True),
+            lambda E_second: eq.branch("psi", r"\psi", V, Z, behind=E_second, flux_moves=True),
             (T_prime, X_prime, C, M, T_m, T_second, X_second),
         )

@@ -17,7 +17,13 @@ from tractexp.extend import Effect, Parameter
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 
-MOTORS = ("stator_flux", "electromechanical", "double_cage", "voltage")
+MOTORS = (
+    "stator_flux",
+    "electromechanical",
+    "double_cage",
+    "double_cage_stator_flux",
+    "voltage",
+)
 STATICS = ("branch", "constant_impedance", "exponential", "zip", "constant_power", "none")
 VALUES = {
     "T_prime": 0.12,
@@ -203,6 +209,7 @@ PAIRS = (
     ("stator_flux", "branch", "shunt"),
     ("electromechanical", "branch", "stator_resistance"),
     ("double_cage", "exponential", "stator_resistance"),
+    ("double_cage_stator_flux", "exponential"),
     ("voltage", "zip"),
     ("stator_flux", "exponential"),
     ("none", "constant_power"),
