@@ -158,6 +158,8 @@ def test_every_motor_is_pushed_in_each_flux_and_its_speed(motor):
     static = get("model/static", "exponential")()
     eq = compose(get("model/motor", motor)(), static, [Injection()]).equations
     for state in eq.states.values():
+        if state.derived:  # of a branch: it starts from the others
+            continue
         pushed = {s.name for s in state.derivative.free_symbols} & set(PERTURBATIONS)
         expected = {"flux": {"push_flux_d", "push_flux_q"}, "speed": {"push_speed"}}
         assert pushed == expected[state.role]

@@ -219,7 +219,7 @@ def test_least_squares_are_told_that_there_are_no_residuals(ioh):
 def test_an_optimizer_that_never_evaluates_is_refused_not_waited_for(ioh, monkeypatch):
     idle = optimizer("random_search")
     monkeypatch.setattr(type(idle), "search", lambda *_: iter(()))
-    with pytest.raises(UserError, match="without a single evaluation"):
+    with pytest.raises(UserError, match="never called `evaluate`"):
         run("idle", idle, (1, 2, 1), SMALL)
 
 

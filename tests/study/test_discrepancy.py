@@ -347,7 +347,7 @@ def test_noise_drawn_white_has_the_law_of_noise_that_is_whitened():
 
 
 def test_a_fit_in_the_stiff_part_of_the_box_asks_for_the_steps_of_the_whole_box(monkeypatch):
-    monkeypatch.setattr(kernels, "LONGEST_STEP", 1.0)
+    monkeypatch.setattr(kernels, "LONGEST_SEARCH_STEP", 1.0)
     made = bench(base(), events(recorder=FAST))
     own, at = made.kernels, made.coordinates
     usual = own.bare.space.from_unit(at.null[at.base])[None]
@@ -361,7 +361,7 @@ def test_a_fit_in_the_stiff_part_of_the_box_asks_for_the_steps_of_the_whole_box(
 
 
 def test_an_investigation_starts_anew_with_shorter_steps_where_its_fits_ask_for_them(monkeypatch):
-    monkeypatch.setattr(kernels, "LONGEST_STEP", 1.0)
+    monkeypatch.setattr(kernels, "LONGEST_SEARCH_STEP", 1.0)
     monkeypatch.setattr(Problem, "steps_at", lambda own, values: 256)
     said: list[str] = []
     found = investigate(base(), events(recorder=FAST), only=FEW, tell=said.append)
