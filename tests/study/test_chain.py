@@ -173,7 +173,6 @@ def test_the_chain_of_a_station_ends(load, shared_data, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.xfail(strict=False, reason=NOT_SEEN)
 def test_the_chain_of_another_simulator_ends(shared_data, tmp_path):
     cases = shared_data.parent / "cases" / "andes"
     if not (cases / "dip_a.csv").is_file():
