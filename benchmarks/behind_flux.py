@@ -66,20 +66,13 @@ def make_table(rows: list[dict[str, Any]]) -> str:
     return marked.table(["load", "sets", TOLD, FOUND, NEAREST, FALSE], lines)
 
 
-def read_rows() -> list[dict[str, Any]]:
-    """The rows stored."""
-    if not STORED.exists():
-        return []
-    return [json.loads(line) for line in STORED.read_text(encoding="utf-8").splitlines()]
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=9)
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further set after")
     parser.add_argument("--docs", action="store_true", help="write the stored rows into the page")
     asked = parser.parse_args()
-    rows = read_rows()
+    rows = strangers.read_rows(STORED)
     if asked.docs:
         marked.replace(strangers.PAGE, MARK, make_table(rows))
         return

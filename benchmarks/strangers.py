@@ -217,11 +217,11 @@ def count_outcomes(rows: list[dict[str, Any]]) -> list[int]:
     return [counted[one] for one in OUTCOMES]
 
 
-def read_rows() -> list[dict[str, Any]]:
-    """The rows stored."""
-    if not STORED.exists():
+def read_rows(stored: Path = STORED) -> list[dict[str, Any]]:
+    """The rows of a file, none where it is not there."""
+    if not stored.exists():
         return []
-    return [json.loads(line) for line in STORED.read_text(encoding="utf-8").splitlines()]
+    return [json.loads(line) for line in stored.read_text(encoding="utf-8").splitlines()]
 
 
 def main() -> None:

@@ -119,4 +119,4 @@ def test_what_is_told_of_an_effect_behind_stator_flux(sets, nearest, told):
 def test_the_page_holds_what_the_rows_behind_stator_flux_hold():
     page = strangers.PAGE.read_text(encoding="utf-8")
     _, made, _ = marked.parted(page, behind_flux.MARK)
-    assert made.strip() == behind_flux.make_table(behind_flux.read_rows())
+    assert made.strip() == behind_flux.make_table(strangers.read_rows(behind_flux.STORED))

@@ -9,7 +9,7 @@ from tractexp.api.fit_spec import FitSpec
 from tractexp.configuration.choices import set_holding
 from tractexp.configuration.run_command import suggest_run
 from tractexp.identification.adequacy import Adequacy
-from tractexp.identification.conclude import conclude, refuse_failed
+from tractexp.identification.conclude import refuse_failed
 from tractexp.identification.result import Result
 from tractexp.identification.search import SearchResult
 from tractexp.text.progress import Progress, counter
@@ -52,17 +52,8 @@ def conclude_identification(
     details = FitDetails(
         list(graded.fits), graded.estimation, uncertainty, agreement, graded.adequacy
     )
-    result = conclude(
-        problem,
-        end,
-        graded.values,
-        details.fits,
-        setup.seed,
-        setup.model.node,
-        setup.optimizer.name,
-    )
     result = replace(
-        result,
+        setup.build_result(end, graded.values, details.fits),
         shown_effects=dict(shown),
         race=[*setup.model.race],
         adequacy=graded.adequacy.to_dict(),

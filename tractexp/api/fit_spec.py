@@ -2,9 +2,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from tractexp.api.arguments import Choice
 from tractexp.api.setup import Setup
+from tractexp.identification.conclude import conclude
+from tractexp.identification.fit import Fit
 from tractexp.identification.frequency_course import FREQUENCY_SWING
+from tractexp.identification.result import Result
 from tractexp.identification.search import SearchResult
 from tractexp.text.progress import Progress, tell
 
@@ -23,3 +28,8 @@ class FitSpec(Setup):
         """
         tell(progress, [*self.lines(), f"optimizer: {self.optimizer.name}, seed {self.seed}"])
         return self.search(self.optimizer, self.seed, progress)
+
+    def build_result(self, end: SearchResult, values: np.ndarray, fits: list[Fit]) -> Result:
+        """The result of free values (d,) that a search led to, before anything is judged of it."""
+        node, name = self.model.node, self.optimizer.name
+        return conclude(self.problem, end, values, fits, self.seed, node, name)

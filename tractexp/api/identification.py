@@ -18,7 +18,6 @@ from tractexp.blocks import Report, Table
 from tractexp.configuration.run_command import build_folder_command
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Grade
-from tractexp.identification.conclude import conclude
 from tractexp.identification.fit import play
 from tractexp.identification.result import Result, by_event
 from tractexp.identification.search import REFUSED, History, SearchResult
@@ -75,16 +74,7 @@ class Identification(Written):
         if not end.objective < REFUSED:
             return None
         fits = play(setup.problem, end.values, setup.validate)
-        result = conclude(
-            setup.problem,
-            end,
-            end.values,
-            fits,
-            setup.seed,
-            setup.model.node,
-            setup.optimizer.name,
-        )
-        return cls(result, setup, end)
+        return cls(setup.build_result(end, end.values, fits), setup, end)
 
     @functools.cached_property
     def details(self) -> FitDetails:
