@@ -180,6 +180,39 @@ def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, statio
         assert "dip of 40 %" in done.stdout
 
 
+def test_dips_of_one_load_in_several_files_are_fitted_by_one_command(tmp_path):
+    """The last file's dip is held out; a file of other channels is no dip of this load."""
+    depths = {"a.cfg": 0.3, "b c.cfg": 0.5, "d.cfg": 0.4}
+    paths = [saved(tmp_path / name, constant(depth=depth)) for name, depth in depths.items()]
+    other = ("VA", "VB", "VC", "I1", "I2", "I3")
+    stranger = saved(tmp_path / "e.cfg", constant(), names=other)
+    made = tractexp.look([*paths, stranger])
+    command = made.commands[-1]
+    said = f"to fit 3 dips together, as of one load, d.cfg#1.1 held out: {command}"
+    assert str(made).splitlines()[1] == said
+    assert "fit 3 dips together" in made.report().html
+    settings = ["optimizer=random_search", "budget=50", "tracking.enabled=false"]
+    done = run_command(
+        *shlex.split(command)[1:],
+        *(QUICK_RACE, *settings, "hydra.run.dir=run"),
+        cwd=tmp_path.parent,
+    )
+    assert done.returncode == 0, done.stderr
+    events = json.loads((tmp_path.parent / "run" / "result.json").read_text())["events"]
+    roles = [("a.cfg#1.1", "train"), ("b c.cfg#1.1", "train"), ("d.cfg#1.1", "validate")]
+    assert [(event["name"], event["role"]) for event in events] == roles
+
+
+def test_loads_of_one_file_each_and_files_of_several_folders_have_no_common_command(tmp_path):
+    first = saved(tmp_path / "a.cfg")
+    elsewhere = saved(tmp_path / "more" / "b.cfg")
+    other = saved(tmp_path / "c.cfg", names=("VA", "VB", "VC", "I1", "I2", "I3"))
+    for given in ([first], [first, elsewhere], [first, other]):
+        assert "joint" not in tractexp.look(given).content
+    settings = {"voltages": [0, 1, 2], "currents": [3, 4, 5]}
+    assert "joint" not in tractexp.look([first, saved(tmp_path / "d.cfg")], **settings).content
+
+
 def test_dips_are_numbered_as_the_reader_numbers_them(tmp_path):
     t = np.arange(round(2.5 * RATE)) / RATE
     U = np.ones_like(t)

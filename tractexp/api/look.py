@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from tractexp.api.arguments import public
+from tractexp.api.joint_command import build_joint_command
 from tractexp.api.listed import Listed
 from tractexp.api.look_content import build_content
 from tractexp.api.read import node_of, record_from_dict, record_to_dict, table
@@ -90,8 +91,11 @@ class Look(Written):
 
     @property
     def commands(self) -> list[str]:
-        """The commands that fit what is worth it, one for each load with such an event."""
-        return [load["command"] for _, load in self._loads if load["command"]]
+        """The commands that fit what is worth it, one for each load with such an event; then the
+        one that fits the dips of one load in several files together.
+        """
+        joint = [self.content["joint"]["command"]] if "joint" in self.content else []
+        return [load["command"] for _, load in self._loads if load["command"]] + joint
 
     @property
     def _loads(self) -> list[tuple[str, Mapping[str, Any]]]:
@@ -255,7 +259,10 @@ def look(*sources: "Records", progress: Progress = None, **settings: "Setting") 
                 views.append(_view(source, settings))
                 stage("measuring the quality of the channels")
                 contents.append(build_content(views[-1]))
-    return Look(distinct, settings, files.plain({"files": contents}), views)
+    content: dict[str, Any] = {"files": contents}
+    if not settings and (joint := build_joint_command(views)):
+        content["joint"] = joint
+    return Look(distinct, settings, files.plain(content), views)
 
 
 def _source(given: Any) -> str | Record:

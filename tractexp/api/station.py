@@ -12,9 +12,10 @@ from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identification import UNUSABLE, Identification
 from tractexp.api.job import Job
+from tractexp.api.joint_command import build_fit_command
 from tractexp.api.listed import Listed
 from tractexp.api.station_load import LoadJob, fit_load, read_files
-from tractexp.api.survey import build_fit_command, survey
+from tractexp.api.survey import survey
 from tractexp.api.surveying import FEWEST_DIPS, complete_entries, keys, name_load
 from tractexp.api.task import Task, call
 from tractexp.blocks import Report, Table

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.job import Job
+from tractexp.api.joint_command import build_fit_command
 from tractexp.api.listed import Listed
 from tractexp.api.load_command import RACE
 from tractexp.api.surveying import (
@@ -23,7 +24,7 @@ from tractexp.api.surveying import (
 from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.overrides import build_typed_command, format_assignment
-from tractexp.configuration.plugin import discover, get, plugin
+from tractexp.configuration.plugin import get, plugin
 from tractexp.errors import DATA, UserError, check_range
 from tractexp.outcome import Written
 from tractexp.record import detect, measure_promise
@@ -241,12 +242,6 @@ def survey(
     raced = propose_race(content["rows"], content["informative"]) if model is None else []
     content["command"] = build_fit_command(str(folder), [c.name for c in best], *raced)
     return Surveyed(content)
-
-
-def build_fit_command(folder: str, events: Sequence[str], *more: str) -> str:
-    """The command that fits events of a folder together, with further settings."""
-    reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
-    return build_typed_command({"name": reader, "path": folder, "train": [*events]}, *more)
 
 
 def propose_race(

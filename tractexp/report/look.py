@@ -32,6 +32,9 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
     """The page of a look: what each file holds, its loads and what happened."""
     files = content["files"]
     page = Report(f"A look at {', '.join(Path(f['file']).name for f in files)}", _lead(files))
+    if "joint" in content:
+        page.verdict(f"To {describe_joint_fit(content['joint'])}:", kind="good")
+        page.code(content["joint"]["command"])
     for view, entry in zip(views, files, strict=True):
         if len(files) > 1:
             page.heading(entry["file"])
@@ -107,6 +110,11 @@ def _lead(files: Sequence[Mapping[str, Any]]) -> str:
     return (
         f"{count_noun(loads, 'load')}, {count_noun(len(events), 'event')}, {worth} worth fitting."
     )
+
+
+def describe_joint_fit(joint: Mapping[str, Any]) -> str:
+    """What the command that fits dips of several files does, in words."""
+    return f"fit {joint['dips']} dips together, as of one load, {joint['held_out']} held out"
 
 
 def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:

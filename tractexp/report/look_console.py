@@ -19,6 +19,7 @@ from tractexp.report.look import (
     SECONDARY,
     channels,
     describe_dead_phases,
+    describe_joint_fit,
     events,
     explain_no_event,
     explain_unnamed,
@@ -43,7 +44,7 @@ def screen(content: Entry) -> Report:
     """
     entries = content["files"]
     reasons = unfitted.sentences(entries)[:MOST_REASONS]
-    page = Report().text(_answer(entries)).items([shorten(each, TWO_LINES) for each in reasons])
+    page = _begin_with_answer(content).items([shorten(each, TWO_LINES) for each in reasons])
     for entry in entries[:MOST_FILES]:
         page.text(shorten(_about(entry), TWO_LINES))
         if notes := entry["notes"]:
@@ -74,7 +75,7 @@ def _add_loads(page: Report, entry: Entry, loads: Table) -> None:
 
 def summary(content: Entry) -> Report:
     """Which load and which dip to fit by which command, then a line for each file, bus and load."""
-    page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
+    page = _begin_with_answer(content).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
         held = f"; {count_noun(len(entry['channels']), 'channel')}" if entry["channels"] else ""
         page.text(
@@ -110,7 +111,7 @@ def summary(content: Entry) -> Report:
 
 def build_full_report(content: Entry) -> Report:
     """Notes, channels, loads and why they are such, all events and all commands of the files."""
-    page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
+    page = _begin_with_answer(content).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
         page.text(_about(entry), *(f"  note: {n}" for n in entry["notes"]))
         if entry["channels"]:
@@ -129,6 +130,15 @@ def build_full_report(content: Entry) -> Report:
         if not entry["feeders"]:
             page.text(f"  {explain_unnamed(entry)}")
     return page
+
+
+def _begin_with_answer(content: Entry) -> Report:
+    """A report that begins with the answer; of several files also how dips are fitted together."""
+    page = Report().text(_answer(content["files"]))
+    joint = content.get("joint")
+    if joint is None:
+        return page
+    return page.text(f"to {describe_joint_fit(joint)}: {joint['command']}")
 
 
 def _answer(files: Sequence[Entry]) -> str:
