@@ -26,6 +26,11 @@ class NamedDip:
     event: LoadEvent
 
     @property
+    def is_from_field(self) -> bool:
+        """Whether its structure is one that nobody knows: its record is in kV and MW."""
+        return self.event.event is not None and self.event.event.record.is_from_field
+
+    @property
     def weight(self) -> float:
         """How much of the load answers: the depth times the active power after the dip."""
         return abs(self.event.what.depth * self.event.what.after[0])
@@ -39,22 +44,23 @@ def build_joint_command(views: Sequence[View]) -> dict[str, Any] | None:
     loads the reader of the screen judges.
     """
     folders = {Path(view.source).parent for view in views}
-    if len(folders) > 1 or not all(_is_plain_file(view) for view in views):
+    dips = _dips_of_commonest_load(views)
+    if len(folders) > 1 or len(dips) < 2 or not all(map(_is_plain_file, views)):
         return None
+    telling = heapq.nlargest(MOST_TOGETHER, dips, key=lambda dip: dip.weight)
+    *fitted, held_out = [dip.name for dip in dips if dip in telling]
+    raced = [RACE] if any(dip.is_from_field for dip in dips) else []
+    command = build_fit_command(str(*folders), fitted, *raced, validate=[held_out])
+    return {"dips": len(fitted) + 1, "held_out": held_out, "command": command}
+
+
+def _dips_of_commonest_load(views: Sequence[View]) -> list[NamedDip]:
+    """The dips of the load that has them in most files, in the files' order."""
     loads: dict[Hashable, list[NamedDip]] = defaultdict(list)
     for view in views:
         for key, dip in _list_dips(view):
             loads[key].append(dip)
-    dips = max(loads.values(), key=len, default=[])
-    if len(dips) < 2:
-        return None
-    telling = heapq.nlargest(MOST_TOGETHER, dips, key=lambda dip: dip.weight)
-    *fitted, held_out = (dip for dip in dips if dip in telling)
-    records = [dip.event.event.record for dip in dips if dip.event.event]
-    raced = [RACE] if any(record.is_from_field for record in records) else []
-    names = [dip.name for dip in fitted]
-    command = build_fit_command(str(*folders), names, *raced, validate=[held_out.name])
-    return {"dips": len(fitted) + 1, "held_out": held_out.name, "command": command}
+    return max(loads.values(), key=len, default=[])
 
 
 def build_fit_command(

@@ -259,9 +259,8 @@ def look(*sources: "Records", progress: Progress = None, **settings: "Setting") 
                 views.append(_view(source, settings))
                 stage("measuring the quality of the channels")
                 contents.append(build_content(views[-1]))
-    content: dict[str, Any] = {"files": contents}
-    if not settings and (joint := build_joint_command(views)):
-        content["joint"] = joint
+    joint = None if settings else build_joint_command(views)
+    content = {"files": contents} | ({"joint": joint} if joint else {})
     return Look(distinct, settings, files.plain(content), views)
 
 
