@@ -13,6 +13,7 @@ and taken up.
 
 The judgement set's seeds follow from the hash of the commit that froze product and generator, so
 that nobody could look at them before; it is refused where either is not what that commit holds.
+What is named is held against one further event of each data set, that no fit and no choice saw.
 `--docs` writes its tables and figures into docs/judgement.md. A later set is drawn by `--frozen
 LATER --out judgement_LATER.jsonl` and takes the place of `NEWEST`.
 """
@@ -39,7 +40,7 @@ import oracle  # noqa: E402, F401
 import tractexp  # noqa: E402
 from hidden_effects import cases  # noqa: E402
 from hidden_effects.effects import CATALOG, PHYSICAL  # noqa: E402
-from hidden_effects.generator import make, scene, truth  # noqa: E402
+from hidden_effects.generator import draw_dips, make, scene, truth  # noqa: E402
 from hidden_effects.laws import FAMILY  # noqa: E402
 from hidden_effects.outside import OUTSIDE  # noqa: E402
 
@@ -63,6 +64,7 @@ HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
 Trials = Iterator[cases.Planned]
 ERROR = 0.01  # of the response: how inexact the loads are in which nothing is hidden
 SUITES = ("nulls", "nuisances", "inexact", *HIDDEN, "field", "loud", "pairs")
+UNUSED_STREAMS = 7, 8  # of a seed's numbers: the dip and the noise of an unused event
 BEST = 3  # single effects of which the least that any leaves is taken
 SAME = {  # effects whose amount is a parameter of the model, in its units
     "stator_resistance": "R_s",
@@ -173,6 +175,7 @@ def run(group: str, planned: cases.Planned, events: int, held: int) -> dict:
         row["generated"] = time.perf_counter() - started
         found = investigate(model, seen[: events - held], seen[events - held :], only=only, seed=0)
         row |= _counted(found) | _compared(found, trial)
+        row["closed_unused"] = find_share_unused(found, trial)
     except (UserError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         row["failed"] = f"{type(error).__name__}: {error}"
     return row | {"seconds": time.perf_counter() - started}
@@ -299,6 +302,34 @@ def _compared(found, trial: cases.Trial) -> dict:
             "lambda_left": _left(found, clean[:, :N]),
         }
     return row
+
+
+def find_share_unused(found, trial: cases.Trial) -> float | None:
+    """The share of the base model's squared error that what is kept takes away of an unused event;
+    None where nothing is kept, or where the load does not survive the event.
+    """
+    from tractexp.discrepancy.held_out import compare_on
+    from tractexp.record import Record, detect
+
+    if (chosen := found.verdict.chosen) is None:
+        return None
+    try:
+        record = make_unused(trial)
+    except (ValueError, ArithmeticError):
+        return None
+    fit = chosen.reported_fit
+    event = detect(Record("unused", **record, source="unused").check())
+    return compare_on(found.context, [event], found.bare, [fit])[fit.names].closed_share
+
+
+def make_unused(trial: cases.Trial) -> dict[str, np.ndarray]:
+    """One more event of the load, with its own dip and noise."""
+    case, made = trial.case, scene(trial.case, trial.seed)
+    draws, noise = (np.random.default_rng([trial.seed, k]) for k in UNUSED_STREAMS)
+    dips = draw_dips(draws, 1, made.recorder, case.needs("swing"), case.needs("negative"))
+    static = made.load.static
+    (record,) = replace(made, dips=dips, static=(complex(static.P, static.Q),)).records()
+    return case.noise.add(record, noise)
 
 
 def _left(found, clean: np.ndarray) -> float:

@@ -20,6 +20,7 @@ from typing import Any
 import hidden_effects_evidence as evidence
 import hidden_effects_study as study
 import marked
+import numpy as np
 
 STORED = Path(__file__).with_suffix(".jsonl")
 KEPT = ("frozen", "group", "label", "seed", "truth", "verdict", "sets")
@@ -64,6 +65,7 @@ HEAD = [
     "of these named",
     "candidates",
     "silent",
+    "closed in an unused event",
 ]
 Row = dict[str, Any]
 
@@ -133,13 +135,23 @@ def make_table(rows: list[Row], newest: str) -> str:
         candidates = sum(row["verdict"] == "candidate" for row in own)
         silent = sum(row["verdict"] in SILENT for row in own)
         version = newest[:8] if is_newest else "before"
-        lines.append([what, version, len(own), *cells, named, candidates, silent])
+        told = [*cells, named, candidates, silent, describe_unused(own)]
+        lines.append([what, version, len(own), *told])
     return marked.table(HEAD, lines)
+
+
+def describe_unused(rows: Iterable[Row]) -> str:
+    """The median of the share of squares that a name takes away of an event which nothing chose by,
+    and of how many rows; "" where none has one.
+    """
+    shares = [row["unused"] for row in rows if row.get("unused") is not None]
+    return f"{np.median(shares):.0%} of {len(shares)}" if shares else ""
 
 
 def shorten(row: Row) -> Row:
     """What is kept of a row."""
-    return {key: row[key] for key in KEPT} | {"reached": is_reached(row)}
+    known = {"reached": is_reached(row), "unused": row.get("closed_unused")}
+    return {key: row[key] for key in KEPT} | known
 
 
 def keep(rows: Iterable[Row]) -> None:

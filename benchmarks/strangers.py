@@ -109,7 +109,9 @@ def make_beside(number: int, simulator: str, rng: np.random.Generator) -> Strang
 
 
 def make_system(number: int, rng: np.random.Generator) -> Stranger:
-    """A load of ANDES's, the frequency with the jumps of the angle in every second set."""
+    """A load of ANDES's, the frequency with the jumps of the angle in every second set: without
+    them the record lacks what the load saw, which no effect is.
+    """
     one = andes_loads.make(SERIES, number)
     chosen = "f" if rng.integers(2) else "f_smooth"
     dips = [
@@ -119,7 +121,8 @@ def make_system(number: int, rng: np.random.Generator) -> Stranger:
     truth = ("second_cage",) if kind == "Motor5" else ()
     truth += ("stator_resistance",) if one.truth["motor"]["rs"] > 1e-3 else ()
     told = f"{kind}, {'with' if 'stator_resistance' in truth else 'without'} stator resistance"
-    return Stranger("ANDES", told, "third_order_zip", andes_loads.FREQUENCY, dips, truth)
+    model, outside = "third_order_zip", chosen == "f_smooth"
+    return Stranger("ANDES", told, model, andes_loads.FREQUENCY, dips, truth, outside)
 
 
 def judge_stranger(number: int, simulator: str) -> dict[str, Any]:

@@ -5,7 +5,8 @@ HERMESS integrates a bus behind a line, with a load of constant impedance, curre
 compensator, through a fault at the bus. The machine sees the voltage that HERMESS finds, and a
 recorder takes one-cycle phasors of both. What the load draws is told by the law and the states of
 HERMESS at each instant. A network without states is refused: a compensator is always at the bus,
-and is a part of what is recorded only where the load has it.
+and is a part of what is recorded only where the load has it. One feeds less than the load draws:
+with HERMESS's own droop it fed several times as much, which the first three rows have.
 """
 
 import tempfile
@@ -19,6 +20,7 @@ import strangers_motulator as motulator
 STEP = 1e-3  # s, of what HERMESS tells
 LINE = 0.06 + 0.02j  # pu of 100 MVA: mostly resistive, so that a fault hardly turns the voltage
 BASE = 100.0  # MVA
+THYRISTOR = 2.5  # the fixed gain of HERMESS's thyristors
 KINDS = {  # what a load has beside a machine, by the names of the catalogue
     "constant impedance": (),
     "constant power in part": ("polynomial_static_load",),
@@ -26,7 +28,7 @@ KINDS = {  # what a load has beside a machine, by the names of the catalogue
 }
 OUTSIDE = ()
 SYSTEM = """StaticInfiniteBus, bus = "1", r = 0, x = 0.0001
-SVC, idx = "svc", bus = "2", KA = {gain}, Kd = 0.05, Td = 0.01, q = 0
+SVC, idx = "svc", bus = "2", KA = {gain}, Kd = {droop}, Td = 0.01, q = 0
 StaticZIP, bus = "2", z_share = {z}, i_share = {i}, p_share = {p}
 Line, bus_i = "1", bus_j = "2", r = {line.real}, x = {line.imag}, g = 0, b = 0, trafo = 1
 BusInit, bus = "1", p = 0, v = 1.0, type = "slack"
@@ -39,11 +41,14 @@ Disturbance, time = {end}, type = "CLEAR_FAULT_BUS", bus = "2"
 
 @dataclass(frozen=True)
 class BusLoad:
-    """Shares (3,) of impedance, current and power, the power [pu], and the compensator's gain."""
+    """Shares (3,) of impedance, current and power, the power [pu], and what the compensator feeds
+    [pu] of a voltage that falls by 1 pu, and with which time constant [s].
+    """
 
     shares: tuple[float, float, float]
     power: complex
-    gain: float
+    slope: float
+    lag: float
     is_compensated: bool
 
     def simulate(self, dip: motulator.Dip) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -55,7 +60,8 @@ class BusLoad:
         reached = np.abs(1 / (1 + LINE * admittances))
         admittance = float(np.interp(dip.depth, 1 - reached, admittances))
         z, i, p = self.shares
-        values = {"z": z, "i": i, "p": p, "gain": self.gain, "line": LINE}
+        gain = self.slope / (THYRISTOR * self.lag)
+        values = {"z": z, "i": i, "p": p, "gain": gain, "droop": 1 / self.slope, "line": LINE}
         values |= {"power": BASE * self.power.real, "reactive": BASE * self.power.imag}
         begin = motulator.BEFORE
         instants = {"begin": begin, "end": begin + dip.length, "admittance": admittance}
@@ -82,8 +88,8 @@ def draw_load(kind: str, rng: np.random.Generator) -> tuple[Any, BusLoad]:
     load = motulator.draw_load("constant torque", rng)
     power = complex(rng.uniform(0.25, 0.45), rng.uniform(0.08, 0.2))
     share = float(rng.uniform(0.3, 0.7)) if kind == "constant power in part" else 0.0
-    gain = float(rng.uniform(5, 30))
-    return load, BusLoad((1 - share, 0.0, share), power, gain, kind == "compensator")
+    slope, lag = float(rng.uniform(0.4, 1.5)), float(rng.uniform(0.03, 0.15))
+    return load, BusLoad((1 - share, 0.0, share), power, slope, lag, kind == "compensator")
 
 
 def record_dip(load: tuple[Any, BusLoad], dip: motulator.Dip) -> dict[str, np.ndarray]:

@@ -138,6 +138,33 @@ def test_a_row_is_counted_of_an_investigation(monkeypatch, planted):
     assert made["reason"] == planted.reason
 
 
+@pytest.mark.parametrize("effect", ["stator_resistance", "frequency_dependence"])
+def test_an_unused_event_is_a_further_dip_of_the_same_load(effect):
+    """With the columns of the others, about the power before, and a voltage of its own."""
+    seed = next(study.cases.seeds(f"an unused event, {effect}"))
+    trial = study.cases.at_limit((effect,), 4.0, seed, events=2)
+    unused, others = study.make_unused(trial), study.make(trial.case, trial.seed)
+    for one in others:
+        assert unused.keys() == one.keys()
+        before = one["t"] < one["t"][0] + 0.3
+        assert np.mean(unused["P"][before]) == pytest.approx(np.mean(one["P"][before]), rel=0.1)
+        assert np.abs(unused["U"] - one["U"]).max() > 0.02
+    assert np.array_equal(unused["P"], study.make_unused(trial)["P"])
+
+
+def test_a_name_closes_most_of_an_unused_event(planted, monkeypatch):
+    """The effect is there in the event, and with nothing kept there is nothing to judge."""
+    trial = SimpleNamespace()
+    record = planted.withheld[0].record
+    columns = {name: getattr(record, name) for name in ("t", "U", "P", "Q")}
+    monkeypatch.setattr(study, "make_unused", lambda trial: columns)
+    assert study.find_share_unused(planted, trial) == pytest.approx(
+        planted.validate.closed_share, abs=0.02
+    )
+    nothing = SimpleNamespace(verdict=SimpleNamespace(chosen=None))
+    assert study.find_share_unused(nothing, trial) is None
+
+
 def row(**changes) -> dict:
     return {
         "group": "4 x",
@@ -235,6 +262,12 @@ def test_the_docs_hold_what_all_sets_together_hold():
     assert made.strip() == judgement_pooled.make_table(rows, rows[-1]["frozen"])
     keys = [(row["frozen"], row["group"], row["label"], row["seed"]) for row in rows]
     assert len({*keys}) == len(keys) > 1_100
+
+
+def test_what_names_close_of_unused_events_is_told_as_a_median():
+    rows = [{"unused": share} for share in (0.9, 0.2, None, 0.7)] + [{}]
+    assert judgement_pooled.describe_unused(rows) == "70% of 3"
+    assert judgement_pooled.describe_unused(rows[-1:]) == ""
 
 
 @pytest.mark.parametrize(
