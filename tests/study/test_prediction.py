@@ -525,6 +525,14 @@ def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where
     assert "No set has a steady state and survives the held-out events." in page_of(lost)
 
 
+def test_what_chose_is_not_told_as_held_out(investigation, tmp_path):
+    investigation.save(tmp_path)
+    words = (tmp_path / "discrepancy.html").read_text(encoding="utf-8")
+    assert "The held-out events took part in choosing: what they say is no test of it." in words
+    assert "model error, not fitted" in words
+    assert "model error, held out" not in words
+
+
 @pytest.mark.long
 def test_without_held_out_events_nothing_incomplete_is_named():
     only = ("undervoltage_trip", "stator_resistance")

@@ -209,7 +209,7 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
         ]
         page.text("What each name contributes:")
         page.table(
-            ["with", "model error, held out"],
+            ["with", "model error, not fitted"],
             rows,
             "One more at a time, the one that helps most first.",
         )
@@ -218,6 +218,8 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
             "The extended model was fitted to the held-out events, too: what they say of it is no"
             " test of it."
         )
+    elif findings.names and findings.evidence.is_predicted:
+        page.text("The held-out events took part in choosing: what they say is no test of it.")
 
 
 def _with_nearest(near: Nearest) -> list[list[str]]:

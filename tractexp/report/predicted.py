@@ -44,7 +44,7 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
     )
     best = f" The best of the {len(every)} that were fitted." if len(rows) < len(every) else ""
     page.table(
-        ["candidate", "model error, held out", "error divided by", "status", "size"],
+        ["candidate", "model error, not fitted", "error divided by", "status", "size"],
         [
             [
                 _label(findings, row),
@@ -95,7 +95,7 @@ def _label(findings: Findings, row: SetEvidence) -> str:
 def _bars(findings: Findings, rows: Sequence[SetEvidence]) -> Chart:
     """The error that each set leaves of the held-out events."""
     errors = [100 * row.held_out_prediction.error for row in rows]
-    chart = Chart("model error, held out [%]", [""], pixels=130 + BAR * len(rows))
+    chart = Chart("model error, not fitted [%]", [""], pixels=130 + BAR * len(rows))
     labels, colors = (
         [_label(findings, row) for row in rows],
         [_color(findings, row) for row in rows],
