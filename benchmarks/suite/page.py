@@ -29,7 +29,7 @@ COLUMNS = [
     "method",
     "cases",
     "error",
-    "90 %",
+    "error, 90 %",
     "none",
     "band held",
     "right",
@@ -37,7 +37,7 @@ COLUMNS = [
     "wrong",
     "silent",
     "seconds",
-    "90 %",
+    "seconds, 90 %",
 ]
 CAPTION = (
     "Error: rms of calculated less measured S over the rms of the response, of unused dips from the"
