@@ -274,45 +274,6 @@ class Shared(Static):
 """
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        (
-            "x = 1\ndef law(:\n",
-            r"module '\w+\.bad' cannot be imported: .*bad\.py, line 2: SyntaxError: invalid syntax",
-        ),
-        (
-            "import json\n\njson.loads('{')\n",
-            r"bad\.py, line 3: JSONDecodeError: Expecting property name",
-        ),
-        (
-            "import nowhere_to_be_found\n",
-            r"bad\.py, line 1: ModuleNotFoundError: No module named 'nowhere_to_be",
-        ),
-        (
-            FORGOTTEN,
-            r"bad\.py, line 4: the class Shared\(Static\) is not decorated with @plugin, so nothing"
-            r" can choose",
-        ),
-        (
-            "from tractexp.extend import sites\n\nsites.P_statc\n",
-            r"bad\.py, line 3: Unknown: there is no 'sites\.P_statc'",
-        ),
-    ],
-)
-def test_a_module_that_cannot_be_a_plugin_is_refused_with_its_file_and_line(
-    text, sentence, tmp_path, monkeypatch
-):
-    name = f"rough_{tmp_path.name.replace('-', '_')}"
-    (tmp_path / name).mkdir()
-    (tmp_path / name / "__init__.py").write_text("")
-    (tmp_path / name / "bad.py").write_text(text)
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(framework, "packages", lambda: (importlib.import_module(name),))
-    with pytest.raises(UserError, match=sentence):
-        discover.__wrapped__()
-
-
 def test_what_plugins_are_made_from_is_not_taken_for_a_plugin_without_its_decorator(
     tmp_path, monkeypatch
 ):
@@ -329,23 +290,6 @@ def test_what_plugins_are_made_from_is_not_taken_for_a_plugin_without_its_decora
     monkeypatch.syspath_prepend(tmp_path)
     framework.import_all([importlib.import_module("shared_bases")])
     assert get("model/static", "shared_base_child").__name__ == "Child"
-
-
-@pytest.mark.parametrize(
-    ("file", "sentence"),
-    [
-        ("", "cannot be imported: ModuleNotFoundError"),
-        ("lonely_acme.py", "is a single file; make it a folder"),
-    ],
-)
-def test_an_entry_point_that_is_no_package_is_refused(file, sentence, tmp_path, monkeypatch):
-    if file:
-        (tmp_path / file).write_text("")
-    monkeypatch.syspath_prepend(tmp_path)
-    point = importlib.metadata.EntryPoint("acme", "lonely_acme", "tractexp.plugins")
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [point])
-    with pytest.raises(UserError, match=r"'lonely_acme' \(entry point 'acme'\) " + sentence):
-        framework.packages.__wrapped__()
 
 
 def test_every_plugin_has_a_schema_that_says_its_name():

@@ -935,7 +935,7 @@ def test_the_command_tells_the_story_and_its_extended_model_runs_at_once(tmp_pat
         "usable: the extended model describes this load",
         "where:",
         "held out",
-        "next: use the extended model: tractexp model=",
+        "next: use the extended model: tractexp model=run/conf/model/extended.yaml ",
         "discrepancy.html",
     ):
         assert part in told, part

@@ -262,6 +262,13 @@ def test_a_headline_tells_the_size_and_the_bounds_that_hold_a_parameter():
     )
 
 
+def test_of_held_out_dips_a_headline_does_not_say_that_noise_alone_leaves_as_much():
+    small, chance = ModelError(0.01, (0.0, 0.02), 0.001), Surprise(0.5, "", 1.0, "P of dip")
+    assert grade_errors(chance, small).sentence.endswith(": noise alone leaves as much")
+    told = grade_errors(chance, small, ModelError(0.05, (0.03, 0.07), 0.01)).sentence
+    assert told.endswith("(1 % of S): noise alone leaves as much of the fitted dips")
+
+
 def test_correlated_noise_of_p_and_q_is_seen_and_used():
     t, U = study.Shape(0.5).voltage()
     rng = np.random.default_rng(4)

@@ -6,7 +6,7 @@ from pathlib import Path
 from tractexp.api.investigation import Investigation
 from tractexp.configuration.run_command import build_again_command
 from tractexp.identification.adequacy import Grade
-from tractexp.text.wording import join_words, shorten
+from tractexp.text.wording import join_words, shorten, shorten_path
 
 NEXT = "next: "
 
@@ -24,7 +24,8 @@ def list_next_commands(result: Investigation, paths: Mapping[str, Path]) -> list
     grade, fit_all = result.content["adequacy"]["grade"], result.gap.fitted_to_both
     context = result.steps.context
     better = next(filter(None, map(context.domain.better, context.events)), "")
-    if model := paths.get(MODEL_FILE.name):
+    typed = {name: shorten_path(path) for name, path in paths.items()}
+    if model := typed.get(MODEL_FILE.name):
         use = use_of(domain, model, fit_all=fit_all)
         which = f", which has {join_words(result.names)}" if result.verdict == "tied" else ""
         if grade == Grade.WRONG_MODEL:
@@ -37,7 +38,7 @@ def list_next_commands(result: Investigation, paths: Mapping[str, Path]) -> list
     if grade != Grade.ADEQUATE and better:
         in_waves = build_again_command("task=discrepancy", "domain=waves", of=("data", "task"))
         lines.append(f"{NEXT}{better}: {in_waves}")
-    if term := paths.get(PLUGIN):
+    if term := typed.get(PLUGIN):
         lines.append(f"use the proposed term: {adopt_term(term)}")
     return lines
 

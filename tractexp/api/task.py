@@ -13,6 +13,7 @@ from tractexp.blocks.terminal import show
 from tractexp.configuration.plugin import Plugin
 from tractexp.outcome import Written
 from tractexp.text.progress import console, say, text_width
+from tractexp.text.wording import shorten_path
 
 if TYPE_CHECKING:
     from tractexp.tracking import TrackedRun
@@ -217,8 +218,7 @@ def print_written(paths: Iterable[Path], page: str) -> None:
         print_paths(by_name.values())
         return
     first = by_name.pop(page)
-    here = Path.cwd()
-    say(f"page: {first.relative_to(here) if first.is_relative_to(here) else first}")
+    say(f"page: {shorten_path(first)}")
     beside = sorted(str(path.relative_to(first.parent)) for path in by_name.values())
     if beside:
         say(f"beside it: {', '.join(beside)}")

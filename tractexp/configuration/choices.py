@@ -51,7 +51,7 @@ def choices(own: Iterable[Path] = ()) -> dict[str, dict[str, Option]]:
                 options[place.parent.as_posix()][place.name] = Option(place.name, _comment(file))
     for package, folder in plugin_folders():
         for module in modules(package, [str(folder)]):
-            for group, about in _list_declared_plugins(module):
+            for group, about in list_declared_plugins(module):
                 name = module.rpartition(".")[2]
                 options[group][name] = Option(name, about, module)
     return options
@@ -153,6 +153,15 @@ def describe_available(group: str, name: str, names: Iterable[str]) -> str:
     return f"{nearest(name, names) or '.'} Available: {', '.join(parts) or 'none'}"
 
 
+def describe_nameless(group: str) -> str:
+    """Return the sentence on a choice that names no plugin of its group, with those there are."""
+    plugins = sorted(o.name for o in choices().get(group, {}).values() if o.module)
+    return (
+        f"{group} lacks the name of what is chosen; write {group}=NAME, or begin its file with"
+        f" 'defaults: [NAME]'. Names: {', '.join(plugins) or 'none'}"
+    )
+
+
 def entry_points() -> list[importlib.metadata.EntryPoint]:
     """The plugin packages that are installed, in order of name."""
     return sorted(
@@ -204,7 +213,7 @@ def _comment(file: Path) -> str:
     return sentence("\n".join(lines))
 
 
-def _list_declared_plugins(module: str) -> Iterator[tuple[str, str]]:
+def list_declared_plugins(module: str) -> Iterator[tuple[str, str]]:
     """(group, first sentence) of the plugins that a module declares."""
     for node in _tree(module).body:
         if not (

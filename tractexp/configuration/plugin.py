@@ -15,6 +15,7 @@ import dataclasses
 import functools
 import importlib
 import inspect
+import itertools
 import re
 import sys
 import traceback
@@ -26,7 +27,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, dataclass_transform, g
 
 from tractexp.configuration.choices import CONF as CONF
 from tractexp.configuration.choices import configuration_folders as configuration_folders
-from tractexp.configuration.choices import entry_points, modules
+from tractexp.configuration.choices import (
+    describe_nameless,
+    entry_points,
+    list_declared_plugins,
+    modules,
+    plugin_folders,
+)
 from tractexp.errors import Unknown, UserError, among, setting
 from tractexp.parameter import Parameter
 
@@ -71,9 +78,12 @@ RENAMED_METHODS: Mapping[str, Mapping[str, str]] = {
     "task": {"logged": "collect_log"},
 }
 
+SETTING_TYPES = (bool, int, float, str, list)
+
 Class = TypeVar("Class", bound=type[Plugin])
 _registry: dict[str, dict[str, type[Plugin]]] = {}
 _schemas: dict[type[Plugin], type] = {}
+_refused: dict[str, str] = {}  # {package or module that cannot be used: the sentence on why}
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
@@ -123,6 +133,7 @@ def plugin(cls: Class) -> Class:
             " rename the file"
         )
     _check_complete(cls, where)
+    _check_typed(cls, where)
     plugin_class = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     plugin_class.name = name
     plugin_class.parameters = _parameters(plugin_class, where)
@@ -152,6 +163,23 @@ def _check_complete(cls: type[Any], where: str) -> None:
             f"{where} lacks what every plugin of group '{cls.group}' must do: define"
             f" {' and '.join(missing)}"
         )
+
+
+def _check_typed(cls: type[Any], where: str) -> None:
+    """Raise `UserError` for a value that its author means as a setting and that has no type."""
+    typed, *typed_above = map(inspect.get_annotations, cls.__mro__)
+    base = cls.__mro__[1]
+    settings = {f.name for f in dataclasses.fields(base)} if dataclasses.is_dataclass(base) else ()
+    known = {*dir(base), *itertools.chain(*typed_above)} - {*settings}
+    for name, value in vars(cls).items():
+        if name in typed or name in known or name.startswith("_") or name.isupper():
+            continue
+        if isinstance(value, SETTING_TYPES):
+            raise UserError(
+                f"{where}: '{name} = {value!r:.40}' has no type, so it is no setting; write"
+                f" '{name}: {type(value).__name__} = {value!r:.40}', or '_{name}' for what nobody"
+                " sets"
+            )
 
 
 def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
@@ -188,8 +216,13 @@ def schema(cls: type[Plugin]) -> type:
 
 @functools.cache
 def packages() -> tuple[Any, ...]:
-    """The packages behind the entry points, imported, in order of name."""
-    return tuple(dict.fromkeys(map(_package, entry_points())))
+    """The packages behind the entry points that can be imported, in order of name."""
+    found = [
+        package
+        for point in entry_points()
+        for package in _try_import(point.module, _package, point)
+    ]
+    return tuple(dict.fromkeys(found))
 
 
 def place_in_plugin(error: BaseException) -> str:
@@ -212,9 +245,39 @@ def place_in_plugin(error: BaseException) -> str:
 
 @functools.cache
 def discover() -> Mapping[str, Mapping[str, type[Plugin]]]:
-    """Import every plugin module once and return {group: {name: class}}."""
-    import_all(packages())
+    """Import every plugin module once and return {group: {name: class}}.
+
+    A module that cannot be used hides none of the others: `list_refused` tells why it cannot, and
+    so does `get` where its plugin is chosen.
+    """
+    names = [name for package in packages() for name in modules(package.__name__, package.__path__)]
+    for module in [module for name in names for module in _try_import(name, _module, name)]:
+        _try_import(module.__name__, _check_decorated, module)
     return _registry
+
+
+def list_refused() -> Mapping[str, str]:
+    """{package or module: the sentence on why it cannot be used} of all that are installed."""
+    discover()
+    return _refused
+
+
+def list_refused_choices() -> Iterator[tuple[str, str]]:
+    """(group, name) of each plugin whose module cannot be used."""
+    for module in list_refused():
+        for group, _ in list_declared_plugins(module):
+            yield group, module.rpartition(".")[2]
+
+
+def _try_import(name: str, function: Callable[[Any], Any], argument: Any) -> list[Any]:
+    """What a function returns of a package or module, in a list; an empty list where it refuses it,
+    which `_refused` keeps.
+    """
+    try:
+        return [function(argument)]
+    except UserError as error:
+        _refused[name] = str(error)
+        return []
 
 
 def list_registered() -> Mapping[str, Mapping[str, type[Plugin]]]:
@@ -235,30 +298,6 @@ def import_all(packages: Iterable[ModuleType]) -> None:
     ]
     for module in imported:
         _check_decorated(module)
-
-
-def register_all() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, str]]:
-    """All plugins that can be used, as `discover`, and {package or module: the sentence on why it
-    cannot}, each tried by itself.
-    """
-    refused: dict[str, str] = {}
-
-    def try_reading(name: str, function: Callable[[Any], Any], argument: Any) -> list[Any]:
-        try:
-            return [function(argument)]
-        except UserError as error:
-            refused[name] = str(error)
-            return []
-
-    packages = [
-        package
-        for point in entry_points()
-        for package in try_reading(point.module, _package, point)
-    ]
-    names = [name for package in packages for name in modules(package.__name__, package.__path__)]
-    for module in [module for name in names for module in try_reading(name, _module, name)]:
-        try_reading(module.__name__, _check_decorated, module)
-    return _registry, refused
 
 
 def _package(point: "EntryPoint") -> ModuleType:
@@ -353,19 +392,31 @@ def find(group: str, name: str) -> type[Any] | None:
     """The plugin class registered as `name` in `group`; None where there is none.
 
     A plugin has its file's name: only files of this name are imported, and all where none holds it.
+    Raises `UserError` with the reason for a plugin whose file cannot be used.
     """
     if name not in _registry.get(group, {}):
         for module in _modules().get(name, ()):
-            _module(module)
+            _try_import(module, _module, module)
+    _check_usable(group, name)
     return _registry.get(group, {}).get(name) or discover().get(group, {}).get(name)
+
+
+def _check_usable(group: str, name: str) -> None:
+    """Raise `UserError` where the file of a plugin was refused: one that declares it, or one of its
+    name that declares none.
+    """
+    for module, sentence in _refused.items():
+        groups = {declared for declared, _ in list_declared_plugins(module)}
+        if module.rpartition(".")[2] == name and (not groups or group in groups):
+            raise UserError(sentence)
 
 
 @functools.cache
 def _modules() -> Mapping[str, Sequence[str]]:
     """{name: modules of this name} of the plugin packages."""
     named: dict[str, list[str]] = {}
-    for package in packages():
-        for module in modules(package.__name__, package.__path__):
+    for package, folder in plugin_folders():
+        for module in modules(package, [str(folder)]):
             named.setdefault(module.rpartition(".")[2], []).append(module)
     return named
 
@@ -377,7 +428,7 @@ def build(group: str, settings: Mapping[str, Any]) -> Any:
     chosen = dict(settings) if isinstance(settings, Mapping) else {}
     name = chosen.pop("name", None)
     if not isinstance(name, str):
-        raise UserError(f"{group} lacks the name of what is chosen; write {group}=NAME")
+        raise UserError(describe_nameless(group))
     cls = get(group, name)
     allowed = [item.name for item in dataclasses.fields(cls)]
     for key in chosen:

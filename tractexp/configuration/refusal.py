@@ -8,7 +8,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tractexp.configuration.choices import describe_available, elsewhere
+from tractexp.configuration.choices import (
+    choices,
+    describe_available,
+    describe_nameless,
+    elsewhere,
+)
 from tractexp.errors import UserError, among
 
 HYDRA = ("hydra", "omegaconf", "antlr4")  # whose code composes configurations
@@ -105,16 +110,31 @@ def _shorten(text: object) -> str:
 
 
 def _describe_missing_choice(error: Any) -> str:
-    """That a choice is not there, with those that are."""
+    """That a choice is not there, with those that are.
+
+    Raises `UserError` with the reason for a plugin whose file cannot be used.
+    """
+    from tractexp.configuration.plugin import find
+
     name = str(error.missing_cfg_file or "")
     group, _, choice = name.rpartition("/")
+    find(group, choice)  # raises the reason where its file cannot be used
     options = [o for o in error.options or () if not o.startswith("_")]
+    if named := re.match(r"In '(.*)': Could not load '(.*)/(.*)'", first_line(error)):
+        return _describe_missing_default(*named.groups())
     if not group or not options:
         return _read_first_line(error)
     where = elsewhere(group, choice) or describe_available(group, choice, options)
     if extra := EXTRAS.get(f"{group}={choice}"):
         where = f" before it is installed: pip install 'tractexp[{extra}]'"
     return f"{group}={choice}: there is no such choice{where}"
+
+
+def _describe_missing_default(file: str, group: str, name: str) -> str:
+    """That a file of configurations begins with a choice that is not there, with those that are."""
+    group = group.removeprefix("schema/")
+    available = describe_available(group, name, choices().get(group, ()))
+    return f"{file}.yaml: its defaults name {group}={name}, and there is no such choice{available}"
 
 
 def _sentence(error: BaseException) -> str:
@@ -171,6 +191,10 @@ SENTENCES = {
         " them {0}=[{1}]"
     ),
     r"Interpolation key '(.*)' not found": "${{{0}}} refers to a setting that there is not",
+    r"TypeError raised while resolving interpolation: Index 'name' \(str\) is not an int": (
+        "a file that is chosen holds a list; it must hold keys and values, of which the first is"
+        " 'defaults: [NAME]'"
+    ),
     r"Error locating target '(.*)', set env": (
         "{0} cannot be imported; _target_ names a class, as package.module.Class"
     ),
@@ -193,6 +217,8 @@ def _read_first_line(error: BaseException) -> str:
     place.
     """
     text = first_line(error)
+    if nameless := re.match(r"Interpolation key '(\w+)\.name' not found", text):
+        return describe_nameless(nameless[1])
     for pattern, sentence in SENTENCES.items():
         if match := re.match(pattern, text):
             return sentence.format(*map(_shorten, match.groups()))
@@ -211,6 +237,8 @@ def _read_first_line(error: BaseException) -> str:
 
 def _unknown_key(key: str, error: Any) -> str:
     """That a key is not there, with those that are."""
+    if key == "experiment":
+        return "the file of an experiment begins with the line '# @package _global_'"
     parent = getattr(error, "parent_node", None)
     try:
         keys = sorted(map(str, parent.keys())) if parent is not None else []

@@ -7,6 +7,7 @@ from typing import Any
 
 from tractexp.configuration import repeatable
 from tractexp.text import quoting
+from tractexp.text.wording import shorten_path
 
 OF_LOAD = ("data", "model", "domain")  # groups
 CALLS = {"discrepancy": "investigate"}  # tasks whose public call has another name
@@ -24,8 +25,7 @@ def remember_command(arguments: list[str]) -> None:
 
 def remember_folder(folder: Path) -> None:
     """Remember the folder of this run, which `tractexp again` takes."""
-    here = Path.cwd()
-    _placed[:] = [folder.relative_to(here) if folder.is_relative_to(here) else folder]
+    _placed[:] = [shorten_path(folder)]
 
 
 def remember_roles(train: Sequence[Any] | None, validate: Sequence[Any] | None) -> None:

@@ -177,11 +177,11 @@ def _import_choices(
     """The choices as they are once every plugin is imported, and why those that fit no group cannot
     be.
     """
-    from tractexp.configuration.plugin import register_all
+    from tractexp.configuration.plugin import discover, list_refused
 
-    classes_of, refused = register_all()
+    refused = list_refused()
     result = {group: dict(names) for group, names in options.items()}
-    for group, classes in classes_of.items():
+    for group, classes in discover().items():
         # also those registered by a program, which are in no file
         for name, cls in classes.items():
             result.setdefault(group, {})[name] = Option(

@@ -316,10 +316,13 @@ def grade_errors(
             Grade.WRONG_MODEL, f"this model does not describe this load: {size}{held}", surprise.p
         )
     said = f"the model describes this load within {fitted}"
+    of_fitted = ""
     if held_out:
         said += f", the held-out dips within {held_out}"
+        of_fitted = " of the fitted dips"
     if noise:
-        return Adequacy(Grade.ADEQUATE, f"{said}: noise alone leaves as much{held}", surprise.p)
+        said += f": noise alone leaves as much{of_fitted}{held}"
+        return Adequacy(Grade.ADEQUATE, said, surprise.p)
     return Adequacy(Grade.EFFECT_MISSING, f"{said}; {_describe_rest(surprise)}{held}", surprise.p)
 
 

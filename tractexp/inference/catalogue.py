@@ -2,12 +2,12 @@
 
 import functools
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.configuration.plugin import discover, get
+from tractexp.configuration.plugin import discover, find, get
 from tractexp.errors import TASK, UserError, among
 from tractexp.model.model import Model
 from tractexp.model.parts import COMPARED, Effect, Measurement
@@ -182,7 +182,7 @@ def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -
     """
     registered = discover().get("effect", {})
     for name in only:
-        if name not in registered:
+        if find("effect", name) is None:
             raise UserError(
                 f"{TASK.effects} names '{name}', which is no effect{among(name, registered)}"
             )
@@ -199,10 +199,18 @@ def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -
             untestable[name] = why
         else:
             testable.append(candidate(effect))
+    _check_testable(only, untestable)
     heads = {c.name for c in testable}
     return Catalogue(
         tuple(testable), untestable, tuple(m for m in members if m.effect.family in heads)
     )
+
+
+def _check_testable(only: Sequence[str], untestable: Mapping[str, str]) -> None:
+    """Raise `UserError` where none of the effects that were asked for can be tested."""
+    if only and all(name in untestable for name in only):
+        reasons = (f"{name}: {untestable[name]}" for name in only)
+        raise UserError(f"{TASK.effects} names nothing that can be tested: {'; '.join(reasons)}")
 
 
 def _is_wanted(effect: Effect, only: Sequence[str]) -> bool:

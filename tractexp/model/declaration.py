@@ -13,6 +13,7 @@ from tractexp.errors import Unfit, UserError
 from tractexp.model import sites
 from tractexp.model.drive import PHASORS
 from tractexp.model.equations import Equations
+from tractexp.model.mistakes import check_parameters_used, explain_symbols
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
 from tractexp.model.signature import select_arguments
 from tractexp.text.wording import join_words
@@ -75,7 +76,8 @@ def _motor(eq: Equations, motor: Motor) -> None:
     """The motor draws V conj(I)."""
     eq.write("motor")
     there = len(eq.definitions)
-    current = motor.declare(eq, **eq.declare(motor.parameters))
+    with explain_symbols(motor):
+        current = motor.declare(eq, **eq.declare(motor.parameters))
     if current is None:
         if eq.states or len(eq.definitions) > there:
             raise UserError(
@@ -100,11 +102,11 @@ def _static(eq: Equations, static: Static) -> None:
     u = sympy.Symbol(sites.static_voltage.name, real=True)
     f = sympy.Symbol("static_frequency", real=True)
     symbols = own | ({"f": f} if "f" in inspect.signature(static.law).parameters else {})
-    law = static.law(u, **symbols)
-    for requirement in static.require(
-        **select_arguments(static.require, own | {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0})
-    ):
-        eq.require(*requirement)
+    given = select_arguments(static.require, own | {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0})
+    with explain_symbols(static):
+        law = static.law(u, **symbols)
+        for requirement in static.require(**given):
+            eq.require(*requirement)
     if law is None:
         _refuse_forgotten_law(static)
         return
@@ -132,7 +134,7 @@ def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -
     event.
     """
     where = f"law() of the static load '{static.name}'"
-    if not (isinstance(law, tuple | list) and len(law) == 2):
+    if not (isinstance(law, tuple | list) and len(law) == 2) or None in law:
         raise UserError(
             f"{where} returns {law!r}; it must return two expressions, P/P_s0 and Q/Q_s0, or None"
         )
@@ -157,4 +159,7 @@ def _effect(eq: Equations, effect: Effect) -> None:
     eq.write(effect.name)
     if not isinstance(effect, Measurement):
         eq.edits[effect.name] = []
-    effect.edit(eq, **eq.declare(effect.parameters))
+    with explain_symbols(effect):
+        effect.edit(eq, **eq.declare(effect.parameters))
+    if not isinstance(effect, Measurement):
+        check_parameters_used(eq, effect)

@@ -231,6 +231,15 @@ class Equations:
         total, zero = (self._drawn[s] for s in (sites.current, sites.zero_current))
         return dict(zip(OUTPUTS[WAVES], (*self.parts(self.turn * total), zero), strict=True))
 
+    def list_expressions(self) -> list[sympy.Expr]:
+        """Every expression that the parts have written so far."""
+        states = (e for s in self.states.values() for e in (s.derivative, s.initial, s.balance))
+        memories = (e for m in self.memories.values() for e in (m.renewal, m.initial))
+        slacks = (requirement.slack for requirement in self.requirements)
+        named = (*self.definitions.values(), *self.steps.values(), *self.values_before.values())
+        written = (*named, *self._drawn.values(), *self._lost, *states, *memories, *slacks)
+        return [expression for expression in written if expression is not None]
+
     # What parts write
 
     def write(self, name: str) -> None:
@@ -362,7 +371,13 @@ class Equations:
         before = self.expression(site)
         if site is sites.current:
             before = self._name_vector("current", before)
-        expression = sympy.sympify(change(before))
+        changed = change(before)
+        if changed is None:
+            raise Unfit(
+                f"its edit of {site.name} returns nothing; the function given to eq.edit must"
+                " return what stands there from then on"
+            )
+        expression = sympy.sympify(changed)
         self._check_kind(site, expression)
         self._real_form.forget()
         self.edits.setdefault(self._writer, []).append(site.name)

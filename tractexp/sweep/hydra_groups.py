@@ -113,9 +113,11 @@ def _list_offered() -> dict[str, set[str]]:
     """
 
     def ask() -> bytes:
-        return json.dumps(
-            {group: [*names] for group, names in list_groups(plugin.discover())}
-        ).encode()
+        offered = {group: [*names] for group, names in list_groups(plugin.discover())}
+        for group, name in plugin.list_refused_choices():
+            if offered.get(group):
+                offered[group].append(name)
+        return json.dumps(offered).encode()
 
     def list_groups(classes_of: Mapping[str, Any]) -> Iterator[tuple[str, set[str]]]:
         for group, classes in classes_of.items():

@@ -7,6 +7,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 LONGEST_SENTENCE = 230  # characters of a sentence on a screen: three lines
 ELLIPSIS = " ..."
@@ -237,6 +238,12 @@ def shown_in_words(shown: Mapping[str, str]) -> str:
         "in the model because the record shows it:"
         f" {'; '.join(f'{name} ({how})' for name, how in shown.items())}"
     )
+
+
+def shorten_path(path: Path) -> Path:
+    """A path as a user types it: from the working folder, where it is below that."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
 
 
 def shorten(sentence: str, longest: int = LONGEST_SENTENCE) -> str:

@@ -1,0 +1,59 @@
+"""Mistakes in the equations of a part, told in a sentence to who wrote it."""
+
+import re
+import sys
+import traceback
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from tractexp.errors import Unfit
+from tractexp.kernel.graph import symbols_of
+from tractexp.model.equations import Equations
+from tractexp.model.parts import Part
+from tractexp.model.symbols import real_symbol
+from tractexp.text.wording import join_words
+
+# {what Python says where numbers are computed of symbols: how to mend it}
+SYMBOLS_AS_NUMBERS: Mapping[str, str] = {
+    r"loop of ufunc .* no callable (\w+) method": (
+        "NumPy's {0} takes numbers, and what a part computes with are symbols; import sympy in the"
+        " method and use SymPy's function"
+    ),
+    r"Cannot convert expression to float|must be real number": (
+        "a number is asked for where there are symbols; import sympy in the method and use SymPy's"
+        " functions, not those of math"
+    ),
+    r"cannot determine truth value of Relational": (
+        "a comparison of symbols is neither true nor false; use sympy.Piecewise, sympy.Max or"
+        " sympy.Min"
+    ),
+}
+
+
+@contextmanager
+def explain_symbols(part: Part) -> Iterator[None]:
+    """Raise `Unfit`, with the line, where a method of a part computes with symbols as if they were
+    numbers.
+    """
+    try:
+        yield
+    except TypeError as error:
+        for pattern, sentence in SYMBOLS_AS_NUMBERS.items():
+            if match := re.search(pattern, str(error)):
+                raise Unfit(_locate(part, error) + sentence.format(*match.groups())) from error
+        raise
+
+
+def _locate(part: Part, error: BaseException) -> str:
+    """The innermost line of a part's own file that an error went through, as "FILE, line N: "."""
+    file = getattr(sys.modules.get(type(part).__module__), "__file__", None)
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+    return f"{file}, line {frames[-1].lineno}: " if frames else ""
+
+
+def check_parameters_used(eq: Equations, part: Part) -> None:
+    """Raise `Unfit` for a parameter of a part that no equation has: no record could tell it."""
+    used = set().union(*map(symbols_of, eq.list_expressions()))
+    idle = [p.name for p in part.parameters if real_symbol(p.name) not in used]
+    if idle:
+        raise Unfit(f"its {join_words(idle)} is in no equation, so that no record could tell it")
