@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from tractexp.errors import Unfit
 from tractexp.kernel.graph import symbols_of
 from tractexp.model.equations import Equations
-from tractexp.model.parts import Part
+from tractexp.model.parts import Effect, Part
 from tractexp.model.symbols import real_symbol
 from tractexp.text.wording import join_words
 
@@ -51,9 +51,13 @@ def _locate(part: Part, error: BaseException) -> str:
     return f"{file}, line {frames[-1].lineno}: " if frames else ""
 
 
-def check_parameters_used(eq: Equations, part: Part) -> None:
-    """Raise `Unfit` for a parameter of a part that no equation has: no record could tell it."""
+def check_sizes_used(eq: Equations, effect: Effect) -> None:
+    """Raise `Unfit` for a size of an effect that no equation has: the effect changes nothing by it.
+
+    Of its other parameters a model may have no use, as of a share of motors where there is none.
+    """
     used = set().union(*map(symbols_of, eq.list_expressions()))
-    idle = [p.name for p in part.parameters if real_symbol(p.name) not in used]
+    sizes = [p.name for p in effect.parameters if p.null is not None]
+    idle = [name for name in sizes if real_symbol(name) not in used]
     if idle:
         raise Unfit(f"its {join_words(idle)} is in no equation, so that no record could tell it")
