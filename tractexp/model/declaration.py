@@ -13,7 +13,7 @@ from tractexp.errors import Unfit, UserError
 from tractexp.model import sites
 from tractexp.model.drive import PHASORS
 from tractexp.model.equations import Equations
-from tractexp.model.mistakes import check_sizes_used, explain_symbols
+from tractexp.model.mistakes import check_size_used, explain_symbols
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
 from tractexp.model.signature import select_arguments
 from tractexp.text.wording import join_words
@@ -162,4 +162,4 @@ def _effect(eq: Equations, effect: Effect) -> None:
     with explain_symbols(effect):
         effect.edit(eq, **eq.declare(effect.parameters))
     if not isinstance(effect, Measurement):
-        check_sizes_used(eq, effect)
+        check_size_used(eq, effect)

@@ -51,13 +51,13 @@ def _locate(part: Part, error: BaseException) -> str:
     return f"{file}, line {frames[-1].lineno}: " if frames else ""
 
 
-def check_sizes_used(eq: Equations, effect: Effect) -> None:
-    """Raise `Unfit` for a size of an effect that no equation has: the effect changes nothing by it.
+def check_size_used(eq: Equations, effect: Effect) -> None:
+    """Raise `Unfit` for an effect none of whose sizes is in an equation: it changes nothing.
 
-    Of its other parameters a model may have no use, as of a share of motors where there is none.
+    Of some of its parameters a model may have no use: of a share of motors where there is none, or
+    of a reactive power in waveforms.
     """
     used = set().union(*map(symbols_of, eq.list_expressions()))
     sizes = [p.name for p in effect.parameters if p.null is not None]
-    idle = [name for name in sizes if real_symbol(name) not in used]
-    if idle:
-        raise Unfit(f"its {join_words(idle)} is in no equation, so that no record could tell it")
+    if not any(real_symbol(name) in used for name in sizes):
+        raise Unfit(f"its size {join_words(sizes)} is in no equation, so that it changes nothing")
