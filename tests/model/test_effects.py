@@ -9,10 +9,10 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
 from scipy.optimize import fsolve, least_squares
 
+import tractexp
 from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, sites
-from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive, Excitation, slopes
 from tractexp.model.model import compose
 from tractexp.record import Record, detect
@@ -227,7 +227,9 @@ def test_a_channel_that_is_not_recorded_is_named():
     with pytest.raises(
         UserError, match=r"'negative_sequence_braking' reads U2, which plain does not have"
     ):
-        Problem(model("negative_sequence_braking"), [recorded])
+        tractexp.identify(
+            [recorded], tractexp.compose(effects=["negative_sequence_braking"]), progress=False
+        )
 
 
 class Bent(Effect):

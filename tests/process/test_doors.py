@@ -227,9 +227,7 @@ def surveyed(folder: Path) -> object:
 
 
 def loaded(folder: Path) -> object:
-    from tractexp.identification.result import load
-
-    return load(folder / "result.json")
+    return tractexp.load(folder / "result.json")
 
 
 def read_table(folder: Path) -> object:

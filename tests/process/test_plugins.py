@@ -21,7 +21,7 @@ from command_line import start_command
 from tractexp.configuration import plugin as framework
 from tractexp.configuration.plugin import CONF, Plugin, build, discover, get, plugin, schema
 from tractexp.errors import UserError
-from tractexp.identification.optimizer import Optimizer
+from tractexp.extend import Optimizer
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Box, Parameter
 

@@ -1,15 +1,16 @@
 """`task=simulate` as a person uses it, and every pair of motor and static load as a predictor."""
 
 import itertools
+import json
 
 import numpy as np
 import pytest
 from command_line import run_command
 
+import tractexp
 from tractexp.api.simulate import order_values
 from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
-from tractexp.identification.result import Result, load
 
 TRUTH = {
     "T_prime": 0.12,
@@ -36,32 +37,33 @@ def simulate_command(*arguments, cwd):
     return run_command("task=simulate", *arguments, "tracking.enabled=false", cwd=cwd)
 
 
-def result(motor="electromechanical", static="exponential", parameters=None, effects=()):
-    """A result of known values."""
-    known = TRUTH if parameters is None else parameters
-    return Result(
-        parameters=known,
-        objective=0.0,
-        epsilon_p=0.0,
-        epsilon_q=0.0,
-        simulations=1,
-        refused=0,
-        iterations=1,
-        seconds=0.0,
-        status="known",
-        seed=0,
-        events=[],
-        at_bound=[],
-        units={},
-        bounds={},
-        model={"motor": {"name": motor}, "static": {"name": static}, "effects": list(effects)},
-        before={"U0": 1.0, "P0": 1.0, "Q0": 0.6, "frequency": 50.0},
-    )
+def write_result(path, motor="electromechanical", static="exponential", parameters=None):
+    """A result.json of known values."""
+    content = {
+        "parameters": TRUTH if parameters is None else parameters,
+        "objective": 0.0,
+        "epsilon_p": 0.0,
+        "epsilon_q": 0.0,
+        "simulations": 1,
+        "refused": 0,
+        "iterations": 1,
+        "seconds": 0.0,
+        "status": "known",
+        "seed": 0,
+        "events": [],
+        "at_bound": [],
+        "units": {},
+        "bounds": {},
+        "model": {"motor": {"name": motor}, "static": {"name": static}, "effects": []},
+        "before": {"U0": 1.0, "P0": 1.0, "Q0": 0.6, "frequency": 50.0},
+    }
+    path.write_text(json.dumps(content))
+    return path
 
 
 @pytest.fixture
 def saved(tmp_path):
-    return result().write(tmp_path / "result.json")
+    return write_result(tmp_path / "result.json")
 
 
 def read(path):
@@ -105,9 +107,9 @@ def test_the_dip_is_the_prediction_of_the_same_result(saved, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     rows = read(tmp_path / "run" / "response.csv")
-    P, Q = load(saved).predict(rows["t"], rows["U"])
-    assert rows["P"] == pytest.approx(P, abs=1e-6)
-    assert rows["Q"] == pytest.approx(Q, abs=1e-6)
+    made = tractexp.load(saved).predict(t=rows["t"], U=rows["U"])
+    assert rows["P"] == pytest.approx(made.P, abs=1e-6)
+    assert rows["Q"] == pytest.approx(made.Q, abs=1e-6)
 
 
 def test_recorded_events_are_played_and_judged(saved, tmp_path):
@@ -212,10 +214,11 @@ def test_every_pair_predicts_its_power_before_a_dip_and_less_in_it(motor, static
     """
     parts = get("model/motor", motor)(), get("model/static", static)()
     defaults = {p.name: p.default for part in parts for p in part.parameters}
-    path = result(motor, static, defaults).write(tmp_path / "result.json")
+    path = write_result(tmp_path / "result.json", motor, static, defaults)
     t = np.arange(400) * 2e-3
     U = 1 - 0.3 * ((t > 0.3) & (t < 0.5))
-    P, Q = load(path).predict(t, U, 50 + 0.0 * t)
+    made = tractexp.load(path).predict(t=t, U=U, f=50 + 0.0 * t)
+    P, Q = made.P, made.Q
     before = 1.0, 0.6
     if static == "none":
         before = defaults["T_m"], Q[0]
