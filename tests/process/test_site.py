@@ -3,17 +3,16 @@ as errors.
 """
 
 import ast
-import dataclasses
 import re
 from pathlib import Path
 
 import pytest
 
+import tractexp
 from site_pages import api, catalogue, commands, criteria, gallery, markdown, tasks
 from tractexp import PUBLIC
 from tractexp.configuration.plugin import discover, get
-from tractexp.extend import Effect, Parameter
-from tractexp.inference.criteria import Criteria
+from tractexp.extend import Effect, Parameter, UserError
 from tractexp.model.printed import list_changed_lines
 
 ROOT = Path(__file__).parents[2]
@@ -163,9 +162,12 @@ def test_every_public_call_and_every_base_is_on_the_page_of_calls(tmp_path):
 
 def test_every_criterion_is_on_its_page_with_its_origin(tmp_path):
     page = criteria.write(tmp_path).read_text(encoding="utf-8")
-    for field in dataclasses.fields(Criteria):
-        assert f"| `{field.name}` | {field.default:g} |" in page
-        assert f"| {field.metadata['origin']} |" in page
+    with pytest.raises(UserError, match=r"criteria\.what: there is no such criterion") as refused:
+        tractexp.investigate("tibet_50pct", criteria={"what": 1.0})
+    names = str(refused.value).rpartition(": ")[2].split(", ")
+    assert len(names) >= 5
+    for name in names:
+        assert re.search(rf"\| `{name}` \| [\d.e-]+ \|.*\| (chosen|derived) \|", page), name
 
 
 def test_every_page_is_in_the_contents():

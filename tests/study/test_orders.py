@@ -13,7 +13,6 @@ from test_shipped_data import DATA
 import tractexp
 from tractexp.configuration.choices import set_holding
 from tractexp.configuration.plugin import discover, get
-from tractexp.discrepancy.investigate import investigate
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.record import Record, detect
@@ -177,16 +176,10 @@ def test_of_waveforms_they_refuse_and_say_what_to_take(name):
 def test_the_order_that_the_load_has_is_named():
     """Here a second cage; of the stator transients test_docs_run and the shipped dips tell it."""
     made = drawn("double_cage", X_second=0.15, T_second=0.01)
-    found = investigate(model("electromechanical"), made[:2], made[2:], only=FEW)
-    assert (found.verdict.word, found.names) == ("named", ("second_cage",)), found.reason
-    assert found.validate.explained_share > 0.95
-    assert abs(found.validate.closed_share - 1) < 0.1
-
-
-def test_silent_where_the_order_is_right():
-    made = drawn("electromechanical")
-    found = investigate(model("electromechanical"), made[:2], made[2:], only=FEW)
-    assert (found.verdict.word, found.names) == ("none", ())
+    base = tractexp.compose()
+    found = tractexp.investigate(made[:2], base, validate=made[2:], effects=FEW, progress=False)
+    assert (found.verdict, found.names) == ("named", ("second_cage",)), found.reason
+    assert abs(found.gap.validate.closed - 1) < 0.1
 
 
 # the story a newcomer meets

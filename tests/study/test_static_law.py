@@ -5,8 +5,8 @@ power.
 import numpy as np
 import pytest
 
+import tractexp
 from tractexp.configuration.plugin import get
-from tractexp.discrepancy.investigate import investigate
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.record import Record, detect
@@ -48,9 +48,13 @@ def test_a_zip_load_taken_for_an_exponential_one_is_named_with_its_share_of_cons
     """
     rng = np.random.default_rng(1)
     made = [dip(depth, duration, rng) for depth, duration in ((0.5, 0.2), (0.3, 0.3), (0.6, 0.15))]
-    of = load("exponential")
-    only = ("stator_resistance", "polynomial_static_load")
-    answer = investigate(of, made[:2], made[2:], {}, {}, only=only)
-    assert (answer.verdict.word, answer.names) == ("named", ("polynomial_static_load",))
-    (share,) = [e for e in answer.final_estimates if e.parameter.name == "constant_share_P"]
-    assert share.value == pytest.approx(0.417, abs=0.02)
+    answer = tractexp.investigate(
+        made[:2],
+        tractexp.compose(static="exponential"),
+        validate=made[2:],
+        effects=("stator_resistance", "polynomial_static_load"),
+        progress=False,
+    )
+    assert (answer.verdict, answer.names) == ("named", ("polynomial_static_load",))
+    share = answer.fit.parameters["constant_share_P"].value
+    assert share == pytest.approx(0.417, abs=0.02)

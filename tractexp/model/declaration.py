@@ -3,7 +3,8 @@ part.
 """
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import sympy
@@ -48,16 +49,26 @@ def declare_equations(
             f"the motor '{motor.name}' and the static load '{static.name}' do not compose: {why}"
         ) from why
     for effect in effects:
-        try:
+        with _refuse(effect):
             _effect(eq, effect)
-        except Unfit as why:
-            raise Refused(effect.name, str(why)) from why
     if not any(eq.outputs().values()):
         raise UserError(
             f"the {title} draw no power; choose a model/motor or a model/static other than 'none'"
         )
     eq.close()
+    for effect in effects:
+        with _refuse(effect):
+            check_size_used(eq, effect)
     return eq
+
+
+@contextmanager
+def _refuse(effect: Effect) -> Iterator[None]:
+    """Raise `Refused` where an effect does not fit."""
+    try:
+        yield
+    except Unfit as why:
+        raise Refused(effect.name, str(why)) from why
 
 
 def _foreign(eq: Equations, part: Part) -> str:
@@ -161,5 +172,3 @@ def _effect(eq: Equations, effect: Effect) -> None:
         eq.edits[effect.name] = []
     with explain_symbols(effect):
         effect.edit(eq, **eq.declare(effect.parameters))
-    if not isinstance(effect, Measurement):
-        check_size_used(eq, effect)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from tractexp.errors import Unfit
 from tractexp.kernel.graph import symbols_of
 from tractexp.model.equations import Equations
-from tractexp.model.parts import Effect, Part
+from tractexp.model.parts import Effect, Measurement, Part
 from tractexp.model.symbols import real_symbol
 from tractexp.text.wording import join_words
 
@@ -55,8 +55,10 @@ def check_size_used(eq: Equations, effect: Effect) -> None:
     """Raise `Unfit` for an effect none of whose sizes is in an equation: it changes nothing.
 
     Of some of its parameters a model may have no use: of a share of motors where there is none, or
-    of a reactive power in waveforms.
+    of a reactive power in waveforms. One of the measurement changes no equation.
     """
+    if isinstance(effect, Measurement):
+        return
     used = set().union(*map(symbols_of, eq.list_expressions()))
     sizes = [p.name for p in effect.parameters if p.null is not None]
     if not any(real_symbol(name) in used for name in sizes):
