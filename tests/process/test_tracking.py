@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import free_port, run_command
+from traps import lay_traps
 
 from tractexp import tracking
 from tractexp.cache import provenance
@@ -616,18 +617,19 @@ FOREIGN = [
 
 
 @pytest.mark.skipif(os.name == "nt", reason="ends the server by a signal")
-def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
+def test_the_ui_answers_on_loopback_imports_nothing_from_here_and_leaves_nothing_behind(
+    tmp_path, uri
+):
     (tmp_path / "note.txt").write_text("hello")
     run_id = tracking.log(TrackedRun("e", "r", artifacts=[tmp_path / "note.txt"]), uri)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
+    lay_traps(elsewhere)
+    there = sorted(elsewhere.iterdir())
     port = free_port()
-    script = (
-        "import sys; from tractexp.tracking.ui import serve; sys.exit(serve(sys.argv[1],"
-        " port=int(sys.argv[2])))"
-    )
+    program = str(Path(sys.executable).with_name("tractexp"))
     ui = subprocess.Popen(
-        [sys.executable, "-c", script, uri, str(port)],
+        [program, "ui", "--uri", uri, "--port", str(port)],
         stdout=-1,
         stderr=-1,
         text=True,
@@ -669,7 +671,7 @@ def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
     while answers(f"http://127.0.0.1:{port}/health"):
         assert time.monotonic() < deadline, "the server outlived the command"
         time.sleep(0.1)
-    assert not list(elsewhere.iterdir())
+    assert sorted(elsewhere.iterdir()) == there
 
 
 def test_the_ui_says_why_it_cannot_open(tmp_path, uri):

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from command_line import free_port, run_command
+from command_line import run_command
+from traps import lay_traps
 
 import tractexp.data
 from tractexp.cli.again import build_repeat_command
@@ -27,26 +28,11 @@ QUICK = ("optimizer=random_search", "budget=10", "hydra.run.dir=run")
 
 # Modules beside the records
 
-TRAPS = (
-    "mlflow",
-    "numpy",
-    "pickle",
-    "yaml",
-    "joblib",
-    "hydra",
-    "json",
-    "typing_extensions",
-    "uvicorn",
-    "tempfile",
-)
-TRAP = "open('trapped', 'a').write(__name__ + ' ')\nraise ImportError(__name__)\n"
-
 
 @pytest.fixture
 def trapped(tmp_path) -> Path:
     """A folder of records, beside which modules lie that say when they are imported."""
-    for name in TRAPS:
-        (tmp_path / f"{name}.py").write_text(TRAP)
+    lay_traps(tmp_path)
     shutil.copy(DATA / "tibet_30pct.csv", tmp_path / "dip.csv")
     return tmp_path
 
@@ -69,25 +55,6 @@ COMMAND, MODULE = (
 def test_no_module_beside_the_records_is_imported(start, arguments, trapped):
     done = subprocess.run([*start, *arguments], cwd=trapped, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert not (trapped / "trapped").exists()
-
-
-def test_the_server_of_the_pages_imports_none_either(trapped, uri):
-    command = [
-        str(Path(sys.executable).with_name("tractexp")),
-        "ui",
-        "--uri",
-        uri,
-        "--port",
-        str(free_port()),
-    ]
-    with subprocess.Popen(
-        command, cwd=trapped, stdout=subprocess.PIPE, text=True, env=os.environ
-    ) as server:
-        assert server.stdout is not None
-        said = [server.stdout.readline(), server.stdout.readline()]
-        server.terminate()
-    assert "ready" in said[1]
     assert not (trapped / "trapped").exists()
 
 

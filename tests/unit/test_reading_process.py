@@ -3,10 +3,14 @@ process that asked.
 """
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import hostile
+import pyarrow
 import pytest
+from pyarrow import parquet
 
 import tractexp
 from tractexp.errors import UserError
@@ -71,3 +75,18 @@ def test_what_is_no_workbook_is_said(name, tmp_path):
     path = hostile.INPUTS[name](tmp_path / name)
     with pytest.raises(UserError, match=rf"{name}: (not a workbook|byte 5 is zero)"):
         tractexp.read(str(path))
+
+
+def test_a_parquet_file_is_read_without_pandas(tmp_path):
+    """Its import takes three times as long as the rest of the reading."""
+    path = tmp_path / "numbers.parquet"
+    columns = {"t": [0.0, 0.1], "n": [1, None], "on": [True, False]}
+    parquet.write_table(pyarrow.table(columns), path)
+    program = (
+        "import runpy, sys; own = runpy.run_path(sys.argv[1]);"
+        "_, read = own['_open_parquet'](open(sys.argv[2], 'rb').read());"
+        "print([(name, cells.tolist()) for name, cells in read('')], 'pandas' in sys.modules)"
+    )
+    command = [sys.executable, "-P", "-c", program, reading_process.__file__, str(path)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert said == "[('t', [0.0, 0.1]), ('n', [1.0, nan]), ('on', [1.0, 0.0])] False\n"

@@ -149,7 +149,11 @@ def _list_cells(column: Any) -> Any:
         (types.is_floating, types.is_integer, types.is_boolean, types.is_null, types.is_decimal),
     )
     if any(is_of(kind) for is_of in numeric):
-        return np.asarray(column.cast("float64").to_numpy(), dtype=float)
+        numbers = column.cast("float64")
+        if numbers.null_count:
+            return np.array(numbers.to_pylist(), dtype=float)
+        # Arrow's own `to_numpy` imports pandas first, which takes three times as long as all else
+        return np.from_dlpack(numbers.combine_chunks())
     if types.is_timestamp(kind):  # Python's own times have microseconds at most
         moments = column.cast(pyarrow.timestamp("us", tz=kind.tz), safe=False)
         return [None if cell is None else cell.replace(tzinfo=None) for cell in moments.to_pylist()]
