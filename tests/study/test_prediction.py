@@ -525,9 +525,8 @@ def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where
     assert "No set has a steady state and survives the held-out events." in page_of(lost)
 
 
-def test_what_chose_is_not_told_as_held_out(investigation, tmp_path):
-    investigation.save(tmp_path / "found")
-    words = (tmp_path / "found" / "discrepancy.html").read_text(encoding="utf-8")
+def test_what_chose_is_not_told_as_held_out(investigation):
+    words = investigation.report().html
     assert "The held-out events took part in choosing: what they say is no test of it." in words
     assert "model error, not fitted" in words
     assert "model error, held out" not in words
