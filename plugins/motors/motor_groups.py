@@ -67,7 +67,7 @@ class MotorGroups(Motor):
     def usual(self, **parameters):
         for k, one in enumerate(self.members, 1):
             assert isinstance(one, Motor)
-            yield from one.usual(**self._own_of(k, one, parameters))
+            yield from one.list_usual(self._own_of(k, one, parameters))
 
     @staticmethod
     def _own_of(k, one, parameters):

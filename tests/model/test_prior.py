@@ -44,6 +44,22 @@ def test_medians_and_factors_are_those_of_the_seven_types():
     assert factors == pytest.approx(np.exp(1.5 * logs.std(axis=0, ddof=1)), rel=0.03)
 
 
+@pytest.mark.parametrize(
+    ("motor", "known"),
+    [
+        ("double_cage", 4),
+        ("double_cage_stator_flux", 5),
+        (["double_cage", "electromechanical"], 8),
+    ],
+)
+def test_a_motor_says_what_is_usual_of_some_of_its_parameters(motor, known):
+    (event,) = tractexp.read("tibet_50pct")
+    model = tractexp.compose(motor=motor).model
+    rows = departures(Problem(model, [event], priors=True), np.array([[p.default for p in model.parameters]]))
+    assert rows.shape == (1, known)
+    assert np.isfinite(rows).all()
+
+
 @pytest.fixture(scope="module")
 def problem():
     (event,) = tractexp.read("tibet_50pct")

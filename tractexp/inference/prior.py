@@ -39,8 +39,8 @@ def departures(problem: Problem, values: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):  # of what no machine has
         rows = [
             np.log(quantity / median) / np.log(factor)
-            for quantity, median, factor in motor.usual(
-                **{p.name: by_name[p.name] for p in motor.parameters}
+            for quantity, median, factor in motor.list_usual(
+                {p.name: by_name[p.name] for p in motor.parameters}
             )
         ]
     return np.stack(rows, axis=1) if rows else np.empty((len(np.atleast_2d(values)), 0))

@@ -18,7 +18,7 @@ from tractexp.configuration.plugin import Plugin
 from tractexp.errors import UserError, among
 from tractexp.model import sites
 from tractexp.model.names import check_name
-from tractexp.model.signature import check_signature
+from tractexp.model.signature import check_signature, select_arguments
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -104,6 +104,10 @@ class Motor(Part):
             Each positive and log-normally spread; a quantity does not depend on the base.
         """
         return ()
+
+    def list_usual(self, parameters: dict[str, Any]) -> "Iterable[tuple[Any, float, float]]":
+        """What `usual` tells of all the motor's parameters by name."""
+        return self.usual(**select_arguments(self.usual, parameters))
 
     @classmethod
     def check_class(cls, where: str) -> None:
