@@ -55,7 +55,8 @@ def test_medians_and_factors_are_those_of_the_seven_types():
 def test_a_motor_says_what_is_usual_of_some_of_its_parameters(motor, known):
     (event,) = tractexp.read("tibet_50pct")
     model = tractexp.compose(motor=motor).model
-    rows = departures(Problem(model, [event], priors=True), np.array([[p.default for p in model.parameters]]))
+    values = np.array([[p.default for p in model.parameters]])
+    rows = departures(Problem(model, [event], priors=True), values)
     assert rows.shape == (1, known)
     assert np.isfinite(rows).all()
 
