@@ -45,5 +45,8 @@ class ShuntCapacitor(Effect):
             else ""
         )
 
+    def refusal(self, eq):
+        return "its static load has a capacitor already" if "compensation" in eq else None
+
     def edit(self, eq, capacitor):
         eq.draw(eq.capacitor(capacitor))

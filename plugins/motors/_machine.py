@@ -52,6 +52,7 @@ X_SECOND = Parameter(
     MILANO,
     "X''",
     power_exponent=-1,
+    physical=(0.06, 1.2),
 )
 R_S = Parameter(
     0.02,

@@ -47,6 +47,7 @@ SHARES = VOLTAGES / 0.98
             0.7 * SHARES**2 + 0.1 * SHARES + 0.2,
         ),
         ("constant_impedance", [], SHARES**2, SHARES**2),
+        ("compensated_branch", [0.3, 0.5], SHARES**2, SHARES**2),
         ("constant_power", [], np.ones(5), np.ones(5)),
     ],
 )

@@ -38,6 +38,7 @@ WAVES_ONLY = {
     "current_transformer_saturation",
     "transformer_error",
     "harmonics_source",
+    "infeed",
     "resonant_branch",
 }
 STACK = (
@@ -241,6 +242,22 @@ def test_a_resonant_branch_rings_at_its_frequency_until_its_time_is_over():
     f = np.abs(np.fft.fftfreq(1 << 16, 1 / 12800.0))
     high = f > 100
     assert f[high][spectrum[high].argmax()] == pytest.approx(190, abs=6)
+
+
+def test_an_infeed_is_a_source_behind_its_resistance_and_inductance():
+    """Of the source the change alone is seen: what it gives at rest is in P0 and Q0."""
+    b, r = 0.8, 0.15
+    v, _ = smooth("v_d", "v_q")
+    (psi,) = solved(lambda t, y: OMEGA_N * (v(t) - v(0.0) - r * y) - 1j * OMEGA * y, [1e-9])
+    more = run("infeed", infeed_susceptance=b, infeed_resistance=r)[0] - run()[0]
+    assert np.abs(more - b * psi).max() < 1e-6
+    assert np.abs(more[:350]).max() < 1e-12
+    assert np.abs(more).max() > 0.1
+
+
+def test_a_capacitor_beside_a_compensated_branch_is_refused():
+    refusal = model(static="compensated_branch").acceptance(effect("shunt_capacitor")).refusal
+    assert refusal == "its static load has a capacitor already"
 
 
 def test_the_zero_sequence_follows_its_branch():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
 from waves_of import OMEGA, dip, event, smooth, times, vector
 
 from tractexp.configuration.plugin import discover, get
@@ -24,7 +25,15 @@ MOTORS = (
     "double_cage_stator_flux",
     "voltage",
 )
-STATICS = ("branch", "constant_impedance", "exponential", "zip", "constant_power", "none")
+STATICS = (
+    "branch",
+    "compensated_branch",
+    "constant_impedance",
+    "exponential",
+    "zip",
+    "constant_power",
+    "none",
+)
 VALUES = {
     "T_prime": 0.12,
     "X_prime": 0.25,
@@ -41,6 +50,7 @@ VALUES = {
     "b_Z": 0.7,
     "b_I": 0.2,
     "branch_resistance": 0.3,
+    "branch_share": 0.5,
     "capacitor": 0.2,
     "zero_conductance": 0.4,
 }
@@ -163,6 +173,85 @@ def test_the_kernel_agrees_with_equations_written_by_hand_and_converges_in_order
     assert np.log2(np.array(errors[:2]) / errors[1:3]) == pytest.approx(4, abs=0.3)
 
 
+def compensated(**changed):
+    """A motor beside a compensated branch, its values, and what the circuit by hand is told of it:
+    the capacitor's susceptance from its share.
+    """
+    of = model("stator_flux", "compensated_branch")
+    chosen = values(of, **changed)
+    made = event(dip(0.45, jump=0.6, negative=0.2, end=0.05), rate=3200.0, length=0.09)
+    left = of.at_rest(chosen, Drive.from_events([made]))
+    p = dict(zip(of.names, chosen, strict=True))
+    inductive = p["branch_share"] * left["P_s0"] / p["branch_resistance"]
+    assert inductive > left["Q_s0"]
+    return of, made, chosen, p | {"capacitor": (inductive - left["Q_s0"]) / made.U0**2}
+
+
+def test_a_compensated_branch_is_its_circuit_with_the_capacitor_that_balances_q():
+    of, made, chosen, known = compensated()
+    current, _ = by_hand(made, known)
+    assert known["capacitor"] > 0.5
+    assert vector(of.simulate(Drive.from_events([made]), chosen, 32)) == pytest.approx(
+        current, abs=1e-9
+    )
+
+
+def test_a_compensated_branch_without_a_capacitor_is_the_branch():
+    """Where what a share of P gives the branch is less than Q, its Q is all there is."""
+    made = event(dip(0.5, jump=0.7, negative=0.25), length=0.2)
+    of, branch = model("stator_flux", "compensated_branch"), model("stator_flux", "branch")
+    inductive = {"branch_resistance": 1.2, "T_m": 0.1, "X_prime": 0.9}
+    seen = played(of, made, values(of, branch_share=0.02, **inductive))
+    assert seen == pytest.approx(played(branch, made, values(branch, **inductive)), abs=1e-12)
+    assert np.abs(seen - played(of, made, values(of, branch_share=0.9, **inductive))).max() > 0.1
+
+
+@pytest.mark.parametrize("Q0", [0.3, -0.3])
+def test_the_admittances_of_a_compensated_branch_add_up_in_either_sequence(Q0):
+    """At rest each sequence sees conductance, branch and capacitor side by side."""
+    r, share, U2 = 0.4, 0.3, 0.1
+    of = model("none", "compensated_branch")
+    made = event(
+        lambda t: np.exp(1j * OMEGA * t) + U2 * smooth(t / 0.02) * np.exp(-1j * OMEGA * t),
+        length=0.3,
+        Q0=Q0,
+    )
+    t = times(made)
+    at_rest = (t > 0.25) & (t < 0.29)
+    current = vector(of.simulate(Drive.from_events([made]), np.array([r, share]), 16))
+    turn = made.turn[at_rest]
+    inductive = share / r
+    Y = lambda w: 1 - share + inductive * (1 + r**2) / (r + 1j * w) + 1j * w * (inductive - Q0)  # noqa: E731
+    assert Y(1) == pytest.approx(1 - 1j * Q0)
+    known = Y(1) * turn + U2 * Y(-1) * np.conj(turn)
+    assert np.abs(current[at_rest] - known).max() < 1e-6
+
+
+def test_parameters_of_a_compensated_load_are_found_in_currents_made_by_scipy():
+    of, made, chosen, known = compensated()
+    current, _ = by_hand(made, known)
+    drive = Drive.from_events([made])
+    names = ["T_m", "M", "R_s", "branch_resistance", "branch_share"]
+    at = [of.names.index(name) for name in names]
+
+    def miss(factors):
+        tried = chosen.copy()
+        tried[at] *= factors
+        off = vector(of.simulate(drive, tried, 4)) - current
+        return np.concatenate([off.real, off.imag])
+
+    found = least_squares(miss, [0.8, 1.3, 1.4, 1.4, 0.8], bounds=(0.5, 1.6)).x
+    assert found == pytest.approx(np.ones(len(names)), abs=1e-3)
+
+
+def test_a_load_of_which_a_negative_element_would_be_left_is_refused():
+    of, made = model("stator_flux", "compensated_branch"), event(dip())
+    drive = Drive.from_events([made])
+    assert "the static load would generate" in of.refusal(values(of, T_m=1.05), drive)
+    inductive = {"T_m": 0.1, "X_prime": 0.9, "branch_resistance": 8.0}
+    assert "more active power than there is" in of.refusal(values(of, **inductive), drive)
+
+
 @pytest.mark.parametrize("angle", [0.7, -2.4])
 def test_a_voltage_turned_by_an_angle_gives_currents_turned_by_it(angle):
     of, whole = model("stator_flux", "branch", "shunt"), np.exp(1j * angle)
@@ -211,6 +300,7 @@ PAIRS = (
     ("double_cage", "exponential", "stator_resistance"),
     ("double_cage_stator_flux", "exponential"),
     ("voltage", "zip"),
+    ("stator_flux", "compensated_branch"),
     ("stator_flux", "exponential"),
     ("none", "constant_power"),
     ("none", "constant_impedance"),

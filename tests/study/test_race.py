@@ -117,3 +117,10 @@ def test_the_race_is_a_table_and_in_the_result():
     assert "Structures raced" in text
     assert text.index("static_exponential") < text.index("static_zip")
     assert fit.result.model["static"]["name"] == "exponential"
+
+
+def test_machines_raced_in_waveforms_stand_beside_no_negative_element():
+    raced = [model_of(name) for name in model_of("auto").candidates["waves"]]
+    machines = [one for one in raced if one.motor["name"] != "line_side_converter"]
+    assert {one.static["name"] for one in machines} == {"compensated_branch"}
+    assert len(machines) > 1

@@ -113,10 +113,11 @@ def _static(eq: Equations, static: Static) -> None:
     u = sympy.Symbol(sites.static_voltage.name, real=True)
     f = sympy.Symbol("static_frequency", real=True)
     symbols = own | ({"f": f} if "f" in inspect.signature(static.law).parameters else {})
-    given = select_arguments(static.require, own | {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0})
+    left = {"P_s0": eq.P_s0, "Q_s0": eq.Q_s0}
+    before = {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0, **left}
     with explain_symbols(static):
         law = static.law(u, **symbols)
-        for requirement in static.require(**given):
+        for requirement in static.require(**select_arguments(static.require, own | before)):
             eq.require(*requirement)
     if law is None:
         _refuse_forgotten_law(static)
@@ -127,7 +128,21 @@ def _static(eq: Equations, static: Static) -> None:
         eq.define(f.name, (eq.omega_n + eq.omega_s) / (eq.omega_n + eq.omega_s0), "f")
     P, Q = law
     powers = eq.place(sites.P_static, eq.P_s0 * P), eq.place(sites.Q_static, eq.Q_s0 * Q)
-    eq.consume(*powers, static.compute_damping(**select_arguments(static.compute_damping, own)))
+    damping = static.compute_damping(**select_arguments(static.compute_damping, own))
+    eq.consume(*powers, damping)
+    asked = select_arguments(static.compute_compensation, own | left)
+    with explain_symbols(static):
+        supplied = static.compute_compensation(**asked)
+    if eq.waves and supplied != 0:
+        _compensate(eq, supplied, damping)
+
+
+def _compensate(eq: Equations, supplied: Any, damping: Any) -> None:
+    """A capacitor at the bus supplies so much to the branch before the event."""
+    supplied = eq.define("compensation", supplied, "Q_C")
+    eq.consume(sympy.Integer(0), supplied * (eq.U / eq.U0) ** 2, damping)
+    speed = 1 + eq.omega_s0 / eq.omega_n
+    eq.draw(eq.capacitor(supplied / (speed * eq.U0**2)))
 
 
 def _refuse_forgotten_law(static: Static) -> None:

@@ -407,6 +407,8 @@ class Model:
         eq = self.equations
         numbers = dict(zip(self.names, map(float, values), strict=True))
         numbers |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[0], *drive.before[0]), strict=True))
+        starts = [symbol.name for symbol in eq.real_starts()]
+        numbers |= zip(starts, self._list_starts(values, drive), strict=True)
 
         def number(expression: Any) -> float:
             whole = eq.expand(expression)
@@ -446,11 +448,14 @@ class Model:
         )
         numbers = [*map(float, (*values, *drive.before[event], *drive.event[event]))]
         substitutes = dict(zip((*self.names, "P0", "Q0", *EVENT), numbers, strict=True))
-        starts = self.kernel.starts(self._candidates(drive, values)[[event]], drive.event[[event]])[
-            0, :, 0
-        ].tolist()
+        starts = self._list_starts(values, drive, event)
         substitutes |= dict(zip(stated["starts"], starts, strict=True))
         return evaluate_texts(stated["quantities"], substitutes)
+
+    def _list_starts(self, values: np.ndarray, drive: Drive, event: int = 0) -> list[float]:
+        """What the states of one candidate (d,) start from in an event."""
+        candidates = self._candidates(drive, values)[[event]]
+        return self.kernel.starts(candidates, drive.event[[event]])[0, :, 0].tolist()
 
     def _at_rest(self) -> str:
         """Names of what stands in the steady state, as JSON."""

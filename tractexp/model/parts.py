@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 # recorded channels that not every record has; I0 of waveforms, where there is some
 CHANNELS = ("f", "U2", "I0")
+LEFT = ("P_s0", "Q_s0")  # what the other parts leave to the static load before the event
 COMPARED = ("I0",)  # of these, what is compared and drives nothing: an event may be without
 
 
@@ -155,13 +156,25 @@ class Static(Part):
 
         return DAMPING
 
+    def compute_compensation(self, *_: Any, **parameters: Any) -> Any:
+        """Reactive power before the event [pu] that a capacitor beside the branch supplies to it in
+        waveforms; 0: there is none.
+
+        Parameters
+        ----------
+        **parameters : Symbol
+            Those of the load, and `P_s0` and `Q_s0` [pu], that the method asks for by name.
+        """
+        return 0
+
     def require(self, *_: Any, **parameters: Any) -> Iterable[tuple[Any, ...]]:
         """The conditions of a steady state.
 
         Parameters
         ----------
         **parameters : Symbol
-            Those of the load, and `P0`, `Q0` and `U0` [pu], that the method asks for by name.
+            Those of the load, and `P0`, `Q0`, `U0`, `P_s0` and `Q_s0` [pu], that the method asks
+            for by name.
 
         Returns
         -------
@@ -181,8 +194,10 @@ class Static(Part):
                 f"{where}: law() asks for the frequency, f, which not every record has; say reads ="
                 " ('f',)"
             )
-        check_signature(cls, "require", None, where, offered=("P0", "Q0", "U0"), all_taken=False)
+        before = ("P0", "Q0", "U0", *LEFT)
+        check_signature(cls, "require", None, where, offered=before, all_taken=False)
         check_signature(cls, "compute_damping", None, where, all_taken=False)
+        check_signature(cls, "compute_compensation", None, where, offered=LEFT, all_taken=False)
 
 
 @dataclass(frozen=True)

@@ -176,8 +176,12 @@ def says_what_it_is(cls: type[Part]) -> None:
 
 
 def prints_its_equations(cls: type[Part]) -> None:
-    """The equations in LaTeX show every parameter."""
-    text = " ".join(with_part(cls).latex())
+    """The equations in LaTeX show every parameter, those of waveforms what phasors have not."""
+    tried = with_part(cls)
+    text = " ".join(tried.latex())
+    if not (cls.phasors_only or all(parameter.symbol in text for parameter in cls.parameters)):
+        waves = compose(tried.motor, tried.static, tried.effects, domain=WAVES)
+        text += " ".join(waves.latex())
     for parameter in cls.parameters:
         assert parameter.symbol in text, (
             f"the equations of '{cls.name}' do not show {parameter.symbol}"
