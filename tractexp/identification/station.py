@@ -61,10 +61,19 @@ class LoadSpec:
     bounds: Mapping[str, Sequence[float]]
     fixed: Mapping[str, float]
     substeps: int | None = None
+    _steps: dict[Event, int] = field(default_factory=dict, init=False, repr=False)
 
     def pose(self, events: Sequence[Event]) -> SizedProblem:
-        """The problem of some of its dips."""
-        return SizedProblem(self.model, events, self.bounds, self.fixed, self.substeps)
+        """The problem of some of its dips, each of which has the same Runge-Kutta steps in all."""
+        steps = [self._count_steps(event) for event in events]
+        return SizedProblem(self.model, events, self.bounds, self.fixed, steps)
+
+    def _count_steps(self, event: Event) -> int:
+        """The steps per sample of a dip, chosen where it is first met."""
+        if event not in self._steps:
+            alone = SizedProblem(self.model, [event], self.bounds, self.fixed, self.substeps)
+            self._steps[event] = int(alone.step.substeps[0])
+        return self._steps[event]
 
 
 @dataclass(frozen=True, eq=False)

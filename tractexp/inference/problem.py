@@ -59,7 +59,7 @@ class Problem:
         events: Sequence[Event],
         bounds: Mapping[str, Sequence[float]] | None = None,
         fixed: Mapping[str, float] | None = None,
-        substeps: int | None = None,
+        substeps: int | Sequence[int] | None = None,
         per_event: Sequence[str] = (),
         loss: Loss | None = None,
         *,
@@ -77,8 +77,8 @@ class Problem:
             Bounds in place of the model's own, in each parameter's unit.
         fixed : {name: value}
             Parameters that are held at a value.
-        substeps : int
-            Runge-Kutta steps per sample; None: as many as the bounds need.
+        substeps : int or ints
+            Runge-Kutta steps per sample, of all or of each event; None: as many as the bounds need.
         per_event : names
             Parameters with a value of their own in each of several events; their columns are called
             `T_m[1]`, `T_m[2]`, ...

@@ -80,7 +80,7 @@ class SizedProblem(Problem):
         events: Sequence[Event],
         bounds: Mapping[str, Sequence[float]],
         fixed: Mapping[str, float],
-        substeps: int | None = None,
+        substeps: int | Sequence[int] | None = None,
     ):
         """State which parameters are shared by motors whose size differs from event to event.
 

@@ -32,19 +32,20 @@ class Step:
     error: np.ndarray
 
     @classmethod
-    def from_setting(cls, substeps: int, events: int) -> "Step":
-        """The number that a user gave, for so many events.
+    def from_setting(cls, substeps: int | Sequence[int], events: int) -> "Step":
+        """The number that a user gave, for so many events, or one for each of them.
 
         Raises
         ------
         UserError
             For a number out of range.
         """
-        if not 1 <= substeps <= MOST_SUBSTEPS:
+        given = np.broadcast_to(substeps, events)
+        if given.min() < 1 or given.max() > MOST_SUBSTEPS:
             raise UserError(
                 f"{MODEL.substeps}={substeps} is out of range: it must be 1 to {MOST_SUBSTEPS}"
             )
-        return cls(np.full(events, substeps), np.full(events, np.nan))
+        return cls(given.copy(), np.full(events, np.nan))
 
     def describe(self, events: Sequence[Event]) -> str:
         """The sentence that a run prints: the steps, their lengths [ms] and the error they leave
