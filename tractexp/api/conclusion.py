@@ -87,6 +87,7 @@ def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result
     """The result with its uncertainty, what was found beside the estimate, and advice."""
     from tractexp.identification.physical import find_free_optimum
     from tractexp.identification.share import find_share_bound
+    from tractexp.identification.unsteady_start import find_unsteady_start
     from tractexp.identification.yardstick import yardstick
 
     uncertainty, agreement, fits = details.uncertainty, details.agreement, details.fits
@@ -94,10 +95,14 @@ def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result
     validate = [event for event in setup.validate if event.record.name in played]
     free = find_free_optimum(uncertainty, setup.model.held, fits, validate)
     share, unrecorded = find_share_bound(uncertainty), uncertainty.unrecorded
+    start = find_unsteady_start(uncertainty)
     fields = uncertainty.fields()
     told = fields["uncertainty"]
     told |= agreement.fields() if agreement else {"gains": {}, "odd_events": []}
-    told["notes"] += [*(agreement.notes if agreement else ()), *([str(free)] if free else ())]
+    told["notes"] += [
+        *(agreement.notes if agreement else ()),
+        *map(str, filter(None, (free, start))),
+    ]
     return replace(
         result,
         **fields,
@@ -107,6 +112,7 @@ def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result
         free_optimum=free.to_dict() if free else {},
         share_bound=share.to_dict() if share else {},
         unrecorded=unrecorded.to_dict() if unrecorded else {},
+        unsteady_start=start.to_dict() if start else {},
         advice=_advise(setup, result, details),
     )
 

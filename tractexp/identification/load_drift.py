@@ -25,10 +25,6 @@ def with_load_drift(uncertainty: Uncertainty) -> Uncertainty:
 
     A parameter that it moves beyond its interval is weakly identified.
     """
-    problem = uncertainty.likelihood.problem
-    shipped = any(event.record.is_shipped for event in problem.events)
-    if shipped or problem.drive.of_waves:
-        return uncertainty
     rows, told = _extrapolate_drifts(uncertainty)
     if not told:
         return uncertainty
@@ -42,16 +38,29 @@ def with_load_drift(uncertainty: Uncertainty) -> Uncertainty:
     )
 
 
+def find_load_drifts(uncertainty: Uncertainty) -> list[np.ndarray]:
+    """How far P and Q (2,) [pu] drift before the dip of each event, by what a fit leaves; 0 where
+    they do not, and of waveforms and shipped records.
+    """
+    problem = uncertainty.likelihood.problem
+    shipped = any(event.record.is_shipped for event in problem.events)
+    if shipped or problem.drive.of_waves:
+        return [np.zeros(2) for _ in problem.events]
+    left = -uncertainty.likelihood.of_records.residuals(uncertainty.unit[None])[0]
+    return [
+        _find_drift(event, left[:, problem.drive.part(e)]) for e, event in enumerate(problem.events)
+    ]
+
+
 def _extrapolate_drifts(uncertainty: Uncertainty) -> tuple[np.ndarray, list[str]]:
     """P and Q (2, N) [pu] of the drifts of all events, gone on as far, and a clause on each."""
     problem = uncertainty.likelihood.problem
-    likelihood = uncertainty.likelihood.of_records
-    left = -likelihood.residuals(uncertainty.unit[None])[0]
-    rows = np.zeros(left.shape)
+    rows = np.zeros(problem.drive.measurements.shape)
     told = []
-    for e, event in enumerate(problem.events):
+    for e, (event, drift) in enumerate(
+        zip(problem.events, find_load_drifts(uncertainty), strict=True)
+    ):
         part = problem.drive.part(e)
-        drift = _find_drift(event, left[:, part])
         if drift.any():
             rows[:, part] = drift[:, None] * _continue_drift(event)
             told.append(_describe_drift(event, drift))

@@ -110,6 +110,8 @@ class Result(Plain):
     free_optimum: dict[str, Any] = field(default_factory=dict)
     # channel that the records lack, swing it may have, moves {parameter: by how much}; empty: none
     unrecorded: dict[str, Any] = field(default_factory=dict)
+    # speeds {event: from that at rest}, errors [%], parameters; empty: a steady start does as well
+    unsteady_start: dict[str, Any] = field(default_factory=dict)
     # of the motors, where the records bound it from below alone: low, high, profile, sentence
     share_bound: dict[str, Any] = field(default_factory=dict)
     advice: list[str] = field(default_factory=list)  # what to do next, the most pressing first
