@@ -5,6 +5,7 @@ and silence for everything else.
 import numpy as np
 import pytest
 from field_waves import KA, KV, dip, load, noise, phases, recording, wave
+from made_motor import X_PRIME, solve_motor
 from test_cev import BITS, names, row
 
 import tractexp
@@ -78,6 +79,29 @@ def test_an_unbalance_tells_the_impedance_without_a_start():
     )
     assert test.power == pytest.approx(3 * KV * KA, rel=0.01)
     assert test.voltage == pytest.approx(110, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("R_r", "H", "unbalance"), [(0.015, 0.8, 0.0), (0.025, 1.2, 0.0), (0.015, 0.8, 0.03)]
+)
+def test_the_intervals_hold_the_truth_of_a_motor_solved_from_standstill(
+    R_r, H, unbalance, tmp_path
+):
+    V, I, T0 = solve_motor(RATE, R_r, H, 4.0, 5.0, unbalance)
+    turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
+    waves = np.sqrt(2) * np.concatenate([KV * (V * turn).real, KA * (I * turn).real])
+    waves += noise(waves.shape, 5e-4) * np.repeat([KV, KA], 3)[:, None]
+    write(recording(waves, RATE), tmp_path / "motor.cfg", "BINARY", 1999)
+    (feeder,) = tractexp.look(tmp_path / "motor.cfg").content["files"][0]["feeders"]
+    test = feeder["type_test"]
+    found = {row["name"]: row for row in test["values"]}
+    base = test["power"] / (3 * KV * KA)  # of what it draws running over the machine's
+    assert found["T0'"]["low"] < T0 < found["T0'"]["high"]
+    assert found["H"]["low"] < H / base < found["H"]["high"]
+    assert found["H"]["high"] < 1.2 * found["H"]["low"]
+    low, high = test["bounds"]["X_prime"]
+    assert low < X_PRIME * base < high
+    assert ("X_2" in found) == (unbalance > 0)
 
 
 def test_a_load_that_is_switched_off_a_live_bus_is_no_type_test():

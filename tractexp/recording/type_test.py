@@ -33,6 +33,8 @@ LEAST_LEFT = 0.1  # of it: with less the frequency is not measured
 STEADY_CURRENT = 0.1  # of a current: by more it changes while a motor still runs up
 LEAST_ERROR = 0.02  # of a value: of what transformers of measurement and windows leave
 TWO_ERRORS = 2.0
+# of the power drawn: what a stator loses, usually two to five percent, brakes no rotor
+MOST_STATOR_LOSS = 0.06
 FEWEST_PHASORS = 20
 
 
@@ -56,13 +58,15 @@ class TypeValue:
 @dataclass(frozen=True)
 class TypeTest:
     """What a report tells of a motor: `values`, per unit of `voltage` [kV] and `power` [MVA], at a
-    nominal `frequency` [Hz].
+    nominal `frequency` [Hz]; `reactive` is the share of the reactance in the impedance at the
+    start, 1 without one.
     """
 
     values: tuple[TypeValue, ...]
     voltage: float
     power: float
     frequency: float
+    reactive: float = 1.0
 
     def __str__(self) -> str:
         told = ", ".join(map(str, self.values))
@@ -81,11 +85,12 @@ class TypeTest:
     @property
     def bounds(self) -> dict[str, list[float]]:
         """The `model.bounds` of a motor that is fitted on this base: at standstill a machine is its
-        transient reactance.
+        transient reactance behind resistances.
         """
         by_name = {each.name: each for each in self.values}
-        reactance = by_name.get("X_locked", by_name.get("X_2"))
-        found = {} if reactance is None else {"X_prime": [reactance.low, reactance.high]}
+        found = {}
+        if (impedance := by_name.get("X_locked", by_name.get("X_2"))) is not None:
+            found["X_prime"] = [impedance.low * self.reactive, impedance.high]
         if (H := by_name.get("H")) is not None:
             omega_n = 2 * np.pi * self.frequency
             found["M"] = [2 * H.low / omega_n, 2 * H.high / omega_n]  # M = 2 H/omega_n, pu s²/rad
@@ -162,7 +167,8 @@ def find_type_test(course: Course, nominal: float) -> TypeTest | None:
         *report.measure_coasting(running, power),
     ]
     found = tuple(each for each in values if each is not None)
-    return TypeTest(found, voltage, power, nominal) if found else None
+    reactive = report.find_reactive_share() if values[0] else 1.0
+    return TypeTest(found, voltage, power, nominal, reactive) if found else None
 
 
 class _Report:
@@ -205,13 +211,25 @@ class _Report:
         first = self.closed.start
         if first < self.least or self.voltage[first] < ALIVE_SHARE * self.voltage.max():
             return None
-        part = slice(first + self.edge, first + self.edge + self.standstill // 2)
+        part = self.starting
         current = self.current[part]
         usual = float(np.median(self.current[running]))
         if not len(current) or current.min() < LEAST_STARTING_CURRENT * usual:
             return None
         impedance = self.voltage[part] / (np.sqrt(3) * current)
         return _measure("X_locked", impedance / ohm, "U/I at the start")
+
+    @property
+    def starting(self) -> slice:
+        """The samples after the breaker closes in which a motor hardly turns."""
+        assert self.closed is not None
+        first = self.closed.start + self.edge
+        return slice(first, first + self.standstill // 2)
+
+    def find_reactive_share(self) -> float:
+        """The share of the reactance in the impedance at the start."""
+        drawn = self.course.S[self.starting]
+        return float(np.median(np.abs(drawn.imag) / np.abs(drawn)))
 
     def measure_unbalance(self, ohm: float) -> TypeValue | None:
         """The impedance of the negative sequence; None where there is hardly any."""
@@ -253,6 +271,7 @@ class _Report:
         falls += _fit_slopes(t, f, 1)
         times = [-1 / slope for slope in decays if slope < 0]
         inertias = [-drawn * before / (2 * slope) for slope in falls if slope < 0]
+        inertias += [(1 - MOST_STATOR_LOSS) * H for H in inertias[:1]]
         constant = _tell("T0'", times, "the decay of U/f after the trip")
         inertia = _tell("H", inertias, "df/dt at the trip")
         return [constant, inertia]
