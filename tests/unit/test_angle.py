@@ -34,6 +34,7 @@ def written(path, angle, name="U_angle", **more):
     [
         ("U_angle", ANGLE),
         ("U_angle", np.angle(np.exp(1j * ANGLE))),
+        ("U_angle", np.degrees(ANGLE)),  # it jumps by 11.5, which no angle in rad does
         ("U_angle [deg]", np.degrees(ANGLE)),
         ("Voltage angle [deg]", np.degrees(np.angle(np.exp(1j * ANGLE)))),
     ],
@@ -50,7 +51,7 @@ def test_an_angle_without_a_unit_that_is_wrapped_by_360_is_in_degrees(tmp_path):
     angle = np.degrees(np.angle(np.exp(1j * (ANGLE + 2 * np.pi * T))))
     record = written(tmp_path / "dip.csv", angle)
     np.testing.assert_allclose(record.f, 51.3, atol=1e-3)
-    assert any("wrapped by 360" in note for note in record.notes)
+    assert any("deg, for in rad it would step" in note for note in record.notes)
 
 
 def test_a_jump_is_no_frequency():

@@ -21,7 +21,7 @@ from tractexp.recording.unit import SECONDARY_LINES
 
 ANGLES = frozenset(("U_angle", "U1_angle"))  # of the voltage, beside powers
 BESIDE = ANGLES | {"U2"}
-WHOLE_TURN = 0.85  # of a turn: an angle that steps by more from row to row was wrapped there
+LARGEST_STEP = 1.15  # of a turn: an angle steps by less from row to row, wrapped or not
 AGREES = 0.05  # of the apparent power, within which it is the product of voltage and current
 
 
@@ -105,12 +105,14 @@ def _settle_voltage(
 def _turned_angle(one: MappedColumn, values: np.ndarray) -> tuple[np.ndarray, str]:
     """An angle (N,) in rad, not wrapped, and what is said of it.
 
-    Without a unit it is in degrees where it is wrapped by 360, else in rad.
+    Without a unit it is in degrees where it steps by more than a turn in rad, else in rad.
     """
     steps = np.abs(np.diff(values[np.isfinite(values)]))
-    by_degrees = float(steps.max(initial=0.0)) > WHOLE_TURN * 360
+    by_degrees = float(steps.max(initial=0.0)) > LARGEST_STEP * 2 * np.pi
     scale = factor(one.role.unit) if one.role.unit else np.pi / 180 if by_degrees else 1.0
-    unit = one.role.unit or ("deg, for it is wrapped by 360" if by_degrees else "rad")
+    unit = one.role.unit or (
+        "deg, for in rad it would step by more than a turn" if by_degrees else "rad"
+    )
     note = f"{one.label} drives the model: the voltage's angle, {unit}"
     return unwrap_angle(scale * values), note
 
