@@ -89,10 +89,11 @@ def describe_station(starts: dict[int, float]) -> list[dict[str, Any]]:
         seen = np.flatnonzero((since >= FIRST) & (since < LAST)) + segment.first
         part, t = slice(seen[0], seen[-1] + 1), since[seen - segment.first] - FIRST
         currents = {
-            name: turn @ np.array([recording.channels[at + k].values[part] for k in range(3)])
+            name: turn
+            @ np.array([recording.channels[at + k].values(part.start, part.stop) for k in range(3)])
             for name, at in FEEDERS.items()
         }
-        currents["sum"] = sum(currents.values())
+        currents["sum"] = np.sum([*currents.values()], axis=0)
         lines = {key: round(1000 * abs(find_line(x, t, 150.0)), 1) for key, x in currents.items()}
         rows.append({"dip": dip, **lines})
     return rows
@@ -110,14 +111,10 @@ def main() -> None:
                 faults.append({"load": name, "dip": dip, "role": role, **lines})
                 left.setdefault((dip, role), []).append(rest)
                 starts[dip] = played.waves.t_start
-    rings = [
-        {
-            "dip": dip,
-            "role": role,
-            **dict(zip(("frequency", "growth"), find_growth(rest, t[: len(rest[0])]), strict=True)),
-        }
-        for (dip, role), rest in sorted(left.items())
-    ]
+    rings = []
+    for (dip, role), rest in sorted(left.items()):
+        frequency, growth = find_growth(rest, t)
+        rings.append({"dip": dip, "role": role, "frequency": frequency, "growth": growth})
     content = {"faults": faults, "rings": rings, "station": describe_station(starts)}
     STORED.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(content, indent=1))

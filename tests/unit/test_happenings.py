@@ -436,6 +436,26 @@ def test_a_tap_tells_the_exponents_of_the_static_part(seed, exponent):
     assert "worth fitting for the static part: P with U^" in event.why
 
 
+@pytest.mark.parametrize("within", [0.001, 0.06])
+@pytest.mark.parametrize("tap", [-0.015, 0.0125])
+def test_one_tap_of_a_transformer_tells_them(tap, within):
+    """A changer steps by 1.25 to 2.5 %, at once or through its resistors within three cycles."""
+    t = grid(4.0)
+    course = 1 + tap * np.clip((t - 2) / within, 0, 1)
+    [event] = seen(t, *exponential(t, course, 1.6))
+    assert (event.kind, event.worth) == ("step", False)
+    assert event.depth == pytest.approx(-tap, abs=0.002)
+    assert event.start == pytest.approx(2.0, abs=0.07)
+    assert event.exponents[0].low < 1.6 < event.exponents[0].high
+
+
+def test_a_load_that_steps_makes_no_tap_of_the_voltage_that_it_lowers():
+    t = grid(4.0)
+    more = np.where(t < 2, 1.0, 1.15)
+    V, I = exponential(t, np.where(t < 2, 1.0, 0.985), 1.6)
+    assert [event.kind for event in seen(t, V, I * more)] == []
+
+
 def test_a_ramp_tells_them_too():
     t = grid(8.0)
     course = 1 - 0.1 * np.clip((t - 2) / 4, 0, 1)

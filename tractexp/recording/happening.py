@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.record.change import SMALL_LOAD_SHARE, Change, load_changes
+from tractexp.record.change import SMALL_LOAD_SHARE, Change, load_changes, voltage_changes
 from tractexp.record.fall import STEADY
 from tractexp.record.record import Record
 from tractexp.recording.event_kind import (
@@ -17,7 +17,12 @@ from tractexp.recording.event_kind import (
     has_no_system,
 )
 from tractexp.recording.event_worth import NO_SYSTEM, judge_worth, measure_phases
-from tractexp.recording.excursion import SLID, Excursion, excursions
+from tractexp.recording.excursion import (
+    LONGEST_ABRUPT_CYCLES,
+    SLID,
+    Excursion,
+    excursions,
+)
 from tractexp.recording.pole_slip import find_pole_slips, is_swing_of_slip
 from tractexp.recording.static_exponent import StaticExponent, find_exponents
 from tractexp.recording.trace import Trace, of_record
@@ -79,6 +84,7 @@ def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]
     spans += find_open_poles(trace, spans)
     spans += [(kind, e) for kind, e in find_inrushes(trace) if not _is_within(trace, e, slips)]
     changes = _own_changes(trace, [e for _, e in spans])
+    spans += [("step", tap) for tap in _find_taps(trace, [e for _, e in spans], changes)]
     listed = [c for c in changes if abs(c.ratio - 1) > LEAST_LISTED_STEP]
     spans += [
         (_name_load_change(c), build_current_span(trace, c.first + 1, c.stop)) for c in listed
@@ -134,6 +140,26 @@ def _own_changes(trace: Trace, outside: list[Excursion]) -> list[Change]:
         for c in changes
         if not any(e.start - near < c.stop and e.end + near > c.first for e in outside)
     ]
+
+
+def _find_taps(
+    trace: Trace, outside: Sequence[Excursion], changes: Sequence[Change]
+) -> list[Excursion]:
+    """The steps of the voltage that are too small for an excursion, as those of a tap changer:
+    beside what happens to the voltage, and none that the load made.
+    """
+    cycle = trace.cycle / trace.step
+    busy = [(e.start, e.end) for e in outside] + [(c.first, c.stop) for c in changes]
+    taps = []
+    for cycles in (1.0, LONGEST_ABRUPT_CYCLES):
+        near = round((1 + cycles) * cycle)  # what levels are measured over, and a window
+        for tap in voltage_changes(trace.U, cycles * cycle):
+            if any(start - near < tap.stop and end + near > tap.first for start, end in busy):
+                continue
+            busy.append((tap.first, tap.stop))
+            level = max(abs(tap.before), 1e-12)
+            taps.append(Excursion(tap.first + 1, tap.stop, tap.ratio - 1, False, True, True, level))
+    return taps
 
 
 def _measure_unbalance(trace: Trace, e: Excursion) -> float:
