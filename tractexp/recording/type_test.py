@@ -211,7 +211,7 @@ class _Report:
         first = self.closed.start
         if first < self.least or self.voltage[first] < ALIVE_SHARE * self.voltage.max():
             return None
-        part = self.starting
+        part = self.start_part
         current = self.current[part]
         usual = float(np.median(self.current[running]))
         if not len(current) or current.min() < LEAST_STARTING_CURRENT * usual:
@@ -220,7 +220,7 @@ class _Report:
         return _measure("X_locked", impedance / ohm, "U/I at the start")
 
     @property
-    def starting(self) -> slice:
+    def start_part(self) -> slice:
         """The samples after the breaker closes in which a motor hardly turns."""
         assert self.closed is not None
         first = self.closed.start + self.edge
@@ -228,7 +228,7 @@ class _Report:
 
     def find_reactive_share(self) -> float:
         """The share of the reactance in the impedance at the start."""
-        drawn = self.course.S[self.starting]
+        drawn = self.course.S[self.start_part]
         return float(np.median(np.abs(np.imag(drawn)) / np.abs(drawn)))
 
     def measure_unbalance(self, ohm: float) -> TypeValue | None:
