@@ -21,7 +21,7 @@ from tractexp.recording.unit import SECONDARY_LINES
 
 ANGLES = frozenset(("U_angle", "U1_angle"))  # of the voltage, beside powers
 BESIDE = ANGLES | {"U2"}
-LARGEST_STEP = 1.15  # of a turn: an angle steps by less from row to row, wrapped or not
+LARGEST_TURN_STEP = 1.15  # of a turn: an angle steps by less from row to row, wrapped or not
 AGREES = 0.05  # of the apparent power, within which it is the product of voltage and current
 
 
@@ -108,7 +108,7 @@ def _turned_angle(one: MappedColumn, values: np.ndarray) -> tuple[np.ndarray, st
     Without a unit it is in degrees where it steps by more than a turn in rad, else in rad.
     """
     steps = np.abs(np.diff(values[np.isfinite(values)]))
-    by_degrees = float(steps.max(initial=0.0)) > LARGEST_STEP * 2 * np.pi
+    by_degrees = float(steps.max(initial=0.0)) > LARGEST_TURN_STEP * 2 * np.pi
     scale = factor(one.role.unit) if one.role.unit else np.pi / 180 if by_degrees else 1.0
     unit = one.role.unit or (
         "deg, for in rad it would step by more than a turn" if by_degrees else "rad"
