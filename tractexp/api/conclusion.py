@@ -94,7 +94,7 @@ def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result
     played = {fit.event.record.name for fit in fits}
     validate = [event for event in setup.validate if event.record.name in played]
     free = find_free_optimum(uncertainty, setup.model.held, fits, validate)
-    share, unrecorded = find_share_bound(uncertainty), uncertainty.unrecorded
+    unrecorded = uncertainty.unrecorded
     start = find_unsteady_start(uncertainty)
     fields = uncertainty.fields()
     told = fields["uncertainty"]
@@ -110,7 +110,7 @@ def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result
         starts=[s.to_dict(setup.problem.space.names) for s in details.estimation.starts],
         rival_structures=[rival.to_dict() for rival in uncertainty.rivals],
         free_optimum=free.to_dict() if free else {},
-        share_bound=share.to_dict() if share else {},
+        share_bound=find_share_bound(uncertainty),
         unrecorded=unrecorded.to_dict() if unrecorded else {},
         unsteady_start=start.to_dict() if start else {},
         advice=_advise(setup, result, details),
@@ -139,7 +139,7 @@ def _suggest_frequency(uncertainty: "Uncertainty") -> list[str]:
         return []
     still = "(task.frequency_swing=0 where it stood still)"
     if missing.course:
-        return [f"record f or U_angle: {missing.course} {still}"]
+        return [f"record f or U_angle: {missing.course['sentence']} {still}"]
     return [
         f"record f or U_angle: without it a swing of {missing.swing:g} Hz moves"
         f" {join_words(missing.beyond)} {still}"

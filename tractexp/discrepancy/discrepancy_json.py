@@ -51,7 +51,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
         "remainder": _remainder(investigation),
-        "frequency_course": _tell_course(investigation),
+        "frequency_course": investigation.frequency_course or None,
         "proposal": proposal_dict(investigation.proposed, generate.PLUGIN),
         "no_proposal": investigation.proposed.why or None,
         "recommendation": recommendation(investigation),
@@ -69,12 +69,6 @@ def content(investigation: Findings) -> dict[str, Any]:
         "parameters": parameters(investigation),
         "simulations": investigation.context.effort.simulations,
     }
-
-
-def _tell_course(investigation: Findings) -> dict[str, Any] | None:
-    """The course of a frequency that nobody recorded, where it explains what no effect does."""
-    course = investigation.frequency_course
-    return None if course is None else course.to_dict()
 
 
 def parameters(investigation: Findings) -> dict[str, dict[str, float]]:

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,6 @@ from tractexp.discrepancy.rest import Rest, find_shapes, share_of
 from tractexp.identification.conclude import at_bound
 from tractexp.identification.frequency_course import (
     FREQUENCY_SWING,
-    FrequencyCourse,
     find_course,
     is_frequency_unknown,
 )
@@ -324,14 +324,14 @@ class Findings:
         return [*self.final_grade.parameters, *held]
 
     @functools.cached_property
-    def frequency_course(self) -> FrequencyCourse | None:
-        """The course of a frequency that nobody recorded which explains what no effect does; None
+    def frequency_course(self) -> dict[str, Any]:
+        """The course of a frequency that nobody recorded which explains what no effect does; {}
         where there is none, or where an effect explains it.
         """
         uncertainty = self.base_grade.uncertainty
         unknown = is_frequency_unknown(uncertainty.likelihood.problem)
         if not unknown or self.verdict.word != UNEXPLAINED:
-            return None
+            return {}
         return find_course(uncertainty, FREQUENCY_SWING)
 
     @functools.cached_property

@@ -6,7 +6,7 @@ effect of the load: no other dip has the same course, so that it predicts none.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,29 +29,6 @@ FALL = 1.0  # s: within which the frequency follows a lost balance of power
 MOST_COURSE_STEPS = 12  # of the fit of a course
 COURSE_DIFFERENCE = 0.02  # of what is usual: the step of differences
 LEAST_EXPLAINED_BY_COURSE = 0.5  # of the model's error: a course that takes away less is not told
-
-
-@dataclass(frozen=True)
-class FrequencyCourse:
-    """A course of the frequency that explains most of what is left: how far it strays from nominal
-    [Hz], the model's error with and without it, and the parameters beside it.
-    """
-
-    strays: float
-    error: float
-    error_without: float
-    parameters: dict[str, float]
-
-    def to_dict(self) -> dict[str, Any]:
-        """As `result.json` has it."""
-        return {**vars(self), "sentence": str(self)}
-
-    def __str__(self) -> str:
-        return (
-            f"a frequency that nobody recorded, {self.strays:.2g} Hz from nominal at most, would"
-            f" leave {self.error:.2g} % of the response where {self.error_without:.2g} % are left:"
-            " a candidate of the measurement, and no effect of the load"
-        )
 
 
 def list_falls(event: Event) -> list[np.ndarray]:
@@ -90,12 +67,15 @@ def is_frequency_unknown(problem: Problem) -> bool:
     return problem.domain.lacks_frequency(problem.events) and not shipped
 
 
-def find_course(uncertainty: "Uncertainty", swing: float) -> FrequencyCourse | None:
-    """The course that explains what the estimate leaves; None where only noise is left, or where
-    none within `swing` [Hz] explains most of it.
+def find_course(uncertainty: "Uncertainty", swing: float) -> dict[str, Any]:
+    """The course that explains what the estimate leaves, as `result.json` has it; {} where only
+    noise is left, or where none within `swing` [Hz] explains most of it.
+
+    It says how far it `strays` from nominal [Hz], the model's `error` with it and `error_without`
+    [%], and the `parameters` beside it.
     """
     if uncertainty.exact:
-        return None
+        return {}
     fit = _CourseFit(uncertainty, swing)
     unit, sizes = fit.descend()
     likelihood, problem = fit.likelihood, fit.likelihood.problem
@@ -103,10 +83,19 @@ def find_course(uncertainty: "Uncertainty", swing: float) -> FrequencyCourse | N
     without = model_error(play(problem, uncertainty.values)).value
     error = model_error(play(drive_by_frequency(problem, deviations), values)).value
     if not error <= (1 - LEAST_EXPLAINED_BY_COURSE) * without:
-        return None
+        return {}
     strays = max(float(np.abs(deviation).max()) for deviation in deviations)
-    parameters = dict(zip(uncertainty.names, values.tolist(), strict=True))
-    return FrequencyCourse(strays, 100 * error, 100 * without, parameters)
+    return {
+        "strays": strays,
+        "error": 100 * error,
+        "error_without": 100 * without,
+        "parameters": dict(zip(uncertainty.names, values.tolist(), strict=True)),
+        "sentence": (
+            f"a frequency that nobody recorded, {strays:.2g} Hz from nominal at most, would leave"
+            f" {100 * error:.2g} % of the response where {100 * without:.2g} % are left: a"
+            " candidate of the measurement, and no effect of the load"
+        ),
+    }
 
 
 class _CourseFit:

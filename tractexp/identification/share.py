@@ -6,7 +6,6 @@ the factor up. Where the profile stays flat to the upper end, the estimate is on
 is told is where it begins to rise.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,38 +19,9 @@ from tractexp.inference.sized_problem import find_torque
 SHARES_HELD = 9  # over the range of the torque, all else fitted again at each
 
 
-@dataclass(frozen=True)
-class ShareBound:
-    """The least share of the motors in P that the records allow.
-
-    Attributes
-    ----------
-    low : float
-        That share.
-    high : float
-        The end of the range, up to which the records tell no difference.
-    profile : tuple of (share, error)
-        The fit's error over the least, at shares all over the range.
-    """
-
-    low: float
-    high: float
-    profile: tuple[tuple[float, float], ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """As `result.json` has it."""
-        rows = [{"share": share, "error": error} for share, error in self.profile]
-        return {"low": self.low, "high": self.high, "profile": rows, "sentence": str(self)}
-
-    def __str__(self) -> str:
-        return (
-            f"the motors draw at least {self.low:.0%} of P: from there to {self.high:.0%}, the end"
-            " of the range, these dips tell no difference"
-        )
-
-
-def find_share_bound(uncertainty: Uncertainty) -> ShareBound | None:
-    """The share of the motors, where the records bound it from below alone.
+def find_share_bound(uncertainty: Uncertainty) -> dict[str, Any]:
+    """The share of the motors, where the records bound it from below alone: `share_bound` of
+    `result.json`.
 
     Parameters
     ----------
@@ -60,34 +30,43 @@ def find_share_bound(uncertainty: Uncertainty) -> ShareBound | None:
 
     Returns
     -------
-    ShareBound or None
-        None where the records bound it on both sides or on none, and where no profile was drawn.
+    dict
+        `low`, the least share of the motors in P that the records allow; `high`, the end of the
+        range, up to which they tell no difference; `profile` [{share, error}], the fit's error over
+        the least at shares all over the range; and the `sentence`. {} where the records bound the
+        share on both sides or on none, and where no profile was drawn.
     """
     problem = uncertainty.likelihood.problem
     try:
         torque = find_torque(problem.model).name
     except UserError:
-        return None
+        return {}
     if torque not in uncertainty.profiled:
-        return None
+        return {}
     c = uncertainty.names.index(torque)
     lower, upper = uncertainty.lower[c], uncertainty.upper[c]
     low, high = uncertainty.intervals[c]
     near = BOUND_DISTANCE * (upper - lower)
     if high < upper - near or low <= lower + near:
-        return None
+        return {}
     drawn = float(np.mean([event.P0 for event in problem.events]))
     if not drawn > 0:
-        return None
-    profile = _draw_profile(uncertainty, c, drawn)
-    return ShareBound(float(low) / drawn, float(upper) / drawn, profile)
+        return {}
+    least, most = float(low) / drawn, float(upper) / drawn
+    return {
+        "low": least,
+        "high": most,
+        "profile": _draw_profile(uncertainty, c, drawn),
+        "sentence": (
+            f"the motors draw at least {least:.0%} of P: from there to {most:.0%}, the end of the"
+            " range, these dips tell no difference"
+        ),
+    }
 
 
-def _draw_profile(
-    uncertainty: Uncertainty, c: int, drawn: float
-) -> tuple[tuple[float, float], ...]:
-    """Pairs (share, error over the least) with coordinate c held at values all over its range, for
-    a load of `drawn` [pu].
+def _draw_profile(uncertainty: Uncertainty, c: int, drawn: float) -> list[dict[str, float]]:
+    """The share and the error over the least, with coordinate c held at values all over its range,
+    for a load of `drawn` [pu].
     """
     held = (np.arange(SHARES_HELD) + 0.5) / SHARES_HELD
     starts = np.tile(uncertainty.unit, (SHARES_HELD, 1))
@@ -100,4 +79,4 @@ def _draw_profile(
     errors = np.sqrt(ended.deviance / least)
     seen = np.isfinite(errors)
     pairs = zip(shares[seen].tolist(), errors[seen].tolist(), strict=True)
-    return tuple(pairs)
+    return [{"share": share, "error": error} for share, error in pairs]

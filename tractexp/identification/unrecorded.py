@@ -7,14 +7,13 @@ networks have them after a fault, to first order. A course that the fit would sh
 it no parameter takes up is no louder than what the fit leaves.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from tractexp.identification.frequency_course import (
-    FrequencyCourse,
     drive_by_frequency,
     find_course,
     is_frequency_unknown,
@@ -41,20 +40,19 @@ class UnrecordedInput:
         By how much that moves each parameter, in its unit.
     beyond : names
         Parameters that it moves beyond their intervals.
-    course : FrequencyCourse or None
-        The course that explains most of what the fit leaves.
+    course : dict
+        That of `find_course`, which explains most of what the fit leaves.
     """
 
     channel: str
     swing: float
     moves: dict[str, float]
     beyond: tuple[str, ...] = ()
-    course: FrequencyCourse | None = None  # that explains most of what is left
+    course: Mapping[str, Any] = field(default_factory=dict)  # that explains most of what is left
 
     def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
-        course = self.course.to_dict() if self.course else {}
-        return {**vars(self), "beyond": list(self.beyond), "course": course}
+        return {**vars(self), "beyond": list(self.beyond)}
 
 
 def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
