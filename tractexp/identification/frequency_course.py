@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tractexp.identification.fit import play
+from tractexp.inference.least_squares import descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import model_error
 from tractexp.inference.prior import weigh_prior
 from tractexp.inference.problem import Problem
+from tractexp.inference.separable import SeparableColumns
 from tractexp.record import Event
 
 if TYPE_CHECKING:
@@ -27,7 +29,7 @@ FREQUENCY_SWING = 0.2
 SWINGS = (0.3, 0.7, 1.5)
 FALL = 1.0  # s: within which the frequency follows a lost balance of power
 MOST_COURSE_STEPS = 12  # of the fit of a course
-COURSE_DIFFERENCE = 0.02  # of what is usual: the step of differences
+LEAST_COURSE_GAIN = 1e-3  # of the deviance: a step that gains less ends the fit
 LEAST_EXPLAINED_BY_COURSE = 0.5  # of the model's error: a course that takes away less is not told
 
 
@@ -76,10 +78,10 @@ def find_course(uncertainty: "Uncertainty", swing: float) -> dict[str, Any]:
     """
     if uncertainty.exact:
         return {}
-    fit = _CourseFit(uncertainty, swing)
-    unit, sizes = fit.descend()
-    likelihood, problem = fit.likelihood, fit.likelihood.problem
-    values, deviations = likelihood.values(unit), fit.spell(sizes)
+    likelihood = uncertainty.likelihood.of_records
+    problem = likelihood.problem
+    unit, deviations = _fit_course(likelihood, uncertainty, swing)
+    values = likelihood.values(unit)
     without = model_error(play(problem, uncertainty.values)).value
     error = model_error(play(drive_by_frequency(problem, deviations), values)).value
     if not error <= (1 - LEAST_EXPLAINED_BY_COURSE) * without:
@@ -98,61 +100,38 @@ def find_course(uncertainty: "Uncertainty", swing: float) -> dict[str, Any]:
     }
 
 
-class _CourseFit:
-    """Parameters and, of each event, the sizes (E, k) of what its course is made of."""
+def _fit_course(
+    likelihood: Likelihood, uncertainty: "Uncertainty", swing: float
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Coordinates (D,) of the parameters, and the deviations (N,) [Hz] of each event.
 
-    def __init__(self, uncertainty: "Uncertainty", swing: float):
-        self.likelihood = uncertainty.likelihood.of_records
-        self.start = uncertainty.unit
-        problem = self.likelihood.problem
-        self.courses = [swing * _list_courses(event) for event in problem.events]
-        self.weight = weigh_prior(problem.events, problem.drive, self.likelihood.free)
+    Beside the parameters the sizes of what a course is made of are free, from -1 to 1 times the
+    swing; a size acts on the rows of its own event, and is held near 0 by a row of its own.
+    """
+    problem, free = likelihood.problem, likelihood.free
+    courses = [swing * _list_courses(event) for event in problem.events]
+    numbers = np.arange(len(courses) * len(courses[0])).reshape(len(courses), -1)
+    weight = weigh_prior(problem.events, problem.drive, free)
 
-    def descend(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates (D,) of the parameters, and sizes (E, k)."""
-        from scipy.optimize import least_squares
+    def spell(point: np.ndarray) -> list[np.ndarray]:
+        sizes = 2 * point[free + numbers] - 1
+        return [own @ shapes for own, shapes in zip(sizes, courses, strict=True)]
 
-        free = len(self.start)
-        sizes = np.zeros((len(self.courses), len(self.courses[0])))
-        start = np.concatenate([np.clip(self.start, 1e-9, 1 - 1e-9), sizes.ravel()])
-        low = np.concatenate([np.zeros(free), -np.ones(sizes.size)])
-        ended = least_squares(
-            lambda x: self._rows(x[:free], x[free:].reshape(sizes.shape)),
-            start,
-            lambda x: self._jacobian(x[:free], x[free:].reshape(sizes.shape)),  # pyright: ignore
-            bounds=(low, np.ones(len(start))),
-            ftol=1e-3,
-            xtol=1e-4,
-            max_nfev=MOST_COURSE_STEPS,
-        )
-        return ended.x[:free], ended.x[free:].reshape(sizes.shape)
+    def play_course(point: np.ndarray) -> np.ndarray:
+        driven = drive_by_frequency(problem, spell(point))
+        return replace(likelihood, problem=driven).rows(point[None, :free])[0]
 
-    def spell(self, sizes: np.ndarray) -> list[np.ndarray]:
-        """The deviations (N,) [Hz] of each event."""
-        return [own @ courses for own, courses in zip(sizes, self.courses, strict=True)]
+    def rows(points: np.ndarray, _: np.ndarray) -> np.ndarray:
+        held = weight * (2 * points[:, free:] - 1)
+        return np.concatenate([np.array([play_course(point) for point in points]), held], axis=1)
 
-    def _rows(self, unit: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        rows = self._driven(sizes).rows(unit[None])[0]
-        return np.concatenate([np.nan_to_num(rows, nan=1e6), self.weight * sizes.ravel()])
-
-    def _jacobian(self, unit: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Derivatives (R + E k, D + E k): a size acts on the rows of its own event alone."""
-        drive = self.likelihood.problem.drive
-        rows, sensitivities = self._driven(sizes).jacobian(unit)
-        free, samples = len(unit), len(rows)
-        J = np.zeros((samples + sizes.size, free + sizes.size))
-        J[:samples, :free] = sensitivities.shared_columns
-        J[samples:, free:] = self.weight * np.eye(sizes.size)
-        at = np.arange(drive.channels * drive.samples).reshape(drive.channels, drive.samples)
-        places = [at[:, drive.part(e)].ravel() for e in range(drive.events)]
-        for k in range(sizes.shape[1]):
-            moved = sizes.copy()
-            moved[:, k] += COURSE_DIFFERENCE
-            change = (self._driven(moved).rows(unit[None])[0] - rows) / COURSE_DIFFERENCE
-            for e, own in enumerate(places):
-                J[own, free + e * sizes.shape[1] + k] = change[own]
-        return np.nan_to_num(J)
-
-    def _driven(self, sizes: np.ndarray) -> Likelihood:
-        problem = drive_by_frequency(self.likelihood.problem, self.spell(sizes))
-        return replace(self.likelihood, problem=problem)
+    recorded = SeparableColumns.of_power(problem.drive, None).rows
+    own_rows = tuple(
+        np.r_[mine, problem.drive.measurements.size + own]
+        for mine, own in zip(recorded, numbers, strict=True)
+    )
+    apart = SeparableColumns(free + numbers, own_rows)
+    start = np.r_[uncertainty.unit, np.full(numbers.size, 0.5)]
+    tolerance = LEAST_COURSE_GAIN * uncertainty.deviance
+    end = descend(rows, start[None], None, MOST_COURSE_STEPS, tolerance, apart).unit[0]
+    return end[:free], spell(end)
