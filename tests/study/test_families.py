@@ -58,8 +58,8 @@ def found(effect, size, seed, only):
 def test_the_catalogues_own_trip_keeps_its_name_beside_its_members():
     made = found("undervoltage_trip", 1.0, 800011, TRIPS[:1])
     assert made.names == ("undervoltage_trip",)
-    (form,) = forms(made)
-    assert form.law == "catalogue"
+    ((_, form),) = forms(made)
+    assert form["law"] == "catalogue"
     # the others are far behind after a few iterations
     assert ("two_stage_trip",) in made.explanations.refits
 
@@ -132,8 +132,8 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     made = found("static_part_trip", 2.0, 820001, TRIPS[:1])
     assert made.verdict.word == "named"
     assert made.catalogue.textbook(made.names) == ("undervoltage_trip",)
-    (form,) = forms(made)
-    assert (form.effect.name, form.effect.differs) == ("static_trip", "of the static load only")
+    ((_, form),) = forms(made)
+    assert (form["effect"], form["differs"]) == ("static_trip", "of the static load only")
     at = made.context.coordinates
     assert at.value("static_tripped", made.extended_fit.unit) == pytest.approx(0.2, abs=0.01)
     assert made.validate.explained_share > 0.9
@@ -157,8 +157,8 @@ def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, see
     textbook = get("effect", member).family
     made = found(hidden, size, seed, (textbook,))
     assert made.verdict.word == "named"
-    (form,) = forms(made)
-    assert (form.name, form.effect.name) == (textbook, member)
+    ((name, form),) = forms(made)
+    assert (name, form["effect"]) == (textbook, member)
     assert made.validate.explained_share > 0.9
 
 
@@ -169,8 +169,8 @@ def test_a_bounded_flux_is_a_saturation_with_a_round_corner():
     """
     made = events("froelich_saturation", size=1.8, seed=820081, count=4, noise=LOUD, recorder=FAST)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=("magnetic_saturation",))
-    (form,) = forms(told)
-    assert form.effect.name == "saturation_curve"
+    ((_, form),) = forms(told)
+    assert form["effect"] == "saturation_curve"
     assert told.context.coordinates.value("saturation_rounding", told.extended_fit.unit) > 0.1
     assert told.validate.explained_share > 0.85
 

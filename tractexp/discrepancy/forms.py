@@ -3,7 +3,6 @@ curve found.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,74 +16,37 @@ CATALOGUE, OTHER = "catalogue", "other"
 SLOPE_STEP = 0.05  # of a standard error: the step by which a curve's slopes are taken
 
 
-@dataclass(frozen=True, eq=False)
-class FittedLaw:
-    """A law as it was found: `curve`, its 95 % band (2, n), and the `textbook` law that fits best,
-    (n,).
+def forms(findings: Findings) -> list[tuple[str, dict[str, Any]]]:
+    """The catalogue's name of each effect of the verdict, and its form as `discrepancy.json` has
+    it: of the member of its family that is in the model.
     """
-
-    curve: Curve
-    band: np.ndarray
-    textbook: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class EffectForm:
-    """One effect named: `name` is the catalogue's, `effect` the member of its family that is in the
-    model.
-    """
-
-    name: str
-    effect: Effect
-    law_fit: FittedLaw | None
-
-    @property
-    def law(self) -> str:
-        """Whether it is the catalogue's place and formula, or another."""
-        return OTHER if self.effect.family else CATALOGUE
-
-    def to_dict(self) -> dict[str, Any]:
-        """As `discrepancy.json` holds it."""
-        law = self.law_fit
-        return {
-            "place": list(self.effect.places),
-            "kind": self.effect.kind,
-            "law": self.law,
-            "differs": self.effect.differs,
-            "effect": self.effect.name,
-            "curve": law
-            and {
-                "x": law.curve.x.tolist(),
-                "y": law.curve.y.tolist(),
-                "lower": law.band[0].tolist(),
-                "upper": law.band[1].tolist(),
-                "textbook": law.textbook.tolist(),
-                "x_label": law.curve.x_label,
-                "y_label": law.curve.y_label,
-            },
-        }
-
-
-def forms(findings: Findings) -> list[EffectForm]:
-    """The form of each effect of the verdict."""
     at = findings.catalogue
-    return [
-        EffectForm(at.family(name), at[name].effect, _curve(findings, at[name].effect))
-        for name in findings.names
-    ]
-
-
-def by_name(forms: Sequence[EffectForm]) -> dict[str, dict[str, Any]]:
-    """Forms by the catalogue's names; a second one of a family by its own."""
-    rows: dict[str, dict[str, Any]] = {}
-    for form in forms:
-        rows[form.effect.name if form.name in rows else form.name] = form.to_dict()
+    rows = []
+    for name in findings.names:
+        effect = at[name].effect
+        form = {
+            "place": list(effect.places),
+            "kind": effect.kind,
+            "law": OTHER if effect.family else CATALOGUE,
+            "differs": effect.differs,
+            "effect": effect.name,
+            "curve": _curve(findings, effect),
+        }
+        rows.append((at.family(name), form))
     return rows
 
 
-def _curve(findings: Findings, effect: Effect) -> FittedLaw | None:
-    """The law found with its band, by the slopes of the curve along the parameters; None of what is
-    no curve.
+def by_name(forms: Sequence[tuple[str, dict[str, Any]]]) -> dict[str, dict[str, Any]]:
+    """Forms by the catalogue's names; a second one of a family by its own."""
+    rows: dict[str, dict[str, Any]] = {}
+    for name, form in forms:
+        rows[form["effect"] if name in rows else name] = form
+    return rows
+
+
+def _curve(findings: Findings, effect: Effect) -> dict[str, Any] | None:
+    """The law found with its 95 % band, by the slopes of the curve along the parameters, and the
+    textbook law that fits best; None of what is no curve.
     """
     at, unit, tests = findings.context.coordinates, findings.extended_fit.unit, findings.tests
     values = {p.name: at.value(p.name, unit) for p in effect.parameters}
@@ -99,11 +61,15 @@ def _curve(findings: Findings, effect: Effect) -> FittedLaw | None:
     half = interval_factor(tests.freedom) * np.sqrt(
         np.einsum("kn,kl,ln->n", J, spread[np.ix_(free, free)], J)
     )
-    return FittedLaw(
-        curve,
-        np.stack([curve.y - half, curve.y + half]),
-        _draw_textbook_law(findings, effect, values, curve),
-    )
+    return {
+        "x": curve.x.tolist(),
+        "y": curve.y.tolist(),
+        "lower": (curve.y - half).tolist(),
+        "upper": (curve.y + half).tolist(),
+        "textbook": _draw_textbook_law(findings, effect, values, curve).tolist(),
+        "x_label": curve.x_label,
+        "y_label": curve.y_label,
+    }
 
 
 def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float) -> np.ndarray:

@@ -2,13 +2,16 @@
 equations.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import use_of
 from tractexp.discrepancy.findings import Findings
-from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
+from tractexp.discrepancy.forms import CATALOGUE, forms
 from tractexp.identification.verdict import brief
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.model.model import compose
@@ -26,13 +29,13 @@ def laws(page: Report, findings: Findings) -> None:
     page.heading("Where it acts, and by which law")
     rows = [
         [
-            f.name,
-            join_words(f.effect.places),
-            KINDS[f.effect.kind] if f.effect.kind else "",
-            f"the {f.law}'s" if f.law == CATALOGUE else f.effect.differs,
-            f.effect.name,
+            name,
+            join_words(form["place"]),
+            KINDS[form["kind"]] if form["kind"] else "",
+            f"the {CATALOGUE}'s" if form["law"] == CATALOGUE else form["differs"],
+            form["effect"],
         ]
-        for f in entries
+        for name, form in entries
     ]
     page.table(
         ["effect", "where", "what it does there", "law", "effect in the model"],
@@ -41,23 +44,25 @@ def laws(page: Report, findings: Findings) -> None:
         " formula may leave nothing where the right one is of another law.",
         words=(1, 2, 3, 4),
     )
-    for form in entries:
-        if form.law_fit is not None:
+    for name, form in entries:
+        if form["curve"] is not None:
             page.chart(
-                _curve(form.law_fit),
-                f"{form.name}: the law found, with its 95 % band, beside the catalogue's as it fits"
+                _curve(form["curve"]),
+                f"{name}: the law found, with its 95 % band, beside the catalogue's as it fits"
                 " these events best.",
             )
 
 
-def _curve(fitted: FittedLaw) -> Chart:
+def _curve(law: Mapping[str, Any]) -> Chart:
     """The law found with its band, beside the catalogue's."""
-    law = fitted.curve
-    chart = Chart(law.x_label, [law.y_label], pixels=320)
-    chart.band("", law.x, fitted.band[0], fitted.band[1], CURVE)
-    chart.line("the law found", law.x, law.y, CURVE, width=2.2)
-    chart.line("the catalogue's law", law.x, fitted.textbook, TEXTBOOK, dash="dash")
-    shown = np.concatenate([law.y, fitted.textbook])
+    x, y, lower, upper, textbook = (
+        np.array(law[key]) for key in ("x", "y", "lower", "upper", "textbook")
+    )
+    chart = Chart(law["x_label"], [law["y_label"]], pixels=320)
+    chart.band("", x, lower, upper, CURVE)
+    chart.line("the law found", x, y, CURVE, width=2.2)
+    chart.line("the catalogue's law", x, textbook, TEXTBOOK, dash="dash")
+    shown = np.concatenate([y, textbook])
     room = 0.25 * max(float(np.ptp(shown)), 1e-6)
     return chart.limits(0, float(shown.min()) - room, float(shown.max()) + room)
 

@@ -84,7 +84,7 @@ def _numbers(page: Report, proposal: Proposal) -> None:
     page.table(
         ["event", "from t [s]", "to t [s]", "channel", "largest change [pu]"],
         [
-            [a.event, f"{a.start:.3f}", f"{a.end:.3f}", a.channel, f"{a.most:+.3g}"]
+            [a["event"], f"{a['start']:.3f}", f"{a['end']:.3f}", a["channel"], f"{a['most']:+.3g}"]
             for a in proposal.acting
         ],
         "When it acts: where it changes what is calculated by more than a tenth of the most it"
@@ -104,7 +104,7 @@ def _add_explanation(page: Report, proposal: Proposal) -> None:
         for role, change, judged in zip(
             ("fitted", "held out"),
             proposal.changes,
-            (proposal.train, proposal.validate),
+            (proposal.judged.train, proposal.judged.validate),
             strict=True,
         )
     ]
@@ -113,13 +113,14 @@ def _add_explanation(page: Report, proposal: Proposal) -> None:
         rows,
         "Errors are of the response, both models as least squares fit them; explained is the"
         " term's part of what it gains and what pushes into the balances or the other terms tried"
-        f" would gain beside it, beyond chance; {chance(proposal.p)}.",
+        f" would gain beside it, beyond chance; {chance(proposal.judged.p)}.",
     )
 
 
 def _plot_term(page: Report, proposal: Proposal) -> None:
     """Add a chart for each event: what the base model misses, and what the term makes of it."""
-    for role, judged in (("fitted", proposal.train), ("held out", proposal.validate)):
+    of_events = proposal.judged.train, proposal.judged.validate
+    for role, judged in zip(("fitted", "held out"), of_events, strict=True):
         page.text(
             "What the base model misses, and what the model with the term draws beyond it"
             f" ({role}):"

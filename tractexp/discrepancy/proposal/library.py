@@ -17,8 +17,8 @@ from tractexp.model.equations import Equations
 from tractexp.parameter import Parameter
 
 SOURCE = "a term proposed by the data; see docs/missing-effects.md"
-# kinds of signals: functions of voltage and states, and functions of time
-ANSWER, TIMED = "answer", "timed"
+# kinds of signals: functions of voltage and states, functions of time, and what these count by
+ANSWER, TIMED, CLOCK = "answer", "timed", "clock"
 
 Grid = tuple[float, ...]
 
@@ -44,14 +44,14 @@ class Shape:
 
 @dataclass(frozen=True)
 class Signal:
-    """What a term follows. `shape` is the function of `shapes`; `latex` formats its parameters'
-    symbols by name.
+    """What a term follows, or the clock that a function of time counts by. `latex` formats the
+    symbols of its parameters.
     """
 
     name: str
     kind: str
     words: str
-    latex: str
+    latex: str = ""
     shapes: tuple[Shape, ...] = ()
     needs: str = ""  # of the equations: "" nothing, or the name of what must be there
 
@@ -69,19 +69,6 @@ class Signal:
             *(s.grid[:1] if s.name == "phase" else s.grid for s in self.shapes)
         )
         return [dict(zip((s.name for s in self.shapes), chosen, strict=True)) for chosen in values]
-
-
-@dataclass(frozen=True)
-class Clock:
-    """By what a function of time counts."""
-
-    name: str
-    words: str
-
-    @property
-    def build(self) -> Callable[..., Any]:
-        """The function that writes it into equations."""
-        return getattr(shapes, self.name)
 
 
 @dataclass(frozen=True)
@@ -146,7 +133,7 @@ class Term:
 
     balance: Balance
     signal: Signal
-    clock: Clock | None = None
+    clock: Signal | None = None
 
     @property
     def name(self) -> str:
@@ -280,9 +267,9 @@ SIGNALS = (
 )  # fmt: skip
 
 CLOCKS = (
-    Clock("of_record", "at a time of the record"),
-    Clock("of_dip", "at a time after the dip begins"),
-    Clock("of_return", "at a time after the voltage returns"),
+    Signal("of_record", CLOCK, "at a time of the record"),
+    Signal("of_dip", CLOCK, "at a time after the dip begins"),
+    Signal("of_return", CLOCK, "at a time after the voltage returns"),
 )
 
 _PU, _SHARE = Size("size", 2.0, "pu", 0.02, power_exponent=1), Size("size", 3.0, "1", 0.05)

@@ -4,11 +4,12 @@ and chance judge.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.gap import Curves, GapTest
+from tractexp.discrepancy.gap import Curves
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
@@ -34,31 +35,18 @@ LEAST_ACTING_SHARE = 0.1  # of the largest change: from where a term is said to 
 LOOKS_LIKE = 0.5  # of a term's change that a textbook effect could have made
 
 
-@dataclass(frozen=True)
-class Acting:
-    """When a term acts in one event: the times of the record [s] between which it changes the load,
-    and how much.
-    """
-
-    event: str
-    start: float
-    end: float
-    channel: str
-    most: float  # pu
-
-
 @dataclass(frozen=True, eq=False)
 class Proposal:
     """A term that held-out events confirm."""
 
     term: Term
     estimates: tuple[ParameterEstimate, ...]
-    train: GapTest
-    validate: GapTest
+    judged: TermAssessment
     # what it leaves of the fitted and of the held-out events by least squares
     changes: tuple[Change[Curves], Change[Curves]]
-    p: float
-    acting: tuple[Acting, ...]
+    # when it acts, a row an event: between which times of the record [s] it changes the load, in
+    # which channel the most, and by how much [pu]
+    acting: tuple[dict[str, Any], ...]
     # with the shares they explain on fitted and on held-out events
     ties: tuple[tuple[Term, float, float], ...]
     # textbook effects, and the share of its change that each could have made
@@ -139,10 +127,8 @@ def _proposal(
     return Proposal(
         term=term,
         estimates=estimates,
-        train=chosen.train,
-        validate=chosen.validate,
+        judged=chosen,
         changes=measure_changes(result, chosen.fit, held),
-        p=chosen.p,
         acting=tuple(_find_acting_places(result, chosen.fit)),
         ties=tuple(
             (result.term(o.fit), o.train.explained_share, o.validate.explained_share)
@@ -172,7 +158,7 @@ def change(result: TermFits, fit: Refit) -> np.ndarray:
     return with_it - alone
 
 
-def _find_acting_places(result: TermFits, fit: Refit) -> list[Acting]:
+def _find_acting_places(result: TermFits, fit: Refit) -> list[dict[str, Any]]:
     """Where in each event a term changes a channel by more than a tenth of the most it does."""
     context = result.context
     added = change(result, fit)
@@ -185,13 +171,13 @@ def _find_acting_places(result: TermFits, fit: Refit) -> list[Acting]:
             t = event.record.t[event.record.samples - own.shape[1] :]
             most = float(own[channel][np.abs(own[channel]).argmax()])
             terms.append(
-                Acting(
-                    event.record.name,
-                    float(t[seen[0]]),
-                    float(t[seen[-1]]),
-                    context.drive.names[channel],
-                    most,
-                )
+                {
+                    "event": event.record.name,
+                    "start": float(t[seen[0]]),
+                    "end": float(t[seen[-1]]),
+                    "channel": context.drive.names[channel],
+                    "most": most,
+                }
             )
     return terms
 
@@ -224,7 +210,7 @@ def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | Non
     """The proposal as `discrepancy.json` has it; `plugin` is the path of its file."""
     if (proposal := proposed.proposal) is None:
         return None
-    judged = ("train", proposal.train), ("validate", proposal.validate)
+    judged = ("train", proposal.judged.train), ("validate", proposal.judged.validate)
     return {
         "terms": [
             _name_term(proposal.term)
@@ -235,8 +221,8 @@ def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | Non
         ],
         "explained": {role: gap.explained_share for role, gap in judged},
         "left": {role: gap.after.chi2_per_sample for role, gap in judged},
-        "p": proposal.p,
-        "when": [vars(a) for a in proposal.acting],
+        "p": proposal.judged.p,
+        "when": list(proposal.acting),
         "ties": [
             _name_term(t) | {"explained": {"train": near, "validate": held}}
             for t, near, held in proposal.ties
