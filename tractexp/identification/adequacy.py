@@ -10,7 +10,7 @@ much. Where it may not, the size of the model's error grades it: an effect is mi
 is the wrong one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -136,15 +136,15 @@ def surprise(
         )
         return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
 
-    excess = squares and Excess.from_fit(squares, unit, J, least)
+    excess = squares and compare_with_squares(squares, unit, J, least)
     own = basis.project_out(rows[None])
-    parts = [compute_statistics(own) | ({APART: excess.of_records} if excess else {})]
+    parts = [compute_statistics(own) | ({APART: excess[0]} if excess else {})]
     together = max(1, MOST_NUMBERS // len(rows))
     for some in np.split(drawn, range(together, FIT_DRAWS, together)):
         white = likelihood.whiten(some)
         parts.append(
             compute_statistics(basis.project_out(white))
-            | ({APART: excess.of_draws(white, some)} if excess else {})
+            | ({APART: excess[1](white, some)} if excess else {})
         )
     by_test = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     values, draws = (
@@ -176,53 +176,43 @@ def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Excess:
+def compare_with_squares(
+    squares: Likelihood, unit: np.ndarray, J: Sensitivities, least: float
+) -> tuple[np.ndarray, Callable[[np.ndarray, np.ndarray], np.ndarray]]:
     """What the likelihood leaves of Eq. (8) over what least squares leave.
 
-    Attributes
+    Parameters
     ----------
-    of_records : (1,)
-        That ratio for the records.
-    likelihood : Likelihood
-        Eq. (8) with P0 and Q0 free.
+    squares : Likelihood
+        That of Eq. (8).
+    unit : (D,)
+        Coordinates of the likelihood's fit.
     J : Sensitivities
         Whitened by the noise, to the coordinates off their bounds.
-    plain, inside : Sensitivities
-        Those of Eq. (8), to all coordinates and to those off their bounds.
-    squares : SeparableBasis
-        What least squares reach.
+    least : float
+        The least sum of squares of Eq. (8).
+
+    Returns
+    -------
+    (1,) array
+        That ratio for the records.
+    (white, drawn) -> (b,)
+        That of draws of noise (b, C, N) [pu], which whitened are `white` (b, R).
     """
+    likelihood = squares.with_initial_power
+    rows, plain = likelihood.jacobian(unit)
+    inside, k = off_walls(unit), plain.k
+    off_bounds = plain.only(inside)
+    reached = plain.only(inside & (np.arange(len(inside)) < k)).basis()
 
-    of_records: np.ndarray
-    likelihood: Likelihood
-    J: Sensitivities
-    plain: Sensitivities
-    inside: Sensitivities
-    squares: SeparableBasis
-
-    @classmethod
-    def from_fit(
-        cls, squares: Likelihood, unit: np.ndarray, J: Sensitivities, least: float
-    ) -> "Excess":
-        """The excess of a fit at coordinates (D,), where `least` is the least sum of squares of
-        Eq. (8).
-        """
-        likelihood = squares.with_initial_power
-        rows, plain = likelihood.jacobian(unit)
-        inside = off_walls(unit)
-        of_records = np.array([rows @ rows / max(least, 1e-300)])
-        free = plain.only(inside & (np.arange(len(inside)) < plain.k))
-        return cls(of_records, likelihood, J, plain, plain.only(inside), free.basis())
-
-    def of_draws(self, white: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-        """The excess (b,) of draws of noise (b, C, N) [pu], which whitened are `white` (b, R)."""
-        raw = self.likelihood.whiten(drawn)
-        k = self.plain.k
-        likely = raw - self.inside.times(self.J.fit(white))
-        shifted = raw + self.plain.times(np.pad(_means(self.likelihood, drawn), ((0, 0), (k, 0))))
-        rest = self.squares.project_out(shifted)
+    def compare_draws(white: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+        raw = likelihood.whiten(drawn)
+        likely = raw - off_bounds.times(J.fit(white))
+        shifted = raw + plain.times(np.pad(_means(likelihood, drawn), ((0, 0), (k, 0))))
+        rest = reached.project_out(shifted)
         return (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)
+
+    return np.array([rows @ rows / max(least, 1e-300)]), compare_draws
 
 
 def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:

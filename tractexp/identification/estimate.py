@@ -24,7 +24,7 @@ import numpy as np
 from tractexp.errors import MODEL, TASK, UserError
 from tractexp.identification.adequacy import Surprise, surprise
 from tractexp.identification.residual_noise import drop_outliers, noise_at
-from tractexp.identification.uncertainty import LocalMinimum, Uncertainty, conclude, threshold
+from tractexp.identification.uncertainty import Uncertainty, conclude, threshold
 from tractexp.inference.blocks import blocks_of, exceeds
 from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
@@ -392,16 +392,12 @@ def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertaint
     rows = uncertainty.likelihood.rows(units) if len(units) else np.empty((0, 1))
     above = (rows**2).sum(axis=1) - uncertainty.deviance
     apart = np.abs(units - uncertainty.unit).max(axis=1, initial=0.0) > SAME_MINIMUM_DISTANCE
-    local_minima = [
-        LocalMinimum(unit, uncertainty.likelihood.values(unit), float(a))
-        for unit, a in zip(units[apart], above[apart], strict=True)
-        if a < threshold()
-    ]
+    beside = replace(uncertainty, local_minima=tuple(units[apart & (above < threshold())]))
     verdicts, own = dict(uncertainty.verdicts), uncertainty.intervals
-    for minimum in local_minima:
-        for j in np.flatnonzero((minimum.values < own[:, 0]) | (minimum.values > own[:, 1])):
-            name, value = uncertainty.names[j], float(minimum.values[j])
+    for values in beside.values_elsewhere:
+        for j in np.flatnonzero((values < own[:, 0]) | (values > own[:, 1])):
+            name = uncertainty.names[j]
             verdicts[name] = verdicts[name].add_objection(
-                f"another valley, at {value:.4g}, fits as well"
+                f"another valley, at {values[j]:.4g}, fits as well"
             )
-    return replace(uncertainty, verdicts=verdicts, local_minima=tuple(local_minima))
+    return replace(beside, verdicts=verdicts)

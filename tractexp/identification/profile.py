@@ -339,7 +339,7 @@ def _elsewhere(
     uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[LikelihoodProfile]
 ) -> Lanes:
     """Lanes from the best place of each range beyond the profile's interval that fits as well."""
-    begin = np.array([uncertainty.unit, *(minimum.unit for minimum in uncertainty.local_minima)])
+    begin = np.array([uncertainty.unit, *uncertainty.local_minima])
     wanted = []  # (column, value in the range)
     for c, profile in zip(column, curves, strict=True):
         low, high = _in_range(uncertainty, c, profile.interval)

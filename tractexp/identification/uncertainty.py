@@ -31,25 +31,6 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class LocalMinimum:
-    """Another minimum that fits as well.
-
-    Attributes
-    ----------
-    unit : (D,)
-        Its coordinates.
-    values : (d,)
-        The free values there.
-    above : float
-        Its deviance above the best.
-    """
-
-    unit: np.ndarray
-    values: np.ndarray
-    above: float
-
-
-@dataclass(frozen=True, eq=False)
 class Uncertainty:
     """What is known about d free parameters.
 
@@ -80,8 +61,8 @@ class Uncertainty:
         What happened on the way.
     profiled : {name: (lower, upper)}
         Intervals by profile, which replace those by curvature.
-    local_minima : tuple of LocalMinimum
-        Others that fit as well.
+    local_minima : tuple of (D,) arrays
+        Coordinates of others that fit as well.
     rivals : tuple of RivalStructure
         Structures that fit as well.
     unrecorded : UnrecordedInput or None
@@ -101,17 +82,19 @@ class Uncertainty:
     notes: list[str]
     # intervals that replace the curvature's
     profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    local_minima: tuple[LocalMinimum, ...] = ()  # others that fit as well
+    local_minima: tuple[np.ndarray, ...] = ()  # others that fit as well
     rivals: "tuple[RivalStructure, ...]" = ()  # structures that fit as well
     unrecorded: "UnrecordedInput | None" = None  # an input that the records lack
 
     @property
     def elsewhere(self) -> np.ndarray:
         """Whether another local minimum has a value (d,) beyond the interval by curvature."""
-        values = np.array([minimum.values for minimum in self.local_minima]).reshape(
-            -1, len(self.names)
-        )
-        return np.any(np.abs(values - self.values) > self.half, axis=0)
+        return np.any(np.abs(self.values_elsewhere - self.values) > self.half, axis=0)
+
+    @property
+    def values_elsewhere(self) -> np.ndarray:
+        """The free values (n, d) at the other local minima."""
+        return self.likelihood.values(np.array(self.local_minima).reshape(-1, len(self.unit)))
 
     @property
     def half(self) -> np.ndarray:
@@ -237,11 +220,9 @@ class Uncertainty:
         ends = self.values[:, None] + self.half[:, None] * [-1.0, 1.0]
         for name, interval in self.profiled.items():
             ends[self.names.index(name)] = interval
-        for minimum in self.local_minima:
-            ends = np.stack(
-                [np.minimum(ends[:, 0], minimum.values), np.maximum(ends[:, 1], minimum.values)],
-                axis=1,
-            )
+        for values in self.values_elsewhere:
+            low, high = ends.T
+            ends = np.stack([np.minimum(low, values), np.maximum(high, values)], axis=1)
         own = ends.copy()
         for rival in () if self.exact else self.rivals:
             there = [
