@@ -51,12 +51,14 @@ def at_fit(c, p, names=(), fault_p=1.0, blur=0.0, left=1.0):
         fit=SimpleNamespace(names=names),
         noise=SimpleNamespace(loudest_input_mode=blur),
         tangent=SimpleNamespace(context=SimpleNamespace(criteria=c)),
-        projection=SimpleNamespace(fault_p=lambda: {"time_skew": np.array([fault_p])}),
+        projection=SimpleNamespace(
+            fault_p=lambda: {"time_skew": np.array([fault_p])},
+            scores=lambda: [Score("an effect", 10.0, p, {}, {}, {})],
+        ),
         chance=SimpleNamespace(
             critical_p=Chance(np.arange(1, 1001) / 1000, {}).critical_p,
             surprises=lambda *_: {"a test": left},
         ),
-        scores=[Score("an effect", 10.0, p, {}, {}, {})],
     )
 
 

@@ -14,7 +14,7 @@ import tractexp
 from tractexp.configuration.plugin import build_chosen
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.window_search import WindowFit, _choose_window
+from tractexp.discrepancy.window_search import _choose_window
 from tractexp.domain.excitation import phasors
 from tractexp.errors import UserError
 from tractexp.inference.criteria import Criteria
@@ -184,8 +184,12 @@ def test_a_window_must_show_whether_or_not_the_records_say_it(gained, said, beli
     """
     window = SimpleNamespace(said=said)
     behind = SimpleNamespace(records=SimpleNamespace(window=window))
-    first = SimpleNamespace(scores=[SimpleNamespace(drop=3000.0)], criteria=Criteria())
-    tried = WindowFit(behind, None, gained)
+    first = SimpleNamespace(
+        scores=[SimpleNamespace(drop=3000.0)],
+        criteria=Criteria(),
+        fit=SimpleNamespace(deviance=9000.0),
+    )
+    tried = behind, SimpleNamespace(deviance=9000.0 - gained)
     assert _choose_window([tried], first) is (tried if believed else None)
 
 

@@ -38,8 +38,6 @@ class Disagreement:
         These, whitened and with the nuisances projected out.
     chance : Chance
         The null distribution of every statistic.
-    scores : list of Score
-        What each further effect would gain, the best first.
     robust : (k, d) or None
         Rows of the covariance where what is left is no noise; None: that of independent residuals.
     """
@@ -49,7 +47,6 @@ class Disagreement:
     tangent: Linearization
     projection: ScoreTest
     chance: Chance
-    scores: list[Score]  # of the candidates outside the fit, the rarest by chance first
     robust: np.ndarray | None = None  # (k, d) as `root`, where what is left is no noise
 
     @property
@@ -77,15 +74,12 @@ class Disagreement:
     def score_fit(self, context: Context, fit: Refit, noise: Noise) -> "Disagreement":
         """The scores at another fit under a noise, by what chance does at this one."""
         t = tangent(context, fit, noise)
-        projection = t.build_score_test(noise)
-        return Disagreement(
-            fit,
-            noise,
-            t,
-            projection,
-            self.chance,
-            projection.scores(),
-        )
+        return Disagreement(fit, noise, t, t.build_score_test(noise), self.chance)
+
+    @functools.cached_property
+    def scores(self) -> list[Score]:
+        """What each effect outside the fit would gain, the rarest by chance first."""
+        return self.projection.scores()
 
     @property
     def criteria(self) -> Criteria:
@@ -212,10 +206,10 @@ def examine_fit(
         if fit.deviance > QUIETER * context.samples:
             break  # else this is the noise of a worse fit
     projection = t.build_score_test(noise)
-    scores = projection.scores()
     chance = chance_at(t, projection, noise, quiet, seed, plain=True)
-    result = Disagreement(fit, noise, t, projection, chance, scores)
-    plain = plain or is_noise_exact(context, noise) or (bool(scores) and scores[0].p < PLAIN)
+    result = Disagreement(fit, noise, t, projection, chance)
+    stands_out = bool(result.scores) and result.scores[0].p < PLAIN
+    plain = plain or is_noise_exact(context, noise) or stands_out
     if not plain and not (result.suffices and not result.faults):
         result = replace(result, chance=chance_at(t, projection, noise, quiet, seed, plain=False))
     if result.is_undecided:

@@ -80,15 +80,7 @@ def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) 
     )
     projection = t.build_score_test(own)
     chance = chance_at(t, projection, own, quiet, seed, plain=True)
-    return Disagreement(
-        fit,
-        own,
-        t,
-        projection,
-        chance,
-        projection.scores(),
-        root,
-    )
+    return Disagreement(fit, own, t, projection, chance, root)
 
 
 def _robust(context: Context, projection: ScoreTest) -> np.ndarray:

@@ -9,7 +9,6 @@ fitted behind each window, too: one that leaves no such fault takes their place.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examine_fit
 from tractexp.inference.base_fit import BaseFit, fitted_from
@@ -25,17 +24,6 @@ from tractexp.noise import Noise
 WINDOW_SHARE = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class WindowFit:
-    """A window: the context behind it, the base model's fit there, and by how much it lowers the
-    deviance.
-    """
-
-    behind: Context
-    fit: Refit
-    gained: float
-
-
 def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
     """The base model's fit and tests behind the recorder's window, where there is one; else those
     given.
@@ -49,41 +37,42 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
         return base, first
     if noise.loudest_input_mode > BLURRED:  # noise of the voltage would pass for a window
         return base, first
-    tried: list[WindowFit] = []
+    # the context behind each window, and the base model fitted there
+    tried: list[tuple[Context, Refit]] = []
     for window in windows_of(context.events):
-        if tried and tried[0].gained <= 0 and window.averages:
+        if tried and not tried[0][1].deviance < first.fit.deviance and window.averages:
             continue  # an average over several cycles is one of averages over one
         behind = context.move_to_records(Records.from_events(context.records.recorded, window))
         local_minima = (first.fit.unit, *base.local_minima)  # the load's: no window moves them far
         begun = rough_refit(behind, noise, [((), start) for start in local_minima])[0]
-        fit = refit(behind, noise, [((), begun.unit)])[0]
-        tried.append(WindowFit(behind, fit, first.fit.deviance - fit.deviance))
+        tried.append((behind, refit(behind, noise, [((), begun.unit)])[0]))
     believed = _choose_window(tried, first) if tried else None
     if believed is None:
         return base, first
-    assert believed.behind.records.window is not None
-    context.effort.say(
-        f"{believed.behind.records.window.describe()}: taken into account from here on"
-    )
-    base = fitted_from(believed.behind, [believed.fit.unit], base.local_minima)
+    behind, fit = believed
+    assert behind.records.window is not None
+    context.effort.say(f"{behind.records.window.describe()}: taken into account from here on")
+    base = fitted_from(behind, [fit.unit], base.local_minima)
     return base, disagreement(base, seed)
 
 
-def _choose_window(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | None:
-    """The window that helps most, where it helps enough.
+def _choose_window(
+    tried: Sequence[tuple[Context, Refit]], first: Disagreement
+) -> tuple[Context, Refit] | None:
+    """The context behind the window that helps most and the base model's fit there, where it helps
+    enough.
 
     None where an effect explains far more than any window does: what lacks something large takes a
     wrong window for a part of it. Without stator transients one of two cycles fits better than the
     right one.
     """
-    best = max(tried, key=lambda one: one.gained)
+    best = min(tried, key=lambda one: one[1].deviance)
     most = max((s.drop for s in first.scores), default=0.0)
-    criteria = first.criteria
-    window = best.behind.records.window
-    least = criteria.shown
+    window = best[0].records.window
+    least = first.criteria.shown
     if window is None or not window.said:  # that the recorder has a window it says is no guess
         least = max(least, WINDOW_SHARE * most)
-    return best if best.gained > least else None
+    return best if first.fit.deviance - best[1].deviance > least else None
 
 
 def behind_window(
