@@ -318,13 +318,13 @@ def test_each_event_is_credited_and_the_one_that_does_not_belong_is_named(model)
     good = records((0.3, 0.5, 0.6), 0.003)
     (odd,) = records((0.4,), 0.003, seed=9, truth=changed)
     fine = compare_events(study.judged(Problem(model, good), study.TYPICAL).uncertainty)
-    assert fine.odd == []
-    assert all(ratio >= 1 for gain in fine.gains.values() for ratio in gain.values())
-    assert fine.gains["dip 3"]["M"] > fine.gains["dip 1"]["M"]
+    assert fine["odd_events"] == []
+    assert all(ratio >= 1 for gain in fine["gains"].values() for ratio in gain.values())
+    assert fine["gains"]["dip 3"]["M"] > fine["gains"]["dip 1"]["M"]
     odd = replace(odd, record=replace(odd.record, name="changed"))
     mixed = compare_events(study.judged(Problem(model, [*good, odd]), study.TYPICAL).uncertainty)
-    assert mixed.odd == ["changed"]
-    assert "changed does not fit with the rest: deviance higher by" in mixed.notes[0]
+    assert mixed["odd_events"] == ["changed"]
+    assert "changed does not fit with the rest: deviance higher by" in mixed["notes"][0]
 
 
 def test_the_powers_of_all_events_take_one_simulation_of_differences(model, monkeypatch):
@@ -390,7 +390,7 @@ def test_the_events_that_are_fitted_by_themselves_are_those_that_disagree_most(m
 def test_the_gain_of_an_event_is_that_of_all_rows_against_those_without_its_own(model):
     """Over every row and every P0 and Q0 at once, as the least squares of the whole have them."""
     known = study.judged(Problem(model, records((0.3, 0.4, 0.5), 0.003)), study.TYPICAL).uncertainty
-    likelihood, gains = known.likelihood, compare_events(known).gains
+    likelihood, gains = known.likelihood, compare_events(known)["gains"]
     J = dense(likelihood.jacobian(known.unit)[1])
 
     def errors(rows):

@@ -1,7 +1,8 @@
 """What a search led to: the estimate with its intervals, its grade and what to do next."""
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,11 +13,11 @@ from tractexp.identification.adequacy import Adequacy
 from tractexp.identification.conclude import refuse_failed
 from tractexp.identification.result import Result
 from tractexp.identification.search import SearchResult
+from tractexp.storage import files
 from tractexp.text.progress import Progress, counter
 from tractexp.text.wording import join_words
 
 if TYPE_CHECKING:
-    from tractexp.identification.agreement import EventAgreement
     from tractexp.identification.estimate import EstimationResult
     from tractexp.identification.fit import Fit
     from tractexp.identification.uncertainty import Uncertainty
@@ -30,7 +31,8 @@ class FitDetails(NamedTuple):
     fits: "list[Fit]"
     estimation: "EstimationResult"
     uncertainty: "Uncertainty"  # with the intervals that profiles gave
-    agreement: "EventAgreement | None"
+    # of several events: `compare_events`
+    agreement: Mapping[str, Any] | None
     adequacy: Adequacy
 
 
@@ -90,28 +92,25 @@ def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result
     from tractexp.identification.unsteady_start import find_unsteady_start
     from tractexp.identification.yardstick import yardstick
 
-    uncertainty, agreement, fits = details.uncertainty, details.agreement, details.fits
+    uncertainty, fits = details.uncertainty, details.fits
+    agreement = details.agreement or {"gains": {}, "odd_events": [], "notes": []}
     played = {fit.event.record.name for fit in fits}
     validate = [event for event in setup.validate if event.record.name in played]
     free = find_free_optimum(uncertainty, setup.model.held, fits, validate)
-    unrecorded = uncertainty.unrecorded
     start = find_unsteady_start(uncertainty)
     fields = uncertainty.fields()
     told = fields["uncertainty"]
-    told |= agreement.fields() if agreement else {"gains": {}, "odd_events": []}
-    told["notes"] += [
-        *(agreement.notes if agreement else ()),
-        *map(str, filter(None, (free, start))),
-    ]
+    told |= {key: files.plain(agreement[key]) for key in ("gains", "odd_events")}
+    told["notes"] += [*agreement["notes"], *map(str, filter(None, (free, start)))]
     return replace(
         result,
         **fields,
         linear_network=yardstick(fits, result.model_error),
-        starts=[s.to_dict(setup.problem.space.names) for s in details.estimation.starts],
+        starts=details.estimation.starts,
         rival_structures=[rival.to_dict() for rival in uncertainty.rivals],
         free_optimum=free.to_dict() if free else {},
         share_bound=find_share_bound(uncertainty),
-        unrecorded=unrecorded.to_dict() if unrecorded else {},
+        unrecorded=dict(uncertainty.unrecorded),
         unsteady_start=start.to_dict() if start else {},
         advice=_advise(setup, result, details),
     )
@@ -122,7 +121,7 @@ def _advise(setup: FitSpec, result: Result, details: FitDetails) -> list[str]:
     from tractexp.identification.advice import advise
 
     data = set_holding(tuple(event.record.where for event in setup.problem.events))
-    odd = details.agreement.odd if details.agreement else ()
+    odd = details.agreement["odd_events"] if details.agreement else ()
     return [
         *advise(details.uncertainty, details.adequacy, odd, data=data),
         *_suggest_machine_ranges(setup, result),
@@ -135,14 +134,14 @@ def _suggest_frequency(uncertainty: "Uncertainty") -> list[str]:
     left; [] where nothing does.
     """
     missing = uncertainty.unrecorded
-    if missing is None or not (missing.beyond or missing.course):
+    if not missing or not (missing["beyond"] or missing["course"]):
         return []
     still = "(task.frequency_swing=0 where it stood still)"
-    if missing.course:
-        return [f"record f or U_angle: {missing.course['sentence']} {still}"]
+    if course := missing["course"]:
+        return [f"record f or U_angle: {course['sentence']} {still}"]
     return [
-        f"record f or U_angle: without it a swing of {missing.swing:g} Hz moves"
-        f" {join_words(missing.beyond)} {still}"
+        f"record f or U_angle: without it a swing of {missing['swing']:g} Hz moves"
+        f" {join_words(missing['beyond'])} {still}"
     ]
 
 

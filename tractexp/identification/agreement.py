@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,38 +13,12 @@ from tractexp.inference.information import Information
 from tractexp.inference.least_squares import MOST_NUMBERS, descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.separable import Sensitivities
-from tractexp.storage import files
 
 DISAGREES = 0.01  # p-value below which an event does not fit with the others
 SUSPECTS = 4  # events that are fitted by themselves, and the others without them
 
 
-@dataclass(frozen=True, eq=False)
-class EventAgreement:
-    """What each of several events adds to an estimate.
-
-    Attributes
-    ----------
-    gains : {event: {name: float}}
-        Width of the parameter's interval without the event, over that with it.
-    odd : list of str
-        Events that do not fit with the rest.
-    notes : list of str
-        A sentence on each of them.
-    """
-
-    gains: dict[str, dict[str, float]]
-    odd: list[str]
-    notes: list[str]
-
-    def fields(self) -> dict[str, Any]:
-        """What is added to `result.json`; None where a parameter is not identifiable without the
-        event.
-        """
-        return {"gains": files.plain(self.gains), "odd_events": self.odd}
-
-
-def compare_events(uncertainty: Uncertainty) -> EventAgreement:
+def compare_events(uncertainty: Uncertainty) -> dict[str, Any]:
     """The share of each event in the precision, and the events that do not fit with the rest.
 
     Parameters
@@ -54,7 +28,10 @@ def compare_events(uncertainty: Uncertainty) -> EventAgreement:
 
     Returns
     -------
-    EventAgreement
+    dict
+        `gains` {event: {name: width of the parameter's interval without the event, over that with
+        it}}, infinite where it is not identifiable without; `odd_events`, which do not fit with the
+        rest; and `notes`, a sentence on each of them.
     """
     likelihood, width = uncertainty.likelihood, uncertainty.upper - uncertainty.lower
     _, J = uncertainty.sensitivities
@@ -72,7 +49,7 @@ def compare_events(uncertainty: Uncertainty) -> EventAgreement:
             ratio = errors(triangle) / together
         gains[event.record.name] = dict(zip(uncertainty.names, ratio.tolist(), strict=True))
     odd, notes = find_disagreeing_events(uncertainty)
-    return EventAgreement(gains, odd, notes)
+    return {"gains": gains, "odd_events": odd, "notes": notes}
 
 
 def without_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:

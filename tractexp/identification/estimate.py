@@ -15,7 +15,6 @@ is worth.
 """
 
 from collections import OrderedDict
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -48,33 +47,6 @@ REMEMBERED = 4  # problems whose valleys are kept: the jobs of a sweep share one
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
-    """One descent of an estimate.
-
-    Attributes
-    ----------
-    origin : str
-        Where it began: "search", "box" or "beside the best".
-    values : (d,)
-        The parameters it ended at, in their units.
-    above : float
-        Its sum of squares above the best's, in mean squares of what the best leaves.
-    """
-
-    origin: str
-    values: np.ndarray
-    above: float
-
-    def to_dict(self, names: Sequence[str]) -> dict[str, Any]:
-        """As `result.json` has it."""
-        return {
-            "from": self.origin,
-            "above": self.above,
-            "parameters": dict(zip(names, self.values.tolist(), strict=True)),
-        }
-
-
-@dataclass(frozen=True, eq=False)
 class EstimationResult:
     """An estimate.
 
@@ -84,13 +56,13 @@ class EstimationResult:
         Values, intervals and verdicts.
     surprise : Surprise
         How often noise alone leaves as much.
-    starts : tuple of Start
-        The descents that it was chosen from, the best first.
+    starts : list of dict
+        The descents that it was chosen from, the best first, as `result.json` has them.
     """
 
     uncertainty: Uncertainty
     surprise: Surprise
-    starts: tuple[Start, ...]
+    starts: list[dict[str, Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,14 +134,25 @@ class DescentEnds:
         )
 
     @property
-    def starts(self) -> tuple[Start, ...]:
-        """What is told of them, the best first."""
+    def starts(self) -> list[dict[str, Any]]:
+        """What is told of them, the best first: where each began, "search", "box" or "beside the
+        best"; its sum of squares above the best's, in mean squares of what the best leaves; and the
+        parameters that it ended at, in their units.
+        """
         values, above = (
             self.likelihood.values(self.descent.unit),
             self.descent.deviance - self.lowest,
         )
         order = [k for k in np.argsort(above, kind="stable") if np.isfinite(above[k])]
-        return tuple(Start(self.origins[k], values[k], float(above[k])) for k in order)
+        names = self.likelihood.problem.space.names
+        return [
+            {
+                "from": self.origins[k],
+                "above": float(above[k]),
+                "parameters": dict(zip(names, values[k].tolist(), strict=True)),
+            }
+            for k in order
+        ]
 
 
 _remembered: OrderedDict[str, tuple[DescentEnds, EstimationResult]] = OrderedDict()

@@ -27,7 +27,6 @@ from tractexp.storage import files
 
 if TYPE_CHECKING:
     from tractexp.identification.rivals import RivalStructure
-    from tractexp.identification.unrecorded import UnrecordedInput
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +64,8 @@ class Uncertainty:
         Coordinates of others that fit as well.
     rivals : tuple of RivalStructure
         Structures that fit as well.
-    unrecorded : UnrecordedInput or None
-        An input that the records lack.
+    unrecorded : dict
+        An input that the records lack, as of `with_unrecorded`.
     """
 
     likelihood: Likelihood
@@ -84,7 +83,7 @@ class Uncertainty:
     profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     local_minima: tuple[np.ndarray, ...] = ()  # others that fit as well
     rivals: "tuple[RivalStructure, ...]" = ()  # structures that fit as well
-    unrecorded: "UnrecordedInput | None" = None  # an input that the records lack
+    unrecorded: Mapping[str, Any] = field(default_factory=dict)  # an input that the records lack
 
     @property
     def elsewhere(self) -> np.ndarray:
@@ -233,8 +232,8 @@ class Uncertainty:
             ends = np.stack(
                 [np.fmin(ends[:, 0], there[:, 0]), np.fmax(ends[:, 1], there[:, 1])], axis=1
             )
-        if self.unrecorded is not None and not self.exact:
-            moves = np.array([self.unrecorded.moves[name] for name in self.names])
+        if self.unrecorded and not self.exact:
+            moves = np.array([self.unrecorded["moves"][name] for name in self.names])
             ends = ends + moves[:, None] * [-1.0, 1.0]
         return np.clip(ends, self.lower[:, None], self.upper[:, None])
 

@@ -7,9 +7,8 @@ networks have them after a fault, to first order. A course that the fit would sh
 it no parameter takes up is no louder than what the fit leaves.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,35 +25,6 @@ from tractexp.inference.information import Information
 from tractexp.inference.problem import Problem
 
 
-@dataclass(frozen=True)
-class UnrecordedInput:
-    """A channel that was not recorded, and what it could do to the parameters.
-
-    Attributes
-    ----------
-    channel : str
-        Its name.
-    swing : float [Hz]
-        How far it may swing.
-    moves : {name: float}
-        By how much that moves each parameter, in its unit.
-    beyond : names
-        Parameters that it moves beyond their intervals.
-    course : dict
-        That of `find_course`, which explains most of what the fit leaves.
-    """
-
-    channel: str
-    swing: float
-    moves: dict[str, float]
-    beyond: tuple[str, ...] = ()
-    course: Mapping[str, Any] = field(default_factory=dict)  # that explains most of what is left
-
-    def to_dict(self) -> dict[str, Any]:
-        """As `result.json` has it."""
-        return {**vars(self), "beyond": list(self.beyond)}
-
-
 def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
     """The judgement with what a swing of the frequency could do, where none was recorded.
 
@@ -68,7 +38,10 @@ def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
     Returns
     -------
     Uncertainty
-        An identified parameter that the swing moves too far is weakly identified.
+        Its `unrecorded` has what `result.json` has of it: the `channel`, the `swing`; `moves`, by
+        how much that moves each parameter, in its unit; `beyond`, the parameters that it moves
+        beyond their intervals; and the `course` that explains most of what the fit leaves, as of
+        `find_course`. An identified parameter that the swing moves too far is weakly identified.
     """
     problem = uncertainty.likelihood.problem
     if swing <= 0 or not is_frequency_unknown(problem):
@@ -77,11 +50,13 @@ def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
     if not moved.any():
         return uncertainty
     moves = dict(zip(uncertainty.names, moved.max(axis=0).tolist(), strict=True))
-    beside = replace(uncertainty, unrecorded=UnrecordedInput("f", swing, moves))
+    told = {"channel": "f", "swing": swing, "moves": moves}
+    beside = replace(uncertainty, unrecorded=told)
     objections = dict(_find_moved(uncertainty, beside))
-    course = find_course(uncertainty, swing)
-    told = UnrecordedInput("f", swing, moves, tuple(objections), course)
-    return replace(beside, unrecorded=told, verdicts=uncertainty.verdicts | objections)
+    consequences = {"beyond": list(objections), "course": find_course(uncertainty, swing)}
+    return replace(
+        beside, unrecorded=told | consequences, verdicts=uncertainty.verdicts | objections
+    )
 
 
 def _find_moves(uncertainty: Uncertainty, swing: float) -> np.ndarray:
@@ -116,8 +91,7 @@ def _find_moved(own: Uncertainty, beside: Uncertainty) -> Iterator[tuple[str, Pa
     """Verdicts of the parameters that the swing moves beyond their interval, or until that is
     wide.
     """
-    assert beside.unrecorded is not None
-    swing, moves = beside.unrecorded.swing, beside.unrecorded.moves
+    swing, moves = beside.unrecorded["swing"], beside.unrecorded["moves"]
     for j, (name, (low, high)) in enumerate(zip(own.names, own.intervals.tolist(), strict=True)):
         value, verdict = float(own.values[j]), own.verdicts[name]
         half = float(np.ptp(beside.intervals[j])) / 2

@@ -2,7 +2,7 @@
 sure, what next.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,8 +10,6 @@ import numpy as np
 from tractexp.blocks import Report, style
 from tractexp.blocks.chart import Chart
 from tractexp.configuration.run_command import command
-from tractexp.identification.agreement import EventAgreement
-from tractexp.identification.estimate import EstimationResult
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
@@ -73,7 +71,7 @@ def report(fit: "Identification") -> Report:
         _fitness(fit.search_result.history, result),
         "Best objective of the search; dashed: the estimate's.",
     )
-    _starts(page, details.estimation, uncertainty)
+    _starts(page, details.estimation.starts)
     page.heading("What the fit leaves")
     _add_residual_section(page, uncertainty)
     page.heading("How the estimates depend on each other")
@@ -167,10 +165,9 @@ def _fitness(history: History, result: Any) -> Chart:
     return chart.level(max(result.objective, 1e-30), "estimate")
 
 
-def _starts(page: Report, estimated: EstimationResult, uncertainty: Uncertainty) -> None:
+def _starts(page: Report, starts: Sequence[Mapping[str, Any]]) -> None:
     """Where each descent to the estimate ended."""
-    starts = estimated.starts
-    above = np.maximum([s.above for s in starts], SAME_END_SHARE)
+    above = np.maximum([s["above"] for s in starts], SAME_END_SHARE)
     chart = Chart("rank of the start", ["deviance above the best"], log_y=True, pixels=280)
     looks = {
         "search": ("x", style.PALETTE[1]),
@@ -178,19 +175,17 @@ def _starts(page: Report, estimated: EstimationResult, uncertainty: Uncertainty)
         "beside the best": ("diamond", style.PALETTE[2]),
     }
     for origin, (symbol, color) in looks.items():
-        at = [k for k, s in enumerate(starts) if s.origin == origin]
+        at = [k for k, s in enumerate(starts) if s["from"] == origin]
         sentences = [
             f"{origin}: "
-            + ", ".join(
-                f"{n} {digits(v)}" for n, v in zip(uncertainty.names, starts[k].values, strict=True)
-            )
+            + ", ".join(f"{n} {digits(v)}" for n, v in starts[k]["parameters"].items())
             for k in at
         ]
         if at:
             chart.points(
                 origin, [k + 1 for k in at], above[at], color, symbol=symbol, hover=sentences
             )
-    valleys = sum(1 for k, s in enumerate(starts) if k == 0 or s.above - starts[k - 1].above > 1.0)
+    valleys = 1 + int(np.sum(np.diff([s["above"] for s in starts]) > 1.0))
     page.chart(
         chart,
         f"Descents of the likelihood from {len(starts)} starts ended at {valleys} heights; those at"
@@ -198,8 +193,11 @@ def _starts(page: Report, estimated: EstimationResult, uncertainty: Uncertainty)
     )
     with page.fold_blocks("where each start ended"):
         page.table(
-            ["from", "above the best", *uncertainty.names],
-            [[s.origin, f"{s.above:.3g}", *map(digits, s.values)] for s in starts],
+            ["from", "above the best", *starts[0]["parameters"]],
+            [
+                [s["from"], f"{s['above']:.3g}", *map(digits, s["parameters"].values())]
+                for s in starts
+            ],
         )
 
 
@@ -315,16 +313,16 @@ def _correlation(page: Report, uncertainty: Uncertainty) -> None:
     )
 
 
-def _events(page: Report, uncertainty: Uncertainty, together: EventAgreement) -> None:
+def _events(page: Report, uncertainty: Uncertainty, together: Mapping[str, Any]) -> None:
     """Add what each event of a joint fit contributes, and which does not belong."""
     page.heading("What each event adds")
-    if together.notes:
-        page.verdict(*(f"{note}." for note in together.notes), kind="bad")
+    if together["notes"]:
+        page.verdict(*(f"{note}." for note in together["notes"]), kind="bad")
     page.table(
         ["without", *uncertainty.names],
         [
             [event, *(_wider(gain[n]) for n in uncertainty.names)]
-            for event, gain in together.gains.items()
+            for event, gain in together["gains"].items()
         ],
         caption="How many times as wide each 95 % interval would be without the event.",
     )
