@@ -105,7 +105,7 @@ def row(seed: int) -> dict | None:
     }
     if found.verdict.word != "tied":
         return told
-    chances = chosen.best.chances
+    chances = chosen.best
     told |= {
         "event": chosen.best.event.words,
         "predicted_least": chances.least,

@@ -22,7 +22,6 @@ from tractexp.discrepancy.judgement import assessment
 from tractexp.discrepancy.next_event import choose
 from tractexp.discrepancy.next_event.choose import EventTrial, mildest
 from tractexp.discrepancy.next_event.imagined import ImaginedDip
-from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.discrepancy.proposal import judge
 from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.discrepancy.ranking import beats
@@ -184,7 +183,7 @@ def status():
 
 def chosen_dip():
     tried = [
-        EventTrial(ImaginedDip(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))))
+        EventTrial(ImaginedDip(depth, 0.1), np.array([p]), np.ones((1, 1)))
         for depth, p in ((0.2, 0.93), (0.6, 0.99))
     ]
     return mildest(tried, choose.DECIDED).event.depth

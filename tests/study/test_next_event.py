@@ -25,11 +25,10 @@ from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import SLIGHT_ERROR
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_event import rivals
-from tractexp.discrepancy.next_event.choose import DECIDED, LEAST_CHANCE, next_event
+from tractexp.discrepancy.next_event.choose import DECIDED, LEAST_CHANCE, EventTrial, next_event
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, imagine_dips
 from tractexp.discrepancy.next_event.same import same
 from tractexp.discrepancy.next_event.separation import (
-    Chances,
     EventView,
     Separation,
     _reduce_blocks,
@@ -329,7 +328,7 @@ def test_a_plan_for_rivals_says_what_an_investigation_says(tied, tmp_path):
     assert "What to record next" in page
     told = json.loads((tmp_path / "plan.json").read_text())
     assert told["sentence"] == made.sentence
-    assert isinstance(tied.next_event.best.chances, Chances)
+    assert isinstance(tied.next_event.best, EventTrial)
 
 
 def test_the_docs_report_what_the_stored_study_holds():
@@ -350,7 +349,7 @@ def test_what_rivals_miss_is_missed_in_each_of_its_like(alike):
     def chance(error, times):
         views = [seen(bench, noise, side, [event], error)[0] for side in sides]
         denied = np.stack([separation.find_denied_rivals(views, truth, times) for truth in (1, 2)])
-        return Chances.from_draws(denied, np.zeros((2, 2), bool)).least
+        return EventTrial.from_draws(event, denied, np.zeros((2, 2), bool)).least
 
     assert chance(0.0, 20) > DECIDED
     assert chance(1.0, 20) < LEAST_CHANCE

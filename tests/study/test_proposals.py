@@ -149,7 +149,7 @@ def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small():
     there = Ground.from_coordinates(
         bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise
     )
-    made = term_fits(screen(there, [term(STEP)], 0, 20), [])
+    made = term_fits(there, screen(there, [term(STEP)], 0, 20)[0], [])
     (found,) = scores(there, [(term(STEP), {"instant": made.values(made.fits[0])["instant"]})])
     lowered = made.bare.deviance - made.fits[0].deviance
     assert lowered > 20

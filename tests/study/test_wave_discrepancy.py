@@ -162,7 +162,7 @@ def test_an_event_that_would_decide_is_found_in_waveforms(planted):
     assert not any(", with " in t.event.words for t in chosen.tried), (
         "waveforms need no channel of their own"
     )
-    assert chosen.best.chances.least > 0.5
+    assert chosen.best.least > 0.5
     assert not chosen.same
     assert chosen.sentence()
 

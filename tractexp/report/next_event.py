@@ -50,7 +50,7 @@ def section(page: Report, choice: NextEvent) -> None:
         [
             [
                 f"{a + 1}: {name}",
-                *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(best.chances.pairs[a])),
+                *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(best.pairs[a])),
             ]
             for a, name in enumerate(choice.rivals)
         ],
@@ -84,9 +84,7 @@ def _chart(choice: NextEvent) -> Chart:
     chart = Chart("depth of the dip [%]", ["probability [%]"], pixels=360)
     plain = [t for t in choice.tried if _kind(t) == KINDS[0]]
     for color, duration in zip(PALETTE, sorted({t.event.duration for t in plain}), strict=False):
-        line = sorted(
-            (t.event.depth, t.chances.least) for t in plain if t.event.duration == duration
-        )
+        line = sorted((t.event.depth, t.least) for t in plain if t.event.duration == duration)
         x, y = 100 * np.array(line).T
         chart.line(f"{1000 * duration:.0f} ms", x, y, color, width=2.0)
     return chart.level(100 * DECIDED).limits(0, -3, 103)
@@ -108,11 +106,11 @@ def _select_surest_events(choice: NextEvent, kind: str) -> list[EventTrial]:
     """The surest events of a kind."""
     ranked = sorted(
         (t for t in choice.tried if _kind(t) == kind),
-        key=lambda t: (-t.chances.least, t.event.burden),
+        key=lambda t: (-t.least, t.event.burden),
     )
     return ranked[:MOST_EVENTS_A_KIND]
 
 
 def _row(tried: EventTrial) -> list[str]:
     """An event's cells."""
-    return [tried.event.words, f"{100 * tried.chances.least:.0f}"]
+    return [tried.event.words, f"{100 * tried.least:.0f}"]

@@ -13,7 +13,6 @@ from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, d
 from tractexp.discrepancy.next_event.same import Same, same
 from tractexp.discrepancy.next_event.separation import (
     FEW,
-    Chances,
     Separation,
     Side,
     linearize_side,
@@ -37,16 +36,34 @@ REPEATED = (2, 3, 5, 10, 20)  # events of one kind together
 NEARLY = 0.02  # of the chance: of events as sure as this the mildest is the surest
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EventTrial:
-    """An event and how surely it leaves one rival."""
+    """An event and how surely it leaves one rival: by which probability each alone where it is the
+    truth (a,), and by which it denies others (a, a).
+    """
 
     event: ImaginedDip
-    chances: Chances
+    alone: np.ndarray
+    pairs: np.ndarray
     # whether rivals were refitted to it, not only linearised about their fits
     refitted: bool = False
     # how many such events are sure to, where one is not and so many are
     repeated: int | None = None
+
+    @classmethod
+    def from_draws(
+        cls, event: ImaginedDip, denied: np.ndarray, ignored: np.ndarray, *, refitted: bool = False
+    ) -> "EventTrial":
+        """Of draws (a, a, b) that deny rivals, by the truth; pairs that are `ignored` (a, a) need
+        not be told apart.
+        """
+        alone = (denied | ignored[:, :, None]).all(axis=1).mean(axis=1)
+        return cls(event, alone, denied.mean(axis=2), refitted)
+
+    @property
+    def least(self) -> float:
+        """The probability that the truth alone is left, the least over all rivals as the truth."""
+        return float(self.alone.min())
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +86,7 @@ class NextEvent:
     @property
     def probability(self) -> float:
         """The least over all rivals as the truth."""
-        return self.best.chances.least
+        return self.best.least
 
     def sentence(self) -> str:
         """What to record, or why nothing need be."""
@@ -109,7 +126,7 @@ class NextEvent:
                 for a, b, p in self.hopeless
             ],
             "tried": [
-                {**t.event.to_dict(), "words": t.event.words, "probability": t.chances.least}
+                {**t.event.to_dict(), "words": t.event.words, "probability": t.least}
                 for t in self.tried
             ],
         }
@@ -119,8 +136,8 @@ class NextEvent:
         return {
             **tried.event.to_dict(),
             "words": tried.event.words,
-            "probability": tried.chances.least,
-            "by_truth": dict(zip(self.rivals, tried.chances.alone.tolist(), strict=True)),
+            "probability": tried.least,
+            "by_truth": dict(zip(self.rivals, tried.alone.tolist(), strict=True)),
             "refitted": tried.refitted,
             "repeated": tried.repeated,
         }
@@ -207,9 +224,7 @@ def next_event(
     if len(open_pairs) < len(apart):  # what can be told apart shall be
         for a, b, _ in open_pairs:
             ignored[a, b] = ignored[b, a] = True
-    tried = [
-        EventTrial(e, Chances.from_draws(d, ignored)) for e, d in zip(events, denied, strict=True)
-    ]
+    tried = [EventTrial.from_draws(e, d, ignored) for e, d in zip(events, denied, strict=True)]
     best = _choose_mildest_event(context, noise, sides, tried, ignored, seed, error)
     pairs = [(a, b, same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
@@ -219,11 +234,7 @@ def next_event(
 
 def mildest(tried: Sequence[EventTrial], decided: float) -> EventTrial:
     """Of the events that are sure enough the one that asks for least, or else of the surest."""
-    enough = [
-        t
-        for t in tried
-        if t.chances.least >= min(decided, max(t.chances.least for t in tried) - NEARLY)
-    ]
+    enough = [t for t in tried if t.least >= min(decided, max(t.least for t in tried) - NEARLY)]
     return min(enough, key=lambda t: t.event.burden)
 
 
@@ -240,8 +251,8 @@ def _choose_mildest_event(
     left, checked = list(tried), []
     while left and len(checked) < CHECKED:
         best = mildest(left, DECIDED)
-        chance = best.chances.least
-        if checked and chance < min(LEAST_CHANCE, max(t.chances.least for t in checked)):
+        chance = best.least
+        if checked and chance < min(LEAST_CHANCE, max(t.least for t in checked)):
             break
         left.remove(best)
         checked.append(
@@ -249,9 +260,9 @@ def _choose_mildest_event(
             if chance >= WORTH
             else best
         )
-        if checked[-1].chances.least >= DECIDED:
+        if checked[-1].least >= DECIDED:
             return checked[-1]
-    return max(checked, key=lambda t: t.chances.least)
+    return max(checked, key=lambda t: t.least)
 
 
 def _compute_refitted_chances(
@@ -285,12 +296,12 @@ def _compute_refitted_chances(
         denied = np.stack(
             [s.find_denied_rivals(views, a, times) for a, (s, views) in enumerate(places, 1)]
         )
-        return EventTrial(event, Chances.from_draws(denied, ignored), refitted=plain)
+        return EventTrial.from_draws(event, denied, ignored, refitted=plain)
 
     once = repeat_event(1)
-    if once.chances.least >= DECIDED:
+    if once.least >= DECIDED:
         return once
-    enough = (n for n in REPEATED if repeat_event(n).chances.least >= DECIDED)
+    enough = (n for n in REPEATED if repeat_event(n).least >= DECIDED)
     return replace(once, repeated=next(enough, None))
 
 

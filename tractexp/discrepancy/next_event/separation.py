@@ -90,28 +90,6 @@ class EventView:
         return bool(np.isfinite(self.f).all() and np.isfinite(self.K).all())
 
 
-@dataclass(frozen=True, eq=False)
-class Chances:
-    """By which probability an event leaves each rival alone where it is the truth (a,), and denies
-    others (a, a).
-    """
-
-    alone: np.ndarray
-    pairs: np.ndarray
-
-    @classmethod
-    def from_draws(cls, denied: np.ndarray, ignored: np.ndarray) -> "Chances":
-        """Of draws (a, a, b) that deny rivals, by the truth; pairs that are `ignored` (a, a) need
-        not be told apart.
-        """
-        return cls((denied | ignored[:, :, None]).all(axis=1).mean(axis=1), denied.mean(axis=2))
-
-    @property
-    def least(self) -> float:
-        """The probability that the truth alone is left, the least over all rivals as the truth."""
-        return float(self.alone.min())
-
-
 def linearize_side(context: Context, noise: Noise, fit: Refit) -> Side:
     """Linearise an explanation at its fit."""
     at = context.coordinates

@@ -21,7 +21,7 @@ from tractexp.discrepancy.proposal.judge import (
 )
 from tractexp.discrepancy.proposal.library import Term, terms
 from tractexp.discrepancy.proposal.refit import TermFits, standard_errors, term_fits
-from tractexp.discrepancy.proposal.screen import Ground, screen
+from tractexp.discrepancy.proposal.screen import Ground, compute_library_p, screen
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
@@ -91,14 +91,14 @@ def propose(
     under = context_of_terms(context)
     ground = Ground.from_coordinates(under, carried_over(under, context, bare.unit), noise)
     context.effort.say("screening a library of terms")
-    screened = screen(ground, among or terms(), seed, LIBRARY_DRAWS)
+    screened, chance = screen(ground, among or terms(), seed, LIBRARY_DRAWS)
     context.effort.say("refitting the most promising terms")
     result = term_fits(
-        screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]]
+        ground, screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]]
     )
     context.effort.say("judging terms on the held-out events")
-    lowered = [result.bare.deviance - fit.deviance for fit in result.fits]
-    ranked = term_assessments(context, result, validate, [screened.p(drop) for drop in lowered])
+    p = [compute_library_p(result.bare.deviance - fit.deviance, chance) for fit in result.fits]
+    ranked = term_assessments(context, result, validate, p)
     tried = tuple((result.term(w.fit), w) for w in ranked)
     standing = [w for w in ranked if not w.objections(context.criteria)]
     if not standing:

@@ -14,7 +14,7 @@ import numpy as np
 
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
 from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, terms
-from tractexp.discrepancy.proposal.screen import Ground, ScreenResult, TermScore, scores
+from tractexp.discrepancy.proposal.screen import Ground, TermScore, scores
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.inference.fitting import Refit, Start, best_of, off_bounds, refit, rough_refit
@@ -56,12 +56,12 @@ class TermFits:
         return values_of(self.context.coordinates, fit.unit, self.term(fit))
 
 
-def shortlist(screened: ScreenResult) -> list[TermScore]:
-    """The most promising terms, each at its best setting, so that no kind of signal crowds out the
-    others.
+def shortlist(screened: Sequence[TermScore]) -> list[TermScore]:
+    """The most promising terms of a screen, each at its best setting, so that no kind of signal
+    crowds out the others.
     """
     best: dict[str, TermScore] = {}
-    for scored in screened.scored:
+    for scored in screened:
         if scored.drop > 0:
             best.setdefault(scored.term.name, scored)
     alike: dict[tuple, int] = {}
@@ -76,12 +76,12 @@ def shortlist(screened: ScreenResult) -> list[TermScore]:
     return sorted([*answers, *rest], key=lambda f: -f.drop)
 
 
-def further(screened: ScreenResult, listed: Sequence[TermScore]) -> list[TermScore]:
+def further(screened: Sequence[TermScore], listed: Sequence[TermScore]) -> list[TermScore]:
     """Further settings of terms, far from those listed on the grid of some parameter: peaks of
     their own.
     """
     more: dict[str, list[TermScore]] = {f.term.name: [f] for f in listed}
-    for scored in screened.scored:
+    for scored in screened:
         there = more.get(scored.term.name)
         if there and len(there) < PEAKS and all(_far(scored, f) for f in there):
             there.append(scored)
@@ -127,11 +127,12 @@ def _finer(scored: TermScore, which: int, scale: float) -> list[dict[str, float]
     return [{**scored.setting, shape.name: value} for value in dict.fromkeys(moved) if value != now]
 
 
-def term_fits(screened: ScreenResult, local_minima: Sequence[np.ndarray]) -> TermFits:
-    """Refit the shortlist; `local_minima` (D,) are other fits of the base model, in the terms'
-    coordinates.
+def term_fits(
+    ground: Ground, screened: Sequence[TermScore], local_minima: Sequence[np.ndarray]
+) -> TermFits:
+    """Refit the shortlist of a screen; `local_minima` (D,) are other fits of the base model, in the
+    terms' coordinates.
     """
-    ground = screened.ground
     listed = shortlist(screened)
     chosen = zoom_settings(ground, [*listed, *further(screened, listed[:AGAIN])])
     likely = [f.term for f in chosen]

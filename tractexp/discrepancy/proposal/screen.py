@@ -84,34 +84,28 @@ class TermScore:
     sizes: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class ScreenResult:
-    """Every term of the library at every setting, the most promising first, and the best of each
-    draw of noise (b,).
+def screen(
+    ground: Ground, terms: Sequence[Term], seed: int, draws: int
+) -> tuple[list[TermScore], np.ndarray]:
+    """Every term at every setting of its grid, the most promising first, and the best of each draw
+    of noise (b,).
     """
-
-    ground: Ground
-    scored: list[TermScore]
-    chance: np.ndarray
-
-    def p(self, drop: float) -> float:
-        """How often noise alone lowers the deviance as much by the best of the whole library: a
-        Gumbel tail.
-        """
-        scale = max(float(self.chance.std()) * np.sqrt(6) / np.pi, 1e-9)
-        location = float(self.chance.mean()) - np.euler_gamma * scale
-        return float(-np.expm1(-np.exp(min(-(drop - location) / scale, 700.0))))
-
-
-def screen(ground: Ground, terms: Sequence[Term], seed: int, draws: int) -> ScreenResult:
-    """Score terms on their grids."""
     noise = ground.draw_noise(seed, draws)
     best = np.zeros(draws)
     scored = []
     for score, drops in _scores(ground, [(t, s) for t in terms for s in t.signal.settings], noise):
         scored.append(score)
         best = np.maximum(best, drops)
-    return ScreenResult(ground, sorted(scored, key=lambda s: -s.drop), best)
+    return sorted(scored, key=lambda s: -s.drop), best
+
+
+def compute_library_p(drop: float, draws: np.ndarray) -> float:
+    """How often noise alone lowers the deviance as much by the best of the whole library, whose
+    drops in draws of noise are known: a Gumbel tail.
+    """
+    scale = max(float(draws.std()) * np.sqrt(6) / np.pi, 1e-9)
+    location = float(draws.mean()) - np.euler_gamma * scale
+    return float(-np.expm1(-np.exp(min(-(drop - location) / scale, 700.0))))
 
 
 def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[TermScore]:
