@@ -14,7 +14,7 @@ from written_out import printed_dip
 from tractexp.errors import UserError
 from tractexp.identification.posterior import PosteriorSample
 from tractexp.identification.profile import check_by_profiles, profiles, revise_verdict
-from tractexp.identification.profile_lanes import End, LikelihoodProfile, Region
+from tractexp.identification.profile_lanes import End, LikelihoodProfile, find_outermost
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict, brief
 from tractexp.inference.least_squares import descend
@@ -281,8 +281,8 @@ def test_a_verdict_repeats_no_interval():
 
 
 def test_places_that_fit_are_looked_for_beside_an_interval_without_ends():
-    region = Region(np.array([[0.2], [0.9]]), np.array([[0.5], [2.0]]))
+    points = np.array([[0.2], [0.9]]), np.array([[0.5], [2.0]])
     with np.errstate(all="raise"):
-        assert region.find_outermost(0, -np.inf, np.inf) == []
-    assert region.find_outermost(0, 0.3, 0.4) == [0]
-    assert region.find_outermost(0, 0.0, 0.1) == [0]
+        assert find_outermost(*points, 0, (-np.inf, np.inf)) == []
+    assert find_outermost(*points, 0, (0.3, 0.4)) == [0]
+    assert find_outermost(*points, 0, (0.0, 0.1)) == [0]

@@ -17,7 +17,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.identification.profile_lanes import End, Lanes, LikelihoodProfile, Region, others_free
+from tractexp.identification.profile_lanes import (
+    End,
+    Lanes,
+    LikelihoodProfile,
+    find_outermost,
+    others_free,
+)
 from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import (
     BOUND,
@@ -51,8 +57,8 @@ class Profiles:
         What the deviance may rise by within an interval.
     simulations, restarts : int
         What they cost, and how often a better optimum restarted them.
-    region : Region
-        All points that were passed.
+    wider : (d,) bools
+        Whether points that the records do not rule out lie beyond the interval by curvature.
     """
 
     uncertainty: Uncertainty
@@ -60,23 +66,7 @@ class Profiles:
     threshold: float
     simulations: int
     restarts: int
-    region: "Region"
-
-    @property
-    def wider(self) -> np.ndarray:
-        """Whether points that the records do not rule out lie beyond the interval by curvature,
-        (d,).
-        """
-        uncertainty = self.uncertainty
-        ends = zip(
-            uncertainty.values - uncertainty.half,
-            uncertainty.values + uncertainty.half,
-            strict=True,
-        )
-        units = [_in_range(uncertainty, c, interval) for c, interval in enumerate(ends)]
-        return np.array(
-            [bool(self.region.find_outermost(c, *unit)) for c, unit in enumerate(units)]
-        )
+    wider: np.ndarray
 
     @property
     def notes(self) -> list[str]:
@@ -254,7 +244,7 @@ def profiles(
                 threshold(),
                 simulations,
                 restarts,
-                drawing.region,
+                drawing.find_wider(),
             )
         descent = uncertainty.likelihood.descent(drawing.better[None])
         simulations += descent.simulations
@@ -271,9 +261,9 @@ class _Drawing:
         """
         self.uncertainty, self.column = uncertainty, column
         self.curves: list[LikelihoodProfile] = []
-        self.region = Region(
-            np.empty((0, len(uncertainty.unit))), np.empty((0, len(uncertainty.names)))
-        )
+        # the points that lanes passed, as of `find_outermost`
+        self.unit = np.empty((0, len(uncertainty.unit)))
+        self.rise = np.empty((0, len(uncertainty.names)))
         self.better: np.ndarray | None = None
         self.simulations = 0
 
@@ -299,15 +289,26 @@ class _Drawing:
         where = [
             (int(c), k)
             for c, p in zip(self.column, self.curves, strict=True)
-            for k in self.region.find_outermost(
-                int(c), *_in_range(self.uncertainty, int(c), p.interval)
-            )
+            for k in self._find_outermost(int(c), p.interval)
         ]
         if where:
             c, k = np.array(where).T
-            rise = self.region.rise[k, c] * threshold()
-            self._join(Lanes(self.uncertainty, c, self.region.unit[k], rise), points)
+            rise = self.rise[k, c] * threshold()
+            self._join(Lanes(self.uncertainty, c, self.unit[k], rise), points)
         return bool(where)
+
+    def find_wider(self) -> np.ndarray:
+        """Whether points that the records do not rule out lie beyond the interval by curvature,
+        (d,).
+        """
+        known = self.uncertainty
+        ends = zip(known.values - known.half, known.values + known.half, strict=True)
+        return np.array([bool(self._find_outermost(c, pair)) for c, pair in enumerate(ends)])
+
+    def _find_outermost(self, c: int, interval: tuple[float, float]) -> list[int]:
+        """The points that fit and lie farthest beyond an interval of the c-th parameter."""
+        unit = _in_range(self.uncertainty, c, interval)
+        return find_outermost(self.unit, self.rise, c, unit)
 
     def _join(self, lanes: Lanes, points: int) -> None:
         """Draw lanes that begin elsewhere, and join each with the profile of its parameter."""
@@ -324,7 +325,9 @@ class _Drawing:
         lanes.run(points, ended)
         self.simulations += lanes.simulations
         self.better = lanes.better
-        self.region = self.region.concatenate(lanes.region)
+        unit, rise = lanes.points
+        self.unit = np.concatenate([self.unit, unit])
+        self.rise = np.concatenate([self.rise, rise])
 
 
 def _in_range(

@@ -56,39 +56,36 @@ class LikelihoodProfile:
         return ", ".join(sentences)
 
 
-@dataclass(frozen=True, eq=False)
-class Region:
-    """Points of lanes.
+def find_outermost(
+    unit: np.ndarray, rise: np.ndarray, c: int, interval: tuple[float, float]
+) -> list[int]:
+    """The points that fit and lie farthest beyond an interval.
 
-    Attributes
+    Parameters
     ----------
     unit : (n, D)
-        Coordinates.
+        Coordinates of points that lanes passed.
     rise : (n, d)
-        By how much the deviance is up, over the limit of each parameter's interval: below 1 the
-        point lies within it.
+        By how much the deviance is up there, over the limit of each parameter's interval: below 1
+        the point fits.
+    c : int
+        The parameter.
+    interval : (low, high)
+        In its range.
+
+    Returns
+    -------
+    list of ints
+        At most two: the farthest below and the farthest above.
     """
-
-    unit: np.ndarray
-    rise: np.ndarray
-
-    def concatenate(self, other: "Region") -> "Region":
-        """The points of both."""
-        return Region(
-            np.concatenate([self.unit, other.unit]), np.concatenate([self.rise, other.rise])
-        )
-
-    def find_outermost(self, c: int, low: float, high: float) -> list[int]:
-        """Rows, at most two: of the points that fit, the farthest below and the farthest above an
-        interval of the c-th parameter.
-        """
-        values = np.where(self.rise[:, c] < 1.0, self.unit[:, c], low)
-        if not len(values):
-            return []
-        down, up = int(values.argmin()), int(values.argmax())
-        return ([down] if values[down] < low - SMALLEST_STEP else []) + (
-            [up] if values[up] > high + SMALLEST_STEP else []
-        )
+    low, high = interval
+    values = np.where(rise[:, c] < 1.0, unit[:, c], low)
+    if not len(values):
+        return []
+    down, up = int(values.argmin()), int(values.argmax())
+    return ([down] if values[down] < low - SMALLEST_STEP else []) + (
+        [up] if values[up] > high + SMALLEST_STEP else []
+    )
 
 
 class Lanes:
@@ -123,12 +120,14 @@ class Lanes:
         self.better: np.ndarray | None = None
 
     @property
-    def region(self) -> Region:
-        """Every point of the lanes."""
+    def points(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates (n, D) of every point of the lanes, and by how much the deviance is up there,
+        over the limit of each parameter's interval (n, d).
+        """
         limits, size = self.uncertainty.limits, len(self.uncertainty.unit)
         unit = np.concatenate([np.empty((0, size)), *(unit for unit, _ in self.trail)])
         rise = np.concatenate([np.empty(0), *(rise for _, rise in self.trail)])
-        return Region(unit, rise[:, None] / limits)
+        return unit, rise[:, None] / limits
 
     def run(self, points: int, ended: Callable[[], None]) -> None:
         """At most so many points on every lane, until one is better than the optimum."""
