@@ -717,7 +717,8 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     both = lambda made: AllEvents(trained, made, known.noise, known.faults, known.base.fit)  # noqa: E731
     fit = lambda made: both(made).fit_jointly([alone], seed=0)  # noqa: E731
     (confirmed,) = fit(events("stator_resistance", size=2.0, count=3)[2:])
-    assert confirmed.is_confirmed(criteria)
+    assert confirmed.louder > 0
+    assert confirmed.p_left >= criteria.adequate_p
     assert confirmed.fit.names == ("stator_resistance",)
     assert confirmed.fit.unit.shape == alone.unit.shape
     R_s = [trained.coordinates.value("R_s", unit) for unit in (confirmed.fit.unit, alone.unit)]
@@ -725,8 +726,6 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     (denied,) = fit(events(None, count=3)[2:])
     assert denied.louder < 0
     assert denied.p_left < criteria.adequate_p
-    assert not denied.is_confirmed(criteria)
-    assert not replace(denied, p_left=1.0).is_confirmed(criteria)
 
 
 def test_what_has_no_steady_state_on_a_held_out_event_is_denied_there():

@@ -359,7 +359,7 @@ def test_of_two_effects_each_is_shown_over_the_other_alone(
         fit(0.0, 2, "one", "other"),
         {"one": fit(200.0, 1, "other"), "other": fit(alone, 1, "one")},
     )
-    joint = SimpleNamespace(fit=pair, p_left=1.0, is_confirmed=lambda criteria: False)
+    joint = SimpleNamespace(fit=pair, p_left=1.0, louder=-1.0)
     both = SimpleNamespace(
         **{**vars(both), "without_each": lambda fit: fewer, "compare": lambda *_: [joint]}
     )

@@ -15,10 +15,8 @@ from tractexp.discrepancy.disagreement import disagreement, examine_fit
 from tractexp.inference.base_fit import fitted_from
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Names, Refit, best_of, refit
 from tractexp.inference.noise_in_quiet import QuietNoise
-from tractexp.inference.records import Records
 from tractexp.inference.wide_fit import wide_refit
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -43,12 +41,6 @@ class JointFit:
     louder: float
     p_left: float  # how often chance leaves as much as it does
 
-    def is_confirmed(self, criteria: Criteria) -> bool:
-        """Whether all events bear it out: they speak louder for it than the fitted ones, and it
-        leaves nothing.
-        """
-        return self.louder > 0 and self.p_left >= criteria.adequate_p
-
 
 @dataclass(frozen=True, eq=False)
 class AllEvents:
@@ -69,10 +61,7 @@ class AllEvents:
     @functools.cached_property
     def context(self) -> Context:
         """The context of all events, those held out among them."""
-        records = self.fitted.records
-        return self.fitted.move_to_records(
-            Records.from_events((*records.recorded, *self.events), records.window)
-        )
+        return self.fitted.move_to_events((*self.fitted.records.recorded, *self.events))
 
     @functools.cached_property
     def quiet(self) -> QuietNoise:

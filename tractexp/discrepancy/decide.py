@@ -91,20 +91,16 @@ def decide(evidence: Evidence, criteria: Criteria) -> Verdict:
     if len(kept) > 1:
         word = TIED
     elif kept:
-        word = NAMED if is_sound(kept[0]) and is_confirmed(kept[0], evidence) else CANDIDATE
+        row = kept[0]
+        # of few effects, of sizes that are known within their bounds, and no wrong model
+        is_few = len(row.fit.names) <= MOST_NAMED
+        is_sound = is_few and not row.open_sizes and row.grade != WRONG_MODEL
+        word = NAMED if is_sound and is_confirmed(row, evidence) else CANDIDATE
     else:
         agrees = least_p >= criteria.adequate_p and bool(find_adequate(evidence, criteria))
         suffices = evidence.base.is_slight or evidence.base.grade == ADEQUATE
         word = NONE if agrees or suffices else UNEXPLAINED
     return Verdict(word, tuple(kept), word != UNEXPLAINED and not evidence.is_predicted)
-
-
-def is_sound(row: SetEvidence) -> bool:
-    """Whether a set may be a name: of few effects, of sizes that are known within their bounds, and
-    not graded a wrong model.
-    """
-    is_known = row.grade != WRONG_MODEL and not row.open_sizes
-    return is_known and len(row.fit.names) <= MOST_NAMED
 
 
 def shows_more(evidence: Evidence, criteria: Criteria) -> bool:

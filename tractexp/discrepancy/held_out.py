@@ -14,7 +14,6 @@ from tractexp.discrepancy.gap import SHOWN, GapTest, beyond_chance, compute_push
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit, fit_initial_power, refit
 from tractexp.inference.noise_in_quiet import QuietNoise, white
-from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 from tractexp.text.wording import count_noun
@@ -55,7 +54,7 @@ def judge_held_out(
     if not any(row.fit.names or faults for row in adequate):
         is_empty = not explained.chosen.names and not explained.faults
         is_silent = context.domain.calibrated and is_empty and base.p_left >= criteria.adequate_p
-        if is_silent and exceeds_noise(both):
+        if is_silent and measure_open_gain(both) > criteria.shown:
             base = replace(base, p_of_all=both.p_left(explained.base.local_minima, seed))
         return replace(evidence, base=base)
     context.effort.say(f"judging {count_noun(len(adequate), 'explanation')} on the held-out events")
@@ -114,25 +113,22 @@ def assess(both: AllEvents, rows: Sequence[SetEvidence], seed: int) -> list[SetE
         assessed[row.fit.names] = replace(
             row, p_of_all=own.p_left, behind_of_all=own.fit.cost - best
         )
-    again = [
-        one.fit
-        for names, one in joint.items()
-        if one.is_confirmed(criteria)
-        and not _suffices(assessed[names])
-        and not criteria.rejects(assessed[names].behind_of_all)
-    ]
+    again = []
+    for names, one in joint.items():
+        row = assessed[names]
+        assert row.gap is not None
+        # shown as it was fitted, and nothing of the held-out events is left
+        suffices = row.gap.left <= row.gap.shown and all(gap.outcome == SHOWN for gap in row.gaps)
+        # all events speak louder for it than the fitted ones, and it leaves nothing of them
+        is_borne_out = one.louder > 0 and one.p_left >= criteria.adequate_p
+        if is_borne_out and not suffices and not criteria.rejects(row.behind_of_all):
+            again.append(one.fit)
     if again:
         without_of_all = {fit.names: both.fit_to_all(without[fit.names]) for fit in again}
         chosen = [row for fit in again for row in rows if row.fit.names == fit.names]
         for row in judge_fits(both, chosen, again, without_of_all):
             assessed[row.fit.names] = replace(row, is_fitted_to_all=True)
     return [assessed[row.fit.names] for row in rows]
-
-
-def _suffices(row: SetEvidence) -> bool:
-    """Whether a set is shown as it was fitted, and leaves nothing of the held-out events."""
-    assert row.gap is not None
-    return all(gap.outcome == SHOWN for gap in row.gaps) and row.gap.left <= row.gap.shown
 
 
 def judge_fits(
@@ -157,20 +153,13 @@ def judge_fits(
     return judged
 
 
-def exceeds_noise(both: AllEvents) -> bool:
-    """Whether perturbations of the base model would gain more on the held-out events than noise
+def measure_open_gain(both: AllEvents) -> float:
+    """What perturbations of the base model would gain on the held-out events, beyond what noise
     leaves there.
     """
     there, (unit,), noise = carry_fits(both.fitted, both.events, [both.bare])
-    left = beyond_chance(
-        there,
-        unit,
-        (),
-        noise,
-        there.coordinates.before,
-        compute_pushed_changes(there, unit, (), noise),
-    )
-    return left > both.fitted.criteria.shown
+    changes = compute_pushed_changes(there, unit, (), noise)
+    return beyond_chance(there, unit, (), noise, there.coordinates.before, changes)
 
 
 def compare_on(
@@ -196,7 +185,7 @@ def carry_fits(
     Returns the context of those events, the coordinates of each fit there, and the noise of the
     last one that has a steady state there.
     """
-    other = context.move_to_records(Records.from_events(events, context.records.window))
+    other = context.move_to_events(events)
     at = other.coordinates.at_measured_power
     units = [fit_initial_power(other, at(fit.unit), white(other), fit.names) for fit in fits]
     noise = white(other)

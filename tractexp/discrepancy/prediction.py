@@ -40,7 +40,6 @@ from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.inference.fitting import Refit, best_of, refit
 from tractexp.inference.model_error import block_sums, noise_variance
-from tractexp.inference.records import Records
 from tractexp.inference.wide_fit import wide_refits
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -95,7 +94,7 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
     if context.prior:  # its rows stand beside what the base model leaves, as in an identification
         start = plain.coordinates.at_measured_power(explained.steps[0].fit.unit)
         noise = residual_noise(plain, refit(plain, noise, [((), start)], faults=())[0])
-    there = context.move_to_records(Records.from_events(events, context.records.window))
+    there = context.move_to_events(events)
 
     def fill(fits: Sequence[Refit]) -> list[SetEvidence]:
         predicted = each_apart(functools.partial(predict, there), fits, context.effort)

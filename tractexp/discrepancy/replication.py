@@ -17,7 +17,6 @@ from tractexp.discrepancy.prediction import predict
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit, refit
 from tractexp.inference.model_error import noise_variance
-from tractexp.inference.records import Records
 from tractexp.record import Event
 
 FEWEST_EVENTS = 3  # of which one can be left out
@@ -87,13 +86,13 @@ def replicate(
         return unit
 
     def fit_to(some: Sequence[Event]) -> dict[Names, Refit]:
-        there = plain.move_to_records(Records.from_events(some, plain.records.window))
+        there = plain.move_to_events(some)
         move = there.coordinates.at_measured_power
         starts = [(names, move(forget(names, unit))) for names, unit in (*smaller, own)]
         return {fit.names: fit for fit in refit(there, noise, starts, faults)}
 
     def measure_gains(fits: dict[Names, Refit], event: Event) -> list[float]:
-        there = plain.move_to_records(Records.from_events([event], plain.records.window))
+        there = plain.move_to_events([event])
         after = predict(there, fits[chosen.names]).squares.sum()
         before = [predict(there, fits[names]).squares.sum() for names, _ in smaller]
         with np.errstate(invalid="ignore"):  # the motor stalls with and without

@@ -132,15 +132,16 @@ class Lanes:
     def run(self, points: int, ended: Callable[[], None]) -> None:
         """At most so many points on every lane, until one is better than the optimum."""
         for _ in range(points):
-            if not self.advance() or self.better is not None:
+            if not self.open.any():
+                break
+            self.advance()
+            if self.better is not None:
                 break
             ended()
 
-    def advance(self) -> bool:
-        """One more point on every open lane; False when there is none left."""
+    def advance(self) -> None:
+        """One more point on every open lane."""
         lanes = np.flatnonzero(self.open)
-        if not len(lanes):
-            return False
         column, sign = self.column[lanes], self.sign[lanes]
         here = self.unit[lanes, column]
         target = np.clip(here + sign * self.step[lanes], 0.0, 1.0)
@@ -171,7 +172,6 @@ class Lanes:
         self.open[lanes[ended]] = False
         if rise.min(initial=0.0) < -LEAST_OPTIMUM_GAIN:
             self.better = descent.unit[rise.argmin()]
-        return True
 
     def _adapt(self, lanes: np.ndarray, rise: np.ndarray, moved: np.ndarray) -> None:
         """Steps that raise the root of the deviance by about `AIM`, at most thrice or a third of

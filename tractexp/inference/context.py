@@ -129,6 +129,10 @@ class Context:
         there = self.rebuild(self.catalogue, records, self.effort.anew(), type(self.kernels.family))
         return there if len(self.coordinates.before) else there.with_measured_power
 
+    def move_to_events(self, events: Sequence[Event]) -> "Context":
+        """The same on other events of this recorder, as of `move_to_records`."""
+        return self.move_to_records(Records.from_events(events, self.records.window))
+
     def rebuild(
         self, catalogue: Catalogue, records: Records, effort: Effort, family: type[Family]
     ) -> "Context":

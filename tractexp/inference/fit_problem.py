@@ -42,11 +42,6 @@ class FitProblem:
         return int(np.count_nonzero(self.valid))
 
     @functools.cached_property
-    def gaps(self) -> bool:
-        """Whether any sample does not count."""
-        return not self.valid.all()
-
-    @functools.cached_property
     def free_set(self) -> FreeSet:
         """The meaning of the coordinates: names, bounds and nulls."""
         return FreeSet.of_problem(self.problem, self.initial_power)
@@ -97,7 +92,7 @@ class FitProblem:
         )
         rows = response.by_candidate
         rows -= drive.measurements
-        if self.gaps:
+        if not self.valid.all():
             with np.errstate(invalid="ignore"):  # what diverged is no number in gaps either
                 rows *= self.valid
         for e, missed in enumerate(response.miss > 0):

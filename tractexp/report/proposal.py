@@ -41,7 +41,7 @@ def add_proposal_section(page: Report, findings: Findings) -> None:
         " by a screen."
     )
     page.equation(proposal.term.latex)
-    if proposal.term.exogenous:
+    if proposal.term.clock:
         page.text(
             "It is not a function of the voltage: something happened by itself, and need not happen"
             " again."

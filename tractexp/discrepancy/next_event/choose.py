@@ -23,7 +23,6 @@ from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.model_error import in_percent
 from tractexp.inference.noise_in_quiet import QuietNoise
-from tractexp.inference.records import Records
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 
@@ -314,9 +313,7 @@ def _fitted_to(
     power = context.kernels.simulate(
         truth.fit.names, middle[None], Drive.from_events([driven(context, event)])
     )[0]
-    whole = context.move_to_records(
-        Records.from_events((*context.records.recorded, as_recorded(context, event, power)))
-    )
+    whole = context.move_to_events((*context.records.recorded, as_recorded(context, event, power)))
     wide = [whole.coordinates.widen_coordinates(side.fit.unit) for side in sides]
     input_modes = (
         None if noise.input_modes is None else QuietNoise.from_context(whole, wide[0]).input_modes

@@ -17,12 +17,12 @@ from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven
 from tractexp.inference.context import Context
 from tractexp.inference.differences import slopes, two_sided
 from tractexp.inference.fitting import Refit
+from tractexp.inference.least_squares import descend
 from tractexp.model.drive import Drive
 
 LARGEST_FOLLOWED_DISTANCE = 1e-6  # pu: how near one comes to the other
-# of the sum of squares: a descent that gains less ends; where one follows, each step gains nearly
-# all
-DONE = 1e-8
+# steps of a descent, which ends where one gains less [pu²]: a single sample so far off
+MOST_FOLLOWING_STEPS, DONE = 60, LARGEST_FOLLOWED_DISTANCE**2
 SETTLED = 0.1  # of the power before: an event that a load has survived by its end
 DIRECTION = 1e-4  # of the largest singular value of normalized columns: a direction of its own
 RICH = (0.1, 0.3, 0.5, 0.7)  # depths
@@ -98,28 +98,19 @@ def _follow_truth(
         context.effort.spend(len(points))
         return np.nan_to_num(outputs[:, valid])
 
-    def whole(x: np.ndarray) -> np.ndarray:
-        unit = start.copy()
-        unit[columns] = x
-        return unit
+    def whole(points: np.ndarray) -> np.ndarray:
+        units = np.tile(start, (len(points), 1))
+        units[:, columns] = points
+        return units
 
     def compute_slopes(unit: np.ndarray, whose: Sequence[str], inside: Sequence[int]) -> np.ndarray:
         points, width = two_sided(unit, inside)
         return slopes(simulate_points(points, whose), width)
 
-    def nearest(x: np.ndarray, rows: np.ndarray):
-        from scipy.optimize import least_squares
-
-        return least_squares(
-            lambda x: (simulate_points(whole(x)[None], rival.names)[0] - truth)[rows],
-            np.clip(x, 1e-3, 1 - 1e-3),
-            lambda x: compute_slopes(whole(x), rival.names, columns)[:, rows].T,  # pyright: ignore[reportArgumentType]
-            bounds=(0.0, 1.0),
-            xtol=1e-14,
-            ftol=DONE,
-            gtol=1e-14,
-            max_nfev=60,
-        )
+    def come_nearest(point: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        miss = lambda points, _: (simulate_points(whole(points), rival.names) - truth)[:, rows]  # noqa: E731
+        begin = np.clip(point, 1e-3, 1 - 1e-3)[None]
+        return descend(miss, begin, None, MOST_FOLLOWING_STEPS, DONE, central=True).unit[0]
 
     mild = np.zeros(valid.shape, bool)  # first: near a stall a descent from afar goes astray
     mild[:, : drive.first[drive.events // 2]] = True
@@ -127,13 +118,14 @@ def _follow_truth(
     for rows in (mild[valid], np.ones(len(truth), bool)):
         if not rows.any():  # the load stalls in all of them
             continue
-        ended = nearest(nearest_point, rows)
-        nearest_point, off = ended.x, float(np.abs(ended.fun).max())
+        nearest_point = come_nearest(nearest_point, rows)
+        missed = simulate_points(whole(nearest_point[None]), rival.names)[0] - truth
+        off = float(np.abs(missed[rows]).max())
         if off > LARGEST_FOLLOWED_DISTANCE:
             return None
     own = (
         compute_slopes(point, names, _of_load(context, names)),
-        compute_slopes(whole(nearest_point), rival.names, columns),
+        compute_slopes(whole(nearest_point[None])[0], rival.names, columns),
     )
     ranks = [_rank(rows) for rows in (*own, np.concatenate(own))]
     return (ranks[2], off) if len(set(ranks)) == 1 else None

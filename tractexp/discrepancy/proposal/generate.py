@@ -90,7 +90,7 @@ def source(term: Term, values: Mapping[str, float], records: str) -> str:
         + CLASS.format(
             headline=headline,
             latex=quoting.python(term.latex),
-            time=TIME if term.exogenous else "",
+            time=TIME if term.clock else "",
             records=quoting.python(records),
             parameters="\n".join(_declare_parameters(term, values)),
             relevant=f"{{{relevant}}}",

@@ -27,7 +27,6 @@ from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.model_error import Change
-from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 
@@ -85,7 +84,7 @@ def term_assessments(
         fits,
         [fit.unit for fit in fits],
     )
-    there = original.move_to_records(Records.from_events(events, original.records.window))
+    there = original.move_to_events(events)
     validate = _assess_models(there, other, noise, [*other.coordinates.before], bare, fits, held)
     return [TermAssessment(*each) for each in zip(fits, train, validate, p, strict=False)]
 
@@ -139,7 +138,7 @@ def measure_changes(
     nested[at.base] = base.unit[at.base]
     nested[at.sizes(fit.names)] = at.null[at.sizes(fit.names)]
     (best,) = refit(context, noise, [(fit.names, found), (fit.names, nested)], faults=())
-    there = context.move_to_records(Records.from_events(events, context.records.window))
+    there = context.move_to_events(events)
     fitted, held_out = (
         Change(
             *(

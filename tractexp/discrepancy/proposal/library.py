@@ -129,7 +129,7 @@ class Balance:
 
 @dataclass(frozen=True)
 class Term:
-    """A signal in a balance."""
+    """A signal in a balance; with a clock it is a function of time, not of the voltage."""
 
     balance: Balance
     signal: Signal
@@ -155,11 +155,6 @@ class Term:
             for s in self.balance.sizes
         ]
         return sizes + [s.parameter(prefix + s.name, values[s.name]) for s in self.signal.shapes]
-
-    @property
-    def exogenous(self) -> bool:
-        """Whether it is a function of time, not of the voltage."""
-        return self.clock is not None
 
     @property
     def words(self) -> str:

@@ -215,7 +215,7 @@ def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | Non
         "terms": [
             _name_term(proposal.term)
             | {
-                "function_of_voltage": not proposal.term.exogenous,
+                "function_of_voltage": proposal.term.clock is None,
                 "parameters": {k.parameter.name: k.plain() for k in proposal.estimates},
             }
         ],
