@@ -255,7 +255,7 @@ def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     made = model.simulate(
         bench.drive, np.array(values)[None], bench.problem.step.substeps, before[:, None]
     )
-    assert np.abs(made.outputs[:, 0] - proposal.train.after.calculated).max() < 1e-8
+    assert np.abs(made.outputs[:, 0] - proposal.judged.train.after.calculated).max() < 1e-8
     assert any("proposed_size_P" in line or "k_P" in line for line in model.latex())
 
 
@@ -281,7 +281,7 @@ def test_what_a_right_term_explains_does_not_hang_on_the_level_of_the_noise(seed
     """
     made = events("load_step", 0.2, seed=seed, recorder=FAST)
     found = searched(made[:2], made[2:])
-    held = found.proposal.validate
+    held = found.proposal.judged.validate
     excess = held.before.deviance - held.context.samples
     assert held.gain / excess == pytest.approx(measured, abs=0.1)
     assert 0.8 < held.explained_share <= 1.0

@@ -135,17 +135,17 @@ def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_
     proposal = proposed.proposal
     assert proposal.term.name == "answer:torque:slip"  # the torque falls with the speed
     assert proposal.values["size"] < 0
-    assert proposal.validate.explained_share > 0.9
+    assert proposal.judged.validate.explained_share > 0.9
     (tmp_path / "proposed_effect.py").write_text(proposal.source, encoding="utf-8")
     effect = runpy.run_path(str(tmp_path / "proposed_effect.py"))["ProposedEffect"]()
-    context, fit = proposal.train.context, proposed.tried[0][1].fit
+    context, fit = proposal.judged.train.context, proposed.tried[0][1].fit
     faults = [context.catalogue[name].effect for name in context.catalogue.of_measurement]
     model = compose(context.load.motor, context.load.static, [effect, *faults], domain="waves")
     own = {f"proposed_{name}": value for name, value in proposal.values.items()}
     at = lambda name: own[name] if name in own else context.coordinates.value(name, fit.unit)  # noqa: E731
     values = np.array([[at(name) for name in model.names]])
     drawn = model.simulate(context.drive, values, context.problem.step.substeps).outputs[:, 0]
-    with_it, without = proposal.train.after.calculated, proposal.train.before.calculated
+    with_it, without = proposal.judged.train.after.calculated, proposal.judged.train.before.calculated
     # all but the power before the dip, which the fit leaves free
     assert np.abs((drawn - with_it) * context.valid).max() < 0.1 * np.abs(without - with_it).max()
 
