@@ -190,8 +190,8 @@ def test_an_equation_in_another_parameter_is_proved_to_be_the_same(alike):
     bench, noise, bare, fits = alike
     pair = fits["stator_resistance"], fits["leakage_loss"]
     proof = same(bench, *pair)
-    assert proof.off < 1e-6
-    assert proof.rank == len(bench.coordinates.base) + 1
+    assert proof["off"] < 1e-6
+    assert proof["rank"] == len(bench.coordinates.base) + 1
     chosen = next_event(bench, noise, bare, pair, ["copper", "loss"])
     assert [(a, b) for a, b, _ in chosen.same] == [(0, 1)]
     assert chosen.sentence().startswith(

@@ -244,7 +244,10 @@ def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     made, found = stepped
     found.write(tmp_path)
     module = _loaded(tmp_path / "proposed_effect.py", monkeypatch)
-    proposal, bench = found.steps.proposed.proposal, found.steps.proposed.proposal.judged.train.context
+    proposal, bench = (
+        found.steps.proposed.proposal,
+        found.steps.proposed.proposal.judged.train.context,
+    )
     chosen = found.steps.proposed.tried[0][1].fit
     faults = [bench.catalogue[n].effect for n in bench.catalogue.of_measurement]
     model = base(module.ProposedEffect(), *faults)

@@ -145,7 +145,10 @@ def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_
     at = lambda name: own[name] if name in own else context.coordinates.value(name, fit.unit)  # noqa: E731
     values = np.array([[at(name) for name in model.names]])
     drawn = model.simulate(context.drive, values, context.problem.step.substeps).outputs[:, 0]
-    with_it, without = proposal.judged.train.after.calculated, proposal.judged.train.before.calculated
+    with_it, without = (
+        proposal.judged.train.after.calculated,
+        proposal.judged.train.before.calculated,
+    )
     # all but the power before the dip, which the fit leaves free
     assert np.abs((drawn - with_it) * context.valid).max() < 0.1 * np.abs(without - with_it).max()
 

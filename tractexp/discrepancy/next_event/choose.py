@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, driven, imagine_dips
-from tractexp.discrepancy.next_event.same import Same, same
+from tractexp.discrepancy.next_event.same import same
 from tractexp.discrepancy.next_event.separation import (
     FEW,
     Separation,
@@ -78,7 +78,7 @@ class NextEvent:
     best: EventTrial
     tried: tuple[EventTrial, ...]
     criteria: Criteria
-    same: tuple[tuple[int, int, Same], ...] = field(default=())
+    same: tuple[tuple[int, int, dict[str, Any]], ...] = field(default=())
     hopeless: tuple[tuple[int, int, float], ...] = field(default=())
     error: float = 0.0  # what the rivals miss of the response, counted in all chances
 
@@ -91,7 +91,7 @@ class NextEvent:
         """What to record, or why nothing need be."""
         sentences = [
             f"{self.rivals[a]} and {self.rivals[b]} cannot be told apart by any dip at this bus:"
-            f" {proof.reason}"
+            f" {proof['reason']}"
             for a, b, proof in self.same
         ]
         sentences += [
@@ -112,13 +112,7 @@ class NextEvent:
             "model_error": self.error,
             "recommended": self._row(self.best),
             "indistinguishable": [
-                {
-                    "pair": [self.rivals[a], self.rivals[b]],
-                    "rank": s.rank,
-                    "off": s.off,
-                    "reason": s.reason,
-                }
-                for a, b, s in self.same
+                {"pair": [self.rivals[a], self.rivals[b]]} | proof for a, b, proof in self.same
             ],
             "no_event_separates": [
                 {"pair": [self.rivals[a], self.rivals[b]], "probability": p}

@@ -2,6 +2,7 @@
 and rates.
 """
 
+import functools
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -105,29 +106,21 @@ def imagine_dips(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDi
     rivals `reads` it.
     """
     domain, durations = context.domain, context.domain.dips.durations
+    pairs = list(itertools.product(DEPTHS, durations))
+    few = list(itertools.product(DEPTHS[::2], durations[::2]))
+    imagine = functools.partial(ImaginedDip, domain=domain)
+    unbalanced = [imagine(*pair, unbalance=UNBALANCED_SHARE) for pair in few]
     if not domain.further:
-        turned = itertools.product(DEPTHS, durations, (0.0, *JUMPS))
-        unbalanced = itertools.product(DEPTHS[::2], durations[::2])
-        dips = [ImaginedDip(*pair, jump=j, domain=domain) for *pair, j in turned]
-        return dips + [
-            ImaginedDip(*pair, unbalance=UNBALANCED_SHARE, domain=domain) for pair in unbalanced
-        ]
-    dips = [ImaginedDip(*pair) for pair in itertools.product(DEPTHS, durations)]
-    dips += [ImaginedDip(depth, LASTING, switched=True) for depth in SWITCHED]
-    dips += [
-        ImaginedDip(*p, jump=j) for *p, j in itertools.product(DEPTHS[::2], durations[::2], JUMPS)
-    ]
-    dips += [
-        ImaginedDip(SWITCHED[1], LASTING, jump=j, switched=True)
-        for j in (-TURNED_BY_BANK, TURNED_BY_BANK)
-    ]
+        return [imagine(*pair, jump=j) for pair in pairs for j in (0.0, *JUMPS)] + unbalanced
+    dips = [imagine(*pair) for pair in pairs]
+    dips += [imagine(depth, LASTING, switched=True) for depth in SWITCHED]
+    dips += [imagine(*pair, jump=j) for pair in few for j in JUMPS]
+    turned = -TURNED_BY_BANK, TURNED_BY_BANK
+    dips += [imagine(SWITCHED[1], LASTING, jump=j, switched=True) for j in turned]
     if "U2" in reads:
-        dips += [
-            ImaginedDip(*pair, unbalance=UNBALANCED_SHARE)
-            for pair in itertools.product(DEPTHS[::2], durations[::2])
-        ]
+        dips += unbalanced
     if RATE_FACTOR / context.events[0].record.step <= HIGHEST_PHASOR_RATE:
-        dips += [ImaginedDip(depth, durations[1], rate=RATE_FACTOR) for depth in DEPTHS[2::2]]
+        dips += [imagine(depth, durations[1], rate=RATE_FACTOR) for depth in DEPTHS[2::2]]
     return dips
 
 

@@ -9,7 +9,7 @@ half its size, to what the integration leaves.
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,30 +29,10 @@ RICH = (0.1, 0.3, 0.5, 0.7)  # depths
 TURNED = (0.0, 20.0, -30.0)  # degrees
 
 
-@dataclass(frozen=True)
-class Same:
-    """Two explanations that are one: the rank of their joint Jacobian and how near each follows the
-    other [pu].
-    """
-
-    rank: int
-    events: int
-    off: float
-
-    @property
-    def reason(self) -> str:
-        """Why two rivals cannot be told apart by any dip."""
-        return (
-            f"over {self.events} voltages, dips and phase jumps of many sizes, the changes that the"
-            " parameters of"
-            f" either make span the same {self.rank} directions, and each follows the other within"
-            f" {LARGEST_FOLLOWED_DISTANCE:.0e} pu"
-        )
-
-
-def same(context: Context, one: Refit, other: Refit) -> Same | None:
+def same(context: Context, one: Refit, other: Refit) -> dict[str, Any] | None:
     """The proof that two explanations are the same function of the voltage, None where they are
-    not.
+    not: the `rank` of their joint Jacobian, how far each is `off` the other where it follows it
+    [pu], and the `reason` why no dip tells them apart.
     """
     events = [
         ImaginedDip(*shape)
@@ -66,7 +46,13 @@ def same(context: Context, one: Refit, other: Refit) -> Same | None:
             if pair is None:
                 return None
             pairs.append(pair)
-    return Same(max(rank for rank, _ in pairs), len(events), max(off for _, off in pairs))
+    rank = max(rank for rank, _ in pairs)
+    reason = (
+        f"over {len(events)} voltages, dips and phase jumps of many sizes, the changes that the"
+        f" parameters of either make span the same {rank} directions, and each follows the other"
+        f" within {LARGEST_FOLLOWED_DISTANCE:.0e} pu"
+    )
+    return {"rank": rank, "off": max(off for _, off in pairs), "reason": reason}
 
 
 def _shrunk(context: Context, fit: Refit, size: float) -> np.ndarray:
