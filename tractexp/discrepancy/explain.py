@@ -34,7 +34,6 @@ from tractexp.discrepancy.ranking import (
 from tractexp.inference.chance import by_draws
 from tractexp.inference.context import Context
 from tractexp.inference.model_error import describe_stall, in_percent
-from tractexp.inference.recorder_window import RecorderWindow
 from tractexp.text.wording import alternatives, join_words, list_figures
 
 CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
@@ -70,7 +69,8 @@ def explain(
             "what the fitted events leave open of it was fitted to the held-out ones, too"
         )
     if (window := context.records.window) is not None:
-        clauses.append(f"{window.describe()}, which is taken into account{_doubt_window(window)}")
+        doubt = "" if window.said else ", though no record says so: ask whether it does"
+        clauses.append(f"{window.describe()}, which is taken into account{doubt}")
     tests = evidence.base.tests if verdict.chosen is None else verdict.chosen.tests or evidence.last
     if tests is not None and tests.parameters_at_bound:
         clauses.append(f"on a bound: {', '.join(tests.parameters_at_bound)}")
@@ -88,11 +88,6 @@ def _explain_confirmation(verdict: Verdict, evidence: Evidence, *, all_fitted: b
     if verdict.word == CANDIDATE:
         return [_explain_doubt(verdict.kept[0], evidence, all_fitted=all_fitted)]
     return []
-
-
-def _doubt_window(window: RecorderWindow) -> str:
-    """What is to be asked of a window that no record names, as the end of a sentence."""
-    return "" if window.said else ", though no record says so: ask whether it does"
 
 
 def _explain_word(

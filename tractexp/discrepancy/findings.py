@@ -237,7 +237,7 @@ class Findings:
     @property
     def base_grade(self) -> GradedModel:
         """The base model as it was given, as an identification grades it."""
-        return self.grader.grade_base()
+        return self.grader.grade((), self.grader.base.window)
 
     @property
     def final_grade(self) -> GradedModel:

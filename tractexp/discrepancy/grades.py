@@ -36,10 +36,6 @@ class Grader:
     search: Callable[[Problem], np.ndarray] | None = None
     known: dict[str, GradedModel] = field(default_factory=dict)
 
-    def grade_base(self) -> GradedModel:
-        """The base model as it was given."""
-        return self.grade((), self.base.window)
-
     def grade(
         self,
         names: Sequence[str],

@@ -24,7 +24,7 @@ from tractexp.identification.profile_lanes import (
     find_outermost,
     others_free,
 )
-from tractexp.identification.uncertainty import Uncertainty, threshold
+from tractexp.identification.uncertainty import Uncertainty, conclude, threshold
 from tractexp.identification.verdict import (
     BOUND,
     END_OF_RANGE,
@@ -232,7 +232,7 @@ def profiles(
         with parts(points) as ended:
             drawing.begin(points, ended)
         if drawing.better is None:
-            drawing.look_elsewhere(points)
+            drawing.join(_elsewhere(uncertainty, column, drawing.curves), points)
         for _ in names:  # what one lane went through may lead another on, and that the next
             if drawing.better is not None or not drawing.go_on(points):
                 break
@@ -248,7 +248,8 @@ def profiles(
             )
         descent = uncertainty.likelihood.descent(drawing.better[None])
         simulations += descent.simulations
-        uncertainty = uncertainty.judge_point(descent.unit[0])
+        noise = None if uncertainty.exact else uncertainty.of_noise
+        uncertainty = conclude(uncertainty.likelihood, descent.unit[0], noise, uncertainty.notes)
         restarts += 1
 
 
@@ -278,10 +279,6 @@ class _Drawing:
         self._run(lanes, points, ended)
         self.curves = [lanes.profile(i) for i in range(k)]
 
-    def look_elsewhere(self, points: int) -> None:
-        """Lanes from where the rest of a range fits as well."""
-        self._join(_elsewhere(self.uncertainty, self.column, self.curves), points)
-
     def go_on(self, points: int) -> bool:
         """Lanes from points of all lanes that fit and lie beyond a profile's interval; False where
         there are none.
@@ -294,7 +291,7 @@ class _Drawing:
         if where:
             c, k = np.array(where).T
             rise = self.rise[k, c] * threshold()
-            self._join(Lanes(self.uncertainty, c, self.unit[k], rise), points)
+            self.join(Lanes(self.uncertainty, c, self.unit[k], rise), points)
         return bool(where)
 
     def find_wider(self) -> np.ndarray:
@@ -310,7 +307,7 @@ class _Drawing:
         unit = _in_range(self.uncertainty, c, interval)
         return find_outermost(self.unit, self.rise, c, unit)
 
-    def _join(self, lanes: Lanes, points: int) -> None:
+    def join(self, lanes: Lanes, points: int) -> None:
         """Draw lanes that begin elsewhere, and join each with the profile of its parameter."""
         self._run(lanes, points)
         self.curves = [

@@ -102,10 +102,6 @@ class Uncertainty:
         """
         return self.factors * self.information.standard_errors
 
-    def judge_point(self, unit: np.ndarray) -> "Uncertainty":
-        """The judgement of another point (D,) of the likelihood."""
-        return conclude(self.likelihood, unit, None if self.exact else self.of_noise, self.notes)
-
     def descend_in(
         self, problem: Problem, points: np.ndarray, iterations: int
     ) -> tuple[Likelihood, Descent]:

@@ -33,8 +33,6 @@ LESS = 1.0
 LEAST_WANDERING = 2.0
 # of the intensity, variances of the channel per second
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))
-# of a single stretch, in variances of its noise
-STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +77,6 @@ class Walk:
         """The logarithm of the likelihood of each intensity of a grid (g,), up to a constant."""
         spread = 1 + np.outer(grid, self.values**2)
         return -(np.log(spread) + self.along**2 / spread).sum(axis=1) / 2
-
-    @property
-    def likeliest(self) -> float:
-        """The intensity of most likelihood on the grid `STIFF`."""
-        return float(STIFF[self.likelihood(STIFF).argmax()])
 
     def share(self, intensity: float) -> np.ndarray:
         """The share (k,) of each direction's variance that is mode and not noise.

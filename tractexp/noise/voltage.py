@@ -26,6 +26,8 @@ SHORTEST_SMOOTHED_STRETCH = 24  # samples of a stretch worth smoothing
 DEGREE, COSINES = 3, 32  # of the curve through a smooth stretch
 # samples as recorded whose errors are followed up, the nearest to the dip: each costs a simulation
 MOST_FOLLOWED_SAMPLES = 400
+# intensities of a curve that are tried, in variances of a stretch's noise
+STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))
 LEAST_NOISE_SHARE = 0.01  # share of a direction's noise: less of it is left out
 SILENT = 1e-5  # pu: less noise than this is none
 
@@ -160,7 +162,7 @@ def _curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
     walk = Walk.from_stretch(
         U / deviation, fixed, cosines(n, count) / np.arange(1, count + 1)[:, None] ** 2
     )
-    share = walk.share(walk.likeliest)
+    share = walk.share(float(STIFF[walk.likelihood(STIFF).argmax()]))
     curve = (U @ fixed.T) @ fixed + deviation * ((walk.along * share) @ walk.basis)
     seen = share > LEAST_NOISE_SHARE
     return curve, deviation * np.concatenate([fixed, np.sqrt(share[seen, None]) * walk.basis[seen]])

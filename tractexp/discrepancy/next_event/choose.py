@@ -145,16 +145,11 @@ class NextEvent:
         missed = f", where they miss {in_percent(self.error)} of a response" if self.error else ""
         if p >= DECIDED:
             return f"record {what}: it tells {them} with a probability of {p:.0%}{missed}"
-        sure = f"no event that was tried is sure to tell {them}"
+        several = f", {self.best.repeated} of them are sure to" if self.best.repeated else ""
         return (
-            f"{sure}; the surest, {what}, does so with a probability of"
-            f" {p:.0%}{missed}{_describe_joint_events(self.best)}"
+            f"no event that was tried is sure to tell {them}; the surest, {what}, does so with a"
+            f" probability of {p:.0%}{missed}{several}"
         )
-
-
-def _describe_joint_events(tried: EventTrial) -> str:
-    """How many such events are sure to."""
-    return f", {tried.repeated} of them are sure to" if tried.repeated else ""
 
 
 def next_event(

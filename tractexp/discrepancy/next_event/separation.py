@@ -84,11 +84,6 @@ class EventView:
     # by how many times the noise's variance the model's error adds to it
     missed: float = 0.0
 
-    @property
-    def survives(self) -> bool:
-        """Whether a load can be simulated through the event."""
-        return bool(np.isfinite(self.f).all() and np.isfinite(self.K).all())
-
 
 def linearize_side(context: Context, noise: Noise, fit: Refit) -> Side:
     """Linearise an explanation at its fit."""
@@ -126,7 +121,10 @@ def seen(
             context,
             names,
             middle[None],
-            [_raise_initial_power(d, channel, sign * POWER_DIFFERENCE) for d in drives],
+            [
+                replace(d, **{channel: getattr(d, channel) + sign * POWER_DIFFERENCE})
+                for d in drives
+            ],
         )
         for channel in ("P0", "Q0")
         for sign in (1, -1)
@@ -160,11 +158,6 @@ def _simulate_drives(
     return np.moveaxis(power.reshape(len(points), power.shape[1], len(drives), -1), 2, 0)
 
 
-def _raise_initial_power(drive, channel: str, more: float):
-    """The same voltage, with a little more P0 or Q0."""
-    return replace(drive, **{channel: getattr(drive, channel) + more})
-
-
 class Separation:
     """Rivals on the recorded events, reduced to what they span; the first of `sides` is the base
     model.
@@ -188,7 +181,7 @@ class Separation:
         None is denied where a side does not survive, the truth itself always where all do. What the
         models miss is missed again in each of its like: more of them tell more of the noise alone.
         """
-        if not all(x.survives for x in seen):
+        if not all(np.isfinite(x.f).all() and np.isfinite(x.K).all() for x in seen):
             return np.zeros((len(self.sides) - 1, self.draws), bool)
         weight = np.sqrt(times / (1 + times * max(x.missed for x in seen)))
         rows = _reduce_blocks([weight * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
