@@ -160,7 +160,7 @@ class Uncertainty:
                     continue
                 tests = ljung_box(seen, self.of_noise.noise.pair(e)[c].order), jarque_bera(seen)
                 results += [
-                    {"event": event.record.name, "channel": channel, **vars(t)} for t in tests
+                    {"event": event.record.name, "channel": channel, **told} for told in tests
                 ]
         return results
 

@@ -1,36 +1,11 @@
 """Is what a fit leaves over noise? Tests of whitened residuals, in closed form."""
 
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 LAGS = 20
 REJECTED = 0.01  # p-value below which a test speaks
-
-
-@dataclass(frozen=True)
-class ResidualTest:
-    """A test of whitened residuals.
-
-    Attributes
-    ----------
-    name : str
-        What is tested, and by which test.
-    statistic : float
-        Its value.
-    freedom : int
-        Degrees of freedom of the chi-squared distribution it is compared with.
-    p : float
-        Probability of as large a statistic where nothing but noise is left.
-    says : str
-        Its outcome in a word.
-    """
-
-    name: str
-    statistic: float
-    freedom: int
-    p: float
-    says: str
 
 
 def autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
@@ -58,7 +33,7 @@ def autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
     return np.array([centered[k:] @ centered[:-k] for k in range(1, lags + 1)]) / (power or 1.0)
 
 
-def ljung_box(rows: np.ndarray, fitted: int = 0) -> ResidualTest:
+def ljung_box(rows: np.ndarray, fitted: int = 0) -> dict[str, Any]:
     """Whether a row is uncorrelated.
 
     Parameters
@@ -70,26 +45,21 @@ def ljung_box(rows: np.ndarray, fitted: int = 0) -> ResidualTest:
 
     Returns
     -------
-    ResidualTest
-        Its statistic is n (n + 2) times the sum of r_k² / (n - k) over the lags.
+    dict
+        As of `tell_test`; its statistic is n (n + 2) times the sum of r_k² / (n - k) over the lags.
 
     Notes
     -----
     Source: Ljung and Box 1978.
     """
-    from scipy.special import chdtrc
-
     n = len(rows)
     lags = max(min(max(LAGS, fitted + 5), n // 4), fitted + 1)
     r = autocorrelation(rows, lags)
     statistic = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
-    p = float(chdtrc(lags - fitted, statistic))
-    return ResidualTest(
-        "whiteness (Ljung-Box)", statistic, lags - fitted, p, "colored" if p < REJECTED else "white"
-    )
+    return tell_test("whiteness (Ljung-Box)", statistic, lags - fitted, ("colored", "white"))
 
 
-def jarque_bera(rows: np.ndarray) -> ResidualTest:
+def jarque_bera(rows: np.ndarray) -> dict[str, Any]:
     """Whether a row has the skewness and kurtosis of a normal distribution.
 
     As `scipy.stats.jarque_bera`, without the second that importing it takes.
@@ -101,8 +71,8 @@ def jarque_bera(rows: np.ndarray) -> ResidualTest:
 
     Returns
     -------
-    ResidualTest
-        Its statistic has two degrees of freedom.
+    dict
+        As of `tell_test`; its statistic has two degrees of freedom.
 
     Notes
     -----
@@ -112,14 +82,38 @@ def jarque_bera(rows: np.ndarray) -> ResidualTest:
     --------
     >>> spiky = np.zeros(100)
     >>> spiky[50] = 10.0
-    >>> jarque_bera(spiky).p < 0.001
+    >>> jarque_bera(spiky)["p"] < 0.001
     True
+    """
+    z = (rows - rows.mean()) / (rows.std() or 1.0)
+    statistic = len(z) / 6 * float(np.mean(z**3) ** 2 + (np.mean(z**4) - 3) ** 2 / 4)
+    return tell_test("normality (Jarque-Bera)", statistic, 2, ("not normal", "normal"))
+
+
+def tell_test(
+    name: str, statistic: float, freedom: int, outcomes: tuple[str, str]
+) -> dict[str, Any]:
+    """What `result.json` has of a test.
+
+    Parameters
+    ----------
+    name : str
+        What is tested, and by which test.
+    statistic : float
+        Its value.
+    freedom : int
+        Degrees of freedom of the chi-squared distribution it is compared with.
+    outcomes : (str, str)
+        The words where the test speaks, and where it does not.
+
+    Returns
+    -------
+    dict
+        Name, statistic and freedom; `p`, the probability of as large a statistic where nothing but
+        noise is left; and what it `says`, in a word.
     """
     from scipy.special import chdtrc
 
-    z = (rows - rows.mean()) / (rows.std() or 1.0)
-    statistic = len(z) / 6 * float(np.mean(z**3) ** 2 + (np.mean(z**4) - 3) ** 2 / 4)
-    p = float(chdtrc(2, statistic))
-    return ResidualTest(
-        "normality (Jarque-Bera)", statistic, 2, p, "not normal" if p < REJECTED else "normal"
-    )
+    p = float(chdtrc(freedom, statistic))
+    says = outcomes[0] if p < REJECTED else outcomes[1]
+    return {"name": name, "statistic": statistic, "freedom": freedom, "p": p, "says": says}
