@@ -75,12 +75,14 @@ class PredictedError:
         """By how much it leaves less, beyond chance: of the ratio's logarithm, by a jackknife over
         the blocks. Not above 0 where that may be chance.
         """
-        own_sum, other_sum = self.squares.sum(), other.squares.sum()
+        own_sum = self.squares.sum()
+        other_sum = other.squares.sum()
         if not np.isfinite(own_sum):
             return -np.inf
         if not np.isfinite(other_sum):
             return np.inf
-        own_rest, other_rest = own_sum - self.squares, other_sum - other.squares
+        own_rest = own_sum - self.squares
+        other_rest = other_sum - other.squares
         without = np.log(np.maximum(other_rest, 1e-300) / np.maximum(own_rest, 1e-300))
         lead = float(np.log(other_sum / own_sum))
         return lead - reach(without, lead)
@@ -189,7 +191,8 @@ class Evidence:
         """The base model, then with one member more at a time, the one that helps most: what each
         is good for.
         """
-        steps, missing = [self.base], set(names)
+        steps = [self.base]
+        missing = set(names)
         while missing:
             wanted = [tuple(sorted((*steps[-1].fit.names, name))) for name in missing]
             found = [row for row in map(self.row_of, wanted) if row is not None]

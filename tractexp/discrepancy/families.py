@@ -39,7 +39,8 @@ def against_members(
     """
     if tests.suffices and not tests.fit.names:
         return tests, []
-    context, noise = base.context, tests.noise
+    context = base.context
+    noise = tests.noise
     fits = member_fits(context, noise, refits, {m.effect.family for m in context.catalogue.members})
     for k, fit in enumerate(fits[:EXAMINED]):
         near = not tests.suffices and fit.cost < tests.fit.cost + NEAR_BEST

@@ -92,10 +92,8 @@ def _draw_textbook_law(
     a law is the catalogue's.
     """
     default = {p.name: p.default for p in effect.parameters}
-    at, fit = (
-        findings.context.coordinates,
-        findings.explanations.refits.get((effect.family or effect.name,)),
-    )
+    at = findings.context.coordinates
+    fit = findings.explanations.refits.get((effect.family or effect.name,))
     start = dict(values)
     if effect.as_textbook and fit is not None:
         start |= {own: at.value(theirs, fit.unit) for own, theirs in effect.as_textbook.items()}

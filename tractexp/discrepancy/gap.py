@@ -157,7 +157,8 @@ def gap(
     -------
     GapTest
     """
-    before, after = curves(context, base, noise, without), curves(context, extended, noise, names)
+    before = curves(context, base, noise, without)
+    after = curves(context, extended, noise, names)
     gained = before.deviance - after.deviance
     left = np.inf
     if np.isfinite(after.deviance):
@@ -171,7 +172,8 @@ def gap(
     by_event = tuple(
         float(np.sum(rows[:, context.drive.part(e)] ** 2)) for e in range(len(context.events))
     )
-    shown, units = context.criteria.shown, (base, extended)
+    shown = context.criteria.shown
+    units = (base, extended)
     return GapTest(
         before,
         after,
@@ -229,7 +231,8 @@ def beyond_chance(
     """
     raw = context.residuals(np.concatenate([unit[None], two_sided(unit, fitted)[0]]), names)
     rows = np.nan_to_num(context.whiten(noise, raw))
-    r, k = rows[0], len(fitted)
+    r = rows[0]
+    k = len(fitted)
     nuisance = rows[1 : 1 + k] - rows[1 + k :]
     nuisance = nuisance[~find_active_bounds(context, unit, fitted, nuisance @ r)]
     Q = np.linalg.qr(nuisance.T)[0]

@@ -85,7 +85,8 @@ class Grader:
 
     def _extend_base(self, names: Sequence[str], window: float | str | None) -> Model:
         """The base model with further effects, behind a recorder's window."""
-        base, own = self.base, {effect.name for effect in self.base.effects}
+        base = self.base
+        own = {effect.name for effect in self.base.effects}
         added = [self.catalogue[name].effect for name in names if name not in own]
         return compose(
             base.motor, base.static, [*base.effects, *added], base.integration, base.domain, window

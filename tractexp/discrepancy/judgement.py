@@ -41,7 +41,8 @@ def judgements(investigation: Findings) -> list[Judgement]:
         for name, why in investigation.catalogue.untestable.items()
     ]
     for candidate in investigation.catalogue.candidates:
-        name, score = candidate.name, scores.get(candidate.name)
+        name = candidate.name
+        score = scores.get(candidate.name)
         if name in investigation.names:
             judged_effects.append(Judgement(name, "relevant", "added"))
         elif name in investigation.last.fit.names:

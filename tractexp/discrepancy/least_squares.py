@@ -90,9 +90,7 @@ def _robust(context: Context, projection: ScoreTest) -> np.ndarray:
     J = projection.Q @ projection.R  # with the rows of the prior
     r = projection.r[0] + projection.Q @ projection.along[0]
     measured = context.drive.measurements
-    columns, rows = (
-        J[: measured.size].reshape(*measured.shape, -1),
-        r[: measured.size].reshape(measured.shape),
-    )
+    columns = J[: measured.size].reshape(*measured.shape, -1)
+    rows = r[: measured.size].reshape(measured.shape)
     blocks = blocks_of(context.events, context.drive, J.shape[1])
     return robust_root(J, moves_without_blocks(columns, rows, blocks, J.T @ J))[0]

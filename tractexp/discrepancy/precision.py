@@ -36,7 +36,8 @@ def effect_sizes(
     """How large the named effects are in a fit; with standard errors where its
     `tests` were made.
     """
-    at, own = context.coordinates, context.catalogue.sizes(names)
+    at = context.coordinates
+    own = context.catalogue.sizes(names)
     values = [at.value(p.name, fit.unit) for p in own]
     if tests is None:
         return [ParameterEstimate(p, value, np.nan) for p, value in zip(own, values, strict=True)]
@@ -67,7 +68,8 @@ def estimates(
     The words are those of an identification.
     """
     context = tests.context
-    at, errors = context.coordinates, standard_errors(tests)
+    at = context.coordinates
+    errors = standard_errors(tests)
     own = context.catalogue.parameters(effects)
     declared = {p.name: p for p in (*context.problem.parameters, *own)}
     names = [*(at.names[k] for k in at.base), *(p.name for p in own)]
@@ -88,7 +90,8 @@ def _words(
     tests: Disagreement, names: Sequence[str], values: Sequence[float], errors: Sequence[float]
 ) -> dict[str, str]:
     """The verdict of each parameter, with all other coordinates left free beside them."""
-    at, R = tests.context.coordinates, tests.root
+    at = tests.context.coordinates
+    R = tests.root
     columns = at.nuisances(tests.fit.names)
     own = [columns.index(at.column[n]) for n in names]
     others = [i for i in range(len(columns)) if i not in own]

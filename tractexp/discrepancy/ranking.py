@@ -115,5 +115,6 @@ def beats(one: SetEvidence, other: SetEvidence, criteria: Criteria) -> bool:
 
 def compute_factor(one: SetEvidence, other: SetEvidence) -> float:
     """The factor by which a set divides what another leaves, as a root of squares."""
-    own, others = one.held_out_prediction.excess, other.held_out_prediction.excess
+    own = one.held_out_prediction.excess
+    others = other.held_out_prediction.excess
     return (others / own) ** 0.5 if own > 0 else float("inf") if others > 0 else 1.0

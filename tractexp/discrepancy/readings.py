@@ -159,7 +159,8 @@ def read_shapes(shapes: Sequence[Remainder], event: Event) -> list[Reading]:
     """A reading of each shape, the loudest first; `event` is the first that was fitted, whose file
     is looked at.
     """
-    supply, commands = event.record.base.frequency, _list_commands(event)
+    supply = event.record.base.frequency
+    commands = _list_commands(event)
     return [
         reading
         for shape in shapes

@@ -68,10 +68,8 @@ class Remainder:
     def __str__(self) -> str:
         """What is left, where, from when on, and whether it dies away."""
         size = f"{abs(self.size):.2g} pu ({self.times} the noise)"
-        what, when = (
-            f"{self.channel} of {self.event}",
-            f"from t = {self.start:.3f} s on, {self.when}",
-        )
+        what = f"{self.channel} of {self.event}"
+        when = f"from t = {self.start:.3f} s on, {self.when}"
         way = "up" if self.size > 0 else "down"
         if self.kind == "ringing":
             return f"{what} rings at {self.frequency:.3g} Hz {when}, at first by {size}{self._ends}"
@@ -151,8 +149,10 @@ class _Stretch:
 
         Of waveforms it stays what it is, for what is left cannot color that.
         """
-        drive, domain = Drive.from_events([domain_of(event).excitation(event)]), domain_of(event)
-        valid, before = drive.weights > 0, slice(0, event.start)
+        drive = Drive.from_events([domain_of(event).excitation(event)])
+        domain = domain_of(event)
+        valid = drive.weights > 0
+        before = slice(0, event.start)
         if (
             not domain.noise_from_model
             and np.count_nonzero(np.all(valid, axis=0)[before]) >= FEWEST_NOISE_SAMPLES
@@ -198,7 +198,8 @@ class _Stretch:
 
     def take_away(self, shape: _Shape, channel: int) -> tuple[np.ndarray, "_Stretch"]:
         """The sizes (1 or 2,) [pu] of a shape, and what is left without it."""
-        sizes, residual = self.fit_shapes([shape], channel)[1][0], self.residual.copy()
+        sizes = self.fit_shapes([shape], channel)[1][0]
+        residual = self.residual.copy()
         residual[channel] -= sizes @ shape.templates(residual.shape[1])
         return sizes, replace(self, residual=residual)
 
@@ -306,7 +307,8 @@ def _gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
 
 def _refine_shape(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _Shape]:
     """The best shape near one, as the noise lets it be seen in one channel, and what it gains."""
-    n, gain = stretch.residual.shape[1], 0.0
+    n = stretch.residual.shape[1]
+    gain = 0.0
     for _ in range(POLISH_ROUNDS):
         for zoom in 0.5 ** np.arange(ZOOMS if np.isfinite(shape.decay) else 0):
             gain, shape = stretch.find_best(_list_neighbors(shape, zoom, n), channel)
@@ -343,7 +345,8 @@ def _describe_shape(
     stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, share: float
 ) -> Remainder:
     """A shape as a person reads it."""
-    event, step = stretch.event, stretch.event.record.step
+    event = stretch.event
+    step = stretch.event.record.step
     rest = stretch.residual.shape[1] - shape.start
     tau = shape.decay * step if shape.decay < STAYS * rest else None
     size = float(np.hypot(*sizes)) if shape.frequency else float(sizes[0])

@@ -81,7 +81,8 @@ def replicate(
 
     def forget(names: Names, unit: np.ndarray) -> np.ndarray:
         """Sizes back at their nulls: events that show nothing of an effect shall find none."""
-        unit, sizes = unit.copy(), at.sizes(names)
+        unit = unit.copy()
+        sizes = at.sizes(names)
         unit[sizes] = at.null[sizes]
         return unit
 

@@ -201,7 +201,8 @@ def compare_with_squares(
     """
     likelihood = squares.with_initial_power
     rows, plain = likelihood.jacobian(unit)
-    inside, k = off_walls(unit), plain.k
+    inside = off_walls(unit)
+    k = plain.k
     off_bounds = plain.only(inside)
     reached = plain.only(inside & (np.arange(len(inside)) < k)).basis()
 

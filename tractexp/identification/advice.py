@@ -114,10 +114,8 @@ def _deeper(uncertainty: Uncertainty) -> list[str]:
     if problem.per_event:
         return [without_figures]
     deepest = int(np.argmax([e.depth for e in problem.events]))
-    shape, noise = (
-        DipShape.from_event(problem.events[deepest]),
-        uncertainty.likelihood.noise.select_event(deepest),
-    )
+    shape = DipShape.from_event(problem.events[deepest])
+    noise = uncertainty.likelihood.noise.select_event(deepest)
     try:
         forecasts = over_depth(problem, uncertainty.values, shape, uncertainty.information, noise)
     except UserError:  # this model or these values cannot be planned with

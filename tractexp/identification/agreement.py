@@ -33,7 +33,8 @@ def compare_events(uncertainty: Uncertainty) -> dict[str, Any]:
         it}}, infinite where it is not identifiable without; `odd_events`, which do not fit with the
         rest; and `notes`, a sentence on each of them.
     """
-    likelihood, width = uncertainty.likelihood, uncertainty.upper - uncertainty.lower
+    likelihood = uncertainty.likelihood
+    width = uncertainty.upper - uncertainty.lower
     _, J = uncertainty.sensitivities
     own = J.without_own
 

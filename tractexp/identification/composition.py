@@ -152,12 +152,14 @@ def _describe_grid(term: str) -> tuple[Sequence[str], np.ndarray]:
         labels = [f"{hour:02d}:30" for hour in range(24)]
         points = [_harmonics((hour + 0.5) / 24, 2) for hour in range(24)]
     elif term == WEEKDAY:
-        labels, points = list(WEEKDAYS), list(np.eye(7))
+        labels = list(WEEKDAYS)
+        points = list(np.eye(7))
     elif term == SEASON:
         labels = MONTHS.split()
         points = [_harmonics((month + 0.5) / 12, 1) for month in range(12)]
     else:
-        labels, points = ["first", "a year later"], [np.array([0.0]), np.array([1.0])]
+        labels = ["first", "a year later"]
+        points = [np.array([0.0]), np.array([1.0])]
     X = np.zeros((len(labels), 15))
     X[:, 0] = 1.0
     X[:, COLUMNS[term]] = points

@@ -34,7 +34,8 @@ def conclude(
     """
     refuse_failed(problem, end)
     epsilon_p, epsilon_q = relative_errors([fit for fit in fits if fit.role == TRAIN])
-    first, estimates = problem.events[0], _values(problem, free)
+    first = problem.events[0]
+    estimates = _values(problem, free)
     own = OwnBase.from_record(first.record)
     exponents = {p.name: p.power_exponent for p in problem.parameters}
     return Result(
@@ -111,7 +112,8 @@ def _list_costs(end: SearchResult) -> dict[str, Any]:
 
 def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
     """Parameters by name, and those with a value of their own in each event."""
-    names, own = problem.model.names, problem.by_event(free)[:, 0]
+    names = problem.model.names
+    own = problem.by_event(free)[:, 0]
     return {
         "parameters": {n: float(v) for n, v in zip(names, problem.full(free)[0], strict=True)},
         "per_event": {name: own[:, names.index(name)].tolist() for name in problem.per_event},

@@ -126,7 +126,8 @@ class DescentEnds:
         From the dips on: a load that swings before them makes a loud noise, to which a likelihood
         gives up too much.
         """
-        squares, problem = self.likelihood, self.likelihood.problem
+        squares = self.likelihood
+        problem = self.likelihood.problem
         rows = squares.rows(np.stack([unit[: squares.free], self.best]))
         polished, least = (rows**2).reshape(2, problem.drive.channels, -1).sum(axis=1)
         return not exceeds(
@@ -139,10 +140,8 @@ class DescentEnds:
         best"; its sum of squares above the best's, in mean squares of what the best leaves; and the
         parameters that it ended at, in their units.
         """
-        values, above = (
-            self.likelihood.values(self.descent.unit),
-            self.descent.deviance - self.lowest,
-        )
+        values = self.likelihood.values(self.descent.unit)
+        above = self.descent.deviance - self.lowest
         order = [k for k in np.argsort(above, kind="stable") if np.isfinite(above[k])]
         names = self.likelihood.problem.space.names
         return [
@@ -327,7 +326,8 @@ def _find_prior_minima(likelihood: Likelihood, near: np.ndarray) -> np.ndarray:
     """Coordinates (at most 4, d) of the local minima with a prior, from those without it and the
     usual.
     """
-    space, defaults = likelihood.problem.space, likelihood.problem.defaults
+    space = likelihood.problem.space
+    defaults = likelihood.problem.defaults
     starts = np.concatenate([near, space.to_unit(defaults)[None]])
     return distinct(
         likelihood.descent(np.concatenate([starts, explore_minima(likelihood).unit])),
@@ -339,7 +339,8 @@ def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.nda
     """The likelihood of the noise that the fit leaves in quiet, and its maxima (n, D), the best
     first.
     """
-    observed, likelihood = ends.observed, ends.likelihood.with_initial_power
+    observed = ends.observed
+    likelihood = ends.likelihood.with_initial_power
     units = likelihood.place_parameters(ends.near)
     input_modes = observed.input_errors(likelihood.values(units[0]))
     for _ in range(ESTIMATE_ROUNDS):
@@ -376,7 +377,8 @@ def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertaint
     above = (rows**2).sum(axis=1) - uncertainty.deviance
     apart = np.abs(units - uncertainty.unit).max(axis=1, initial=0.0) > SAME_MINIMUM_DISTANCE
     beside = replace(uncertainty, local_minima=tuple(units[apart & (above < threshold())]))
-    verdicts, own = dict(uncertainty.verdicts), uncertainty.intervals
+    verdicts = dict(uncertainty.verdicts)
+    own = uncertainty.intervals
     for values in beside.values_elsewhere:
         for j in np.flatnonzero((values < own[:, 0]) | (values > own[:, 1])):
             name = uncertainty.names[j]

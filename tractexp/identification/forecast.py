@@ -131,7 +131,8 @@ def forecast_next_dip(graded: "GradedModel") -> dict[str, Any]:
     band = measure_band(graded.fits)
     if band is None:
         return {}
-    problem, information = graded.problem, graded.uncertainty.information
+    problem = graded.problem
+    information = graded.uncertainty.information
     values = problem.full(graded.values)[0]
     root = (
         problem.full(graded.values + _find_covariance_root(information.J) * information.width)

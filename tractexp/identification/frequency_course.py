@@ -108,7 +108,8 @@ def _fit_course(
     Beside the parameters the sizes of what a course is made of are free, from -1 to 1 times the
     swing; a size acts on the rows of its own event, and is held near 0 by a row of its own.
     """
-    problem, free = likelihood.problem, likelihood.free
+    problem = likelihood.problem
+    free = likelihood.free
     courses = [swing * _list_courses(event) for event in problem.events]
     numbers = np.arange(len(courses) * len(courses[0])).reshape(len(courses), -1)
     weight = weigh_prior(problem.events, problem.drive, free)

@@ -65,7 +65,8 @@ class GradedModel:
     @functools.cached_property
     def parameters(self) -> list[ParameterEstimate]:
         """What is known of each free parameter, with the interval and verdict of `result.json`."""
-        known, declared = self.uncertainty, {p.name: p for p in self.problem.parameters}
+        known = self.uncertainty
+        declared = {p.name: p for p in self.problem.parameters}
         errors = known.information.standard_errors
         errors = np.where(np.isfinite(errors), errors, np.nan).tolist()
         rows = zip(

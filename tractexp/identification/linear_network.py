@@ -90,7 +90,8 @@ class BlackBox:
         in phasors P and Q oscillate with it. The admittance is what the pole adds at first and what
         dies out.
         """
-        poles, shares = self.networks[0].poles, np.abs(self.networks[0].coefficients)
+        poles = self.networks[0].poles
+        shares = np.abs(self.networks[0].coefficients)
         turning = (
             poles.imag / (2 * np.pi) + self.turns
             if self.turns
@@ -225,7 +226,8 @@ def _samples(ports: Sequence[Port]) -> int:
 
 def _refuse(ports: Sequence[Port], names: str) -> None:
     """Raise `UserError` for events of too few samples, or whose voltage does not move."""
-    samples, needed = _samples(ports), SAMPLES * unknowns(0, ports[0])
+    samples = _samples(ports)
+    needed = SAMPLES * unknowns(0, ports[0])
     if samples < needed:
         raise UserError(
             f"{names}: {samples // 2} samples from the dip on are too few for a linear network,"

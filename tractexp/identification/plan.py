@@ -60,7 +60,8 @@ class DipShape:
         """The shape of a recorded event, with the noise that a fit found there, or that before the
         dip.
         """
-        noise, domain = noise or Noise((before_the_event(event),)), domain_of(event)
+        noise = noise or Noise((before_the_event(event),))
+        domain = domain_of(event)
         (noise_P, noise_Q, *_), memory = noise.levels, noise.memory(event.record.step)
         return cls(
             event.depth,
@@ -180,7 +181,8 @@ def forecast(
 
 def _weigh_model_error(planned: Problem, values: np.ndarray, shape: DipShape) -> float:
     """By how many times the noise's variance the model's error adds to it in a planned dip."""
-    model, full = planned.model, planned.full(values)
+    model = planned.model
+    full = planned.full(values)
     still = Drive.from_events([planned.domain.excitation(shape.still.event(), model)])
     dip, rest = (
         model.simulate(drive, full, planned.step.substeps).outputs[:, 0]

@@ -40,7 +40,8 @@ class Elite:
     def __init__(self, box: Box):
         """Keep none yet of the points of a box."""
         self.box = box
-        self.x, self.f = np.empty((0, box.dimension)), np.empty(0)
+        self.x = np.empty((0, box.dimension))
+        self.f = np.empty(0)
 
     def add(self, x: np.ndarray, f: np.ndarray) -> None:
         """Consider further points; those refused or worse than a full elite are passed over.
@@ -54,9 +55,11 @@ class Elite:
         """
         better = f < (self.f[-1] if len(self.f) == ELITE else REFUSED)
         if better.any():
-            x, f = np.concatenate((self.x, x[better])), np.concatenate((self.f, f[better]))
+            x = np.concatenate((self.x, x[better]))
+            f = np.concatenate((self.f, f[better]))
             chosen = best_distinct(self.box.to_unit(x), f, LEAST_START_DISTANCE, ELITE)
-            self.x, self.f = x[chosen], f[chosen]
+            self.x = x[chosen]
+            self.f = f[chosen]
 
 
 class _Residuals:
@@ -67,7 +70,8 @@ class _Residuals:
         kept.
         """
         self.evaluate, self.box, self.scale = evaluate, box, scale
-        self.unit, self.value = np.empty(0), np.empty(0)
+        self.unit = np.empty(0)
+        self.value = np.empty(0)
 
     def _rows(self, unit: np.ndarray) -> np.ndarray:
         """Residuals (n, m) at points (n, d) of the unit cube, scaled."""
@@ -77,7 +81,8 @@ class _Residuals:
         """Residuals (m,) at a point (d,) of the unit cube, scaled."""
         # asked again, as for the Jacobian: no second simulation
         if not np.array_equal(unit, self.unit):
-            self.unit, self.value = unit.copy(), self._rows(unit[None])[0]
+            self.unit = unit.copy()
+            self.value = self._rows(unit[None])[0]
         return self.value
 
     def jacobian(self, unit: np.ndarray) -> np.ndarray:
@@ -180,7 +185,8 @@ def race(
     None
         After each descent.
     """
-    left, best = [], np.inf
+    left = []
+    best = np.inf
     for start, objective in starts:
         x, f = least_squares_from(evaluate, box, start, objective, ROUGH, ROUGH_TRIALS)
         if f < best:

@@ -95,7 +95,8 @@ def sample(
             f"{setting('task=posterior')} needs emcee; install it by: pip install"
             " 'tractexp[posterior]'"
         ) from None
-    likelihood, d = uncertainty.likelihood, len(uncertainty.unit)
+    likelihood = uncertainty.likelihood
+    d = len(uncertainty.unit)
     if walkers < 2 * d:
         raise UserError(
             f"{TASK.walkers}={walkers} is too few: {d} coordinates need at least {2 * d}"

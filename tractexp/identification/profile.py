@@ -260,7 +260,8 @@ class _Drawing:
         """Draw the profiles of the parameters `column` (k,) of an estimate; nothing is drawn
         yet.
         """
-        self.uncertainty, self.column = uncertainty, column
+        self.uncertainty = uncertainty
+        self.column = column
         self.curves: list[LikelihoodProfile] = []
         # the points that lanes passed, as of `find_outermost`
         self.unit = np.empty((0, len(uncertainty.unit)))
@@ -331,7 +332,8 @@ def _in_range(
     uncertainty: Uncertainty, c: int, interval: tuple[float, float]
 ) -> tuple[float, float]:
     """An interval of the c-th parameter in its range."""
-    low, width = uncertainty.lower[c], uncertainty.upper[c] - uncertainty.lower[c]
+    low = uncertainty.lower[c]
+    width = uncertainty.upper[c] - uncertainty.lower[c]
     return (interval[0] - low) / width, (interval[1] - low) / width
 
 

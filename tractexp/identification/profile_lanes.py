@@ -82,7 +82,8 @@ def find_outermost(
     values = np.where(rise[:, c] < 1.0, unit[:, c], low)
     if not len(values):
         return []
-    down, up = int(values.argmin()), int(values.argmax())
+    down = int(values.argmin())
+    up = int(values.argmax())
     return ([down] if values[down] < low - SMALLEST_STEP else []) + (
         [up] if values[up] > high + SMALLEST_STEP else []
     )
@@ -105,8 +106,10 @@ class Lanes:
         `simulations` led to.
         """
         self.uncertainty, self.limit, self.simulations = uncertainty, threshold(), simulations
-        self.origin, self.risen = unit, rise
-        self.column, self.unit = np.repeat(column, 2), np.repeat(unit, 2, axis=0)
+        self.origin = unit
+        self.risen = rise
+        self.column = np.repeat(column, 2)
+        self.unit = np.repeat(unit, 2, axis=0)
         self.sign = np.tile([-1.0, 1.0], len(column))
         self.scale = self.limit / uncertainty.limits[self.column]
         self.slope = np.zeros_like(self.unit)  # how the others move with the profiled one
@@ -124,7 +127,8 @@ class Lanes:
         """Coordinates (n, D) of every point of the lanes, and by how much the deviance is up there,
         over the limit of each parameter's interval (n, d).
         """
-        limits, size = self.uncertainty.limits, len(self.uncertainty.unit)
+        limits = self.uncertainty.limits
+        size = len(self.uncertainty.unit)
         unit = np.concatenate([np.empty((0, size)), *(unit for unit, _ in self.trail)])
         rise = np.concatenate([np.empty(0), *(rise for _, rise in self.trail)])
         return unit, rise[:, None] / limits
@@ -142,7 +146,8 @@ class Lanes:
     def advance(self) -> None:
         """One more point on every open lane."""
         lanes = np.flatnonzero(self.open)
-        column, sign = self.column[lanes], self.sign[lanes]
+        column = self.column[lanes]
+        sign = self.sign[lanes]
         here = self.unit[lanes, column]
         target = np.clip(here + sign * self.step[lanes], 0.0, 1.0)
         start = np.clip(self.unit[lanes] + self.slope[lanes] * (target - here)[:, None], 0.0, 1.0)

@@ -122,8 +122,10 @@ class Projection:
         """
         from scipy.optimize import least_squares
 
-        n, apart = len(poles), 2 * np.pi * HIGHEST * self.rate
-        lower, upper = np.log(self.slowest), np.log(FASTEST * self.rate)
+        n = len(poles)
+        apart = 2 * np.pi * HIGHEST * self.rate
+        lower = np.log(self.slowest)
+        upper = np.log(FASTEST * self.rate)
         bounds = np.array(
             [[lower, upper]] * n + [[-apart, apart]] * (0 if self.ports[0].series else n)
         ).T

@@ -64,7 +64,8 @@ def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
     back = np.sqrt(likelihood.samples / max(likelihood.samples - absorbed, 1))
     pairs: list[Pair] = []
     for e in range(drive.events):
-        part, pair = drive.part(e), []
+        part = drive.part(e)
+        pair = []
         for c in range(drive.channels):
             pieces = stretches(residuals[c, part], likelihood.valid[c, part])
             enough = sum(map(len, pieces)) >= FEWEST_NOISE_SAMPLES

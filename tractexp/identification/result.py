@@ -40,7 +40,8 @@ def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str, float
     recorder's window.
     """
     effects = [build("effect", {"name": name}) for name in node.get("effects", ())]
-    motor, static = build("model/motor", node["motor"]), build("model/static", node["static"])
+    motor = build("model/motor", node["motor"])
+    static = build("model/static", node["static"])
     return (
         motor,
         static,

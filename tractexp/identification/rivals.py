@@ -73,10 +73,8 @@ def with_rivals(
     Uncertainty
         A parameter that a rival moves beyond its interval has the objection in its verdict.
     """
-    structures, candidates = (
-        list(_structures(uncertainty.likelihood.problem.model)),
-        list[RivalStructure | None](),
-    )
+    structures = list(_structures(uncertainty.likelihood.problem.model))
+    candidates = list[RivalStructure | None]()
     with parts(len(structures)) as ended:
         for name, model in structures:
             candidates.append(_fit_rival(uncertainty, name, model))

@@ -130,7 +130,8 @@ class _Counter:
         self.raw = Box(problem.lower, problem.upper)
         self.box = Box.unit(d) if unit else self.raw
         self.simulations = self.refused = 0
-        self.best, self.best_values = np.inf, np.full(d, np.nan)
+        self.best = np.inf
+        self.best_values = np.full(d, np.nan)
         self.elite: Elite | None = None
         self.started = time.perf_counter()
 
@@ -174,7 +175,8 @@ class _Counter:
         self.refused += int(np.count_nonzero(f >= REFUSED))
         first = int(np.argmin(f))
         if f[first] < self.best:
-            self.best, self.best_values = float(f[first]), raw[first].copy()
+            self.best = float(f[first])
+            self.best_values = raw[first].copy()
         if self.elite is not None:
             self.elite.add(x, f)
         if self.limits.target is not None and self.best <= self.limits.target:
@@ -205,7 +207,8 @@ class _Counter:
 
 def _before_polish(limits: Limits, dimension: int) -> Limits:
     """The part of `limits` that a polished search may spend before the polish."""
-    simulations, seconds = limits.simulations, limits.seconds
+    simulations = limits.simulations
+    seconds = limits.seconds
     if simulations is not None:
         simulations -= min(int(simulations * POLISH_SHARE), POLISH_STEPS * (dimension + 2))
     return Limits(
@@ -243,7 +246,8 @@ def _iterations(
     if not optimizer.polish:
         yield from _begin_search(counter, optimizer, rng)
         return
-    limits, counter.elite = counter.limits, Elite(counter.box)
+    limits = counter.limits
+    counter.elite = Elite(counter.box)
     counter.limits = _before_polish(limits, counter.box.dimension)
     try:
         yield from _begin_search(counter, optimizer, rng)

@@ -44,7 +44,8 @@ def find_share_bound(uncertainty: Uncertainty) -> dict[str, Any]:
     if torque not in uncertainty.profiled:
         return {}
     c = uncertainty.names.index(torque)
-    lower, upper = uncertainty.lower[c], uncertainty.upper[c]
+    lower = uncertainty.lower[c]
+    upper = uncertainty.upper[c]
     low, high = uncertainty.intervals[c]
     near = BOUND_DISTANCE * (upper - lower)
     if high < upper - near or low <= lower + near:
@@ -52,7 +53,8 @@ def find_share_bound(uncertainty: Uncertainty) -> dict[str, Any]:
     drawn = float(np.mean([event.P0 for event in problem.events]))
     if not drawn > 0:
         return {}
-    least, most = float(low) / drawn, float(upper) / drawn
+    least = float(low) / drawn
+    most = float(upper) / drawn
     return {
         "low": least,
         "high": most,
@@ -73,7 +75,8 @@ def _draw_profile(uncertainty: Uncertainty, c: int, drawn: float) -> list[dict[s
     starts[:, c] = held
     columns = np.full(SHARES_HELD, c)
     ended = others_free(uncertainty, starts, columns, tolerance=0.05)
-    low, high = uncertainty.lower[c], uncertainty.upper[c]
+    low = uncertainty.lower[c]
+    high = uncertainty.upper[c]
     shares = (low + held * (high - low)) / drawn
     least = min(uncertainty.deviance, float(ended.deviance.min()))
     errors = np.sqrt(ended.deviance / least)

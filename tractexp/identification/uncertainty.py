@@ -150,8 +150,10 @@ class Uncertainty:
     @functools.cached_property
     def tests(self) -> list[dict[str, Any]]:
         """Whiteness and normality of the whitened residual of each event and channel."""
-        problem, valid = self.of_noise.problem, self.of_noise.valid
-        white, results = self.whitened_residual.reshape(problem.drive.channels, -1), []
+        problem = self.of_noise.problem
+        valid = self.of_noise.valid
+        white = self.whitened_residual.reshape(problem.drive.channels, -1)
+        results = []
         for e, event in enumerate(problem.events):
             part = problem.drive.part(e)
             for c, channel in enumerate(problem.drive.names):
@@ -171,7 +173,8 @@ class Uncertainty:
         """
         rows, noise, problem = [], self.of_noise.noise, self.of_noise.problem
         for e, event in enumerate(problem.events):
-            pair, covariance = noise.pair(e), noise.covariance(e)
+            pair = noise.pair(e)
+            covariance = noise.covariance(e)
             cross = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
             for c, (channel, before) in enumerate(
                 zip(problem.drive.names, event.levels, strict=True)
@@ -351,7 +354,8 @@ Spread = tuple[Likelihood, float, Information, np.ndarray, np.ndarray]
 
 def _curvature(likelihood: Likelihood, unit: np.ndarray) -> Spread:
     """How far the maximum of a likelihood spreads, by its curvature."""
-    problem, free = likelihood.problem, likelihood.free
+    problem = likelihood.problem
+    free = likelihood.free
     rows, J = likelihood.jacobian(unit)
     width = problem.upper - problem.lower
     information = Information(problem.space.names, likelihood.values(unit), width, J.without_own)

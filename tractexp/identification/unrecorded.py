@@ -61,7 +61,8 @@ def with_unrecorded(uncertainty: Uncertainty, swing: float) -> Uncertainty:
 
 def _find_moves(uncertainty: Uncertainty, swing: float) -> np.ndarray:
     """The moves (courses, d) of the parameters, in their units, by each course of the frequency."""
-    likelihood, unit = uncertainty.likelihood.of_records, uncertainty.unit
+    likelihood = uncertainty.likelihood.of_records
+    unit = uncertainty.unit
     problem = likelihood.problem
     left, sensitivities = uncertainty.sensitivities
     driven = [
@@ -91,9 +92,11 @@ def _find_moved(own: Uncertainty, beside: Uncertainty) -> Iterator[tuple[str, Pa
     """Verdicts of the parameters that the swing moves beyond their interval, or until that is
     wide.
     """
-    swing, moves = beside.unrecorded["swing"], beside.unrecorded["moves"]
+    swing = beside.unrecorded["swing"]
+    moves = beside.unrecorded["moves"]
     for j, (name, (low, high)) in enumerate(zip(own.names, own.intervals.tolist(), strict=True)):
-        value, verdict = float(own.values[j]), own.verdicts[name]
+        value = float(own.values[j])
+        verdict = own.verdicts[name]
         half = float(np.ptp(beside.intervals[j])) / 2
         wide = max(half, moves[name]) > IDENTIFIED_SHARE * size(value, own.lower[j], own.upper[j])
         known = verdict.word != UNIDENTIFIED

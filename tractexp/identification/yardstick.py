@@ -42,7 +42,8 @@ def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
         box, played = play_network(fits)
     except UserError as why:
         return {"sentence": f"no linear network stands beside it: {why}"}
-    own, judged = model_errors(played), slice(split, None) if split < len(fits) else slice(split)
+    own = model_errors(played)
+    judged = slice(split, None) if split < len(fits) else slice(split)
     left, model = (e["held_out"]["value"] if e["held_out"] else e["value"] for e in (own, error))
     ratio = model / left if left > 0 and np.isfinite(model) else None
     dips = "dips" if len(fits[judged]) > 1 else "dip"

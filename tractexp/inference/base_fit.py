@@ -89,7 +89,8 @@ def minima_of(context: Context, bare: Likelihood) -> list[np.ndarray]:
     list of (D,) arrays
         The best first, every effect at its null.
     """
-    at, ends = context.coordinates, valleys(bare)
+    at = context.coordinates
+    ends = valleys(bare)
     minima = np.tile(at.null, (len(ends), 1))
     minima[:, [*at.base, *at.before]] = ends
     return list(minima)

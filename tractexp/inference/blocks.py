@@ -89,7 +89,8 @@ def exceeds(squares: np.ndarray, others: np.ndarray, blocks: Sequence[slice]) ->
     False
     """
     difference = np.array([float(np.sum(squares[b] - others[b])) for b in blocks])
-    count, total = len(difference), float(difference.sum())
+    count = len(difference)
+    total = float(difference.sum())
     scatter = np.sqrt(count / max(count - 1, 1) * np.sum((difference - difference.mean()) ** 2))
     return total > 2 * scatter and total > LEAST_SQUARES_DIFFERENCE * sum(
         float(others[b].sum()) for b in blocks

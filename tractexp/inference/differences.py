@@ -54,7 +54,8 @@ def forward_differences(
     [[[3.0, 0.0], [-0.0, 3.0]]]
     """
     n, d = unit.shape
-    shared, steps = apart.find_shared_columns(d), apart.moves(d)
+    shared = apart.find_shared_columns(d)
+    steps = apart.moves(d)
     h = np.where(unit > 0.5, -RANGE_DIFFERENCE, RANGE_DIFFERENCE)
     moved = unit[:, None, :] + steps * h[:, None, :]
     J = rows(moved.reshape(-1, d), np.repeat(lanes, len(steps))).reshape(n, len(steps), -1)
@@ -103,7 +104,8 @@ def central_differences(
     n, d = unit.shape
     up = np.minimum(unit + CENTRAL, 1.0) - unit
     down = unit - np.maximum(unit - CENTRAL, 0.0)
-    shared, moves = apart.find_shared_columns(d), apart.moves(d)
+    shared = apart.find_shared_columns(d)
+    moves = apart.moves(d)
     steps = np.concatenate(
         [np.zeros((n, 1, d)), moves * up[:, None], moves * -down[:, None]], axis=1
     )
@@ -111,7 +113,8 @@ def central_differences(
         *steps.shape[:2], -1
     )
     base, above, below = batch[:, 0], batch[:, 1 : len(moves) + 1], batch[:, len(moves) + 1 :]
-    J, k = np.zeros_like(above), len(shared)
+    J = np.zeros_like(above)
+    k = len(shared)
     J[:, :k] = _from_both_sides(base, above[:, :k], below[:, :k], up[:, shared], down[:, shared])
     for mine, own in zip(apart.rows, apart.coordinates, strict=True):
         J[:, k:, mine] = _from_both_sides(
@@ -126,7 +129,8 @@ def _from_both_sides(
     """Derivatives (n, k, R) from rows (n, R) and those (n, k, R) one step `up` and `down` (n, k)
     from there.
     """
-    lost_up, lost_down = np.isnan(above).any(axis=2), np.isnan(below).any(axis=2)
+    lost_up = np.isnan(above).any(axis=2)
+    lost_down = np.isnan(below).any(axis=2)
     for side, lost in (above, lost_up), (below, lost_down):
         side[lost] = base[np.nonzero(lost)[0]]
     span = np.where(lost_up, 0.0, up) + np.where(lost_down, 0.0, down)
@@ -169,10 +173,8 @@ def two_sided(
     >>> width.round(6).tolist()
     [0.0002, 0.0001]
     """
-    points, at = (
-        np.tile(unit, (2, len(columns), 1)),
-        (np.arange(len(columns)), np.asarray(columns, dtype=int)),
-    )
+    points = np.tile(unit, (2, len(columns), 1))
+    at = (np.arange(len(columns)), np.asarray(columns, dtype=int))
     points[0][at] = np.minimum(unit[at[1]] + COORDINATE_STEP, 1.0)
     points[1][at] = np.maximum(unit[at[1]] - COORDINATE_STEP, 0.0)
     return points.reshape(-1, len(unit)), points[0][at] - points[1][at]

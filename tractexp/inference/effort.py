@@ -45,13 +45,15 @@ class Effort:
     def anew(self) -> "Effort":
         """A count of its own for a part of the work, which tells the same listener."""
         part = Effort(self.say)
-        part._all, part._parts = self._all, self._parts
+        part._all = self._all
+        part._parts = self._parts
         self._all.append(part)
         return part
 
     def say(self, line: str) -> None:
         """Tell the listener the step that begins."""
-        self._step, self._said = line, time.perf_counter()
+        self._step = line
+        self._said = time.perf_counter()
         self._tell(line)
 
     @contextmanager
@@ -118,7 +120,8 @@ class Effort:
                     far = [str(part) for part in self._parts if part.total > 1][:1]
                     if self.total > counted:
                         far.append(f"{self.total} simulations")
-                    self._said, counted = now, self.total
+                    self._said = now
+                    counted = self.total
                     reached = f": {', '.join(far)}" if far else ""
                     self._tell(f"{STILL} {self._step or 'at work'}{reached}")
 

@@ -82,7 +82,8 @@ class FitProblem:
         (n, C, N) array [pu]
             Calculated minus measured: 0 in gaps, nan in an event without a steady state.
         """
-        problem, drive = self.problem, self.problem.drive
+        problem = self.problem
+        drive = self.problem.drive
         before = None
         if self.initial_power:
             power = self.free_set.box.from_unit(unit)[:, self.free_set.before]

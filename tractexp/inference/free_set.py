@@ -106,10 +106,8 @@ class FreeSet:
         FreeSet
         """
         members = tuple(p for member in catalogue.members for p in member.effect.parameters)
-        parameters, power = (
-            join_boxes(whole.space, Box.from_parameters(members)),
-            power_before(whole),
-        )
+        parameters = join_boxes(whole.space, Box.from_parameters(members))
+        power = power_before(whole)
         nulls = {
             p.name: p.default if p.null is None else p.null for p in (*whole.parameters, *members)
         }
@@ -179,10 +177,8 @@ class FreeSet:
 
     def present(self, unit: np.ndarray) -> tuple[str, ...]:
         """The names of the load's effects that are not at their null at coordinates (D,)."""
-        off, of_load = (
-            unit != self.null,
-            (*self.catalogue.of_load, *(m.name for m in self.catalogue.members)),
-        )
+        off = unit != self.null
+        of_load = (*self.catalogue.of_load, *(m.name for m in self.catalogue.members))
         return tuple(name for name in of_load if off[self.sizes([name])].any())
 
     def settings(self, effects: Sequence[str]) -> list[int]:

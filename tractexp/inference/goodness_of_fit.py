@@ -124,7 +124,8 @@ def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> fl
     from scipy.special import gammaincc
 
     if draws.ndim == 1:
-        mean, variance = draws.mean(), max(draws.var(), 1e-300)
+        mean = draws.mean()
+        variance = max(draws.var(), 1e-300)
         return max(
             float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P
         )
@@ -143,10 +144,12 @@ def _compute_exceedance(largest: np.ndarray, value: float) -> float:
     """
     from scipy.special import gamma
 
-    b, below = len(largest), np.arange(len(largest))
+    b = len(largest)
+    below = np.arange(len(largest))
     weights = np.ones(b), below / (b - 1), below * (below - 1) / ((b - 1) * (b - 2))
     first, once, twice = (float((w * np.sort(largest)).mean()) for w in weights)
-    second, third = 2 * once - first, 6 * twice - 6 * once + first
+    second = 2 * once - first
+    third = 6 * twice - 6 * once + first
     c = 2 / (3 + third / max(second, 1e-12)) - np.log(2) / np.log(3)
     k = 7.859 * c + 2.9554 * c**2
     if k * np.sqrt(b / 0.5633) > -HEAVIER:

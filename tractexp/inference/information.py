@@ -90,10 +90,8 @@ class Information:
         size = np.linalg.norm(self.J, axis=0)
         scale = np.where(size > 0, size, 1.0)
         _, singular, directions = np.linalg.svd(self.J / scale, full_matrices=False)
-        seen, directions = (
-            singular > self.structural * singular.max(initial=0.0),
-            directions / scale,
-        )
+        seen = singular > self.structural * singular.max(initial=0.0)
+        directions = directions / scale
         return directions[seen] / singular[seen, None], directions[~seen], size == 0
 
     @property
@@ -207,7 +205,8 @@ def _echelon(rows: np.ndarray) -> np.ndarray:
     """The reduced row echelon form by full pivoting: the same row space with as many zeros as it
     allows.
     """
-    rows, done = rows.copy(), 0
+    rows = rows.copy()
+    done = 0
     used: list[int] = []
     while done < len(rows):
         open_ = np.abs(rows[done:])

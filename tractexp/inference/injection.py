@@ -92,7 +92,8 @@ def perturbations(context: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.
     """
     at = context.coordinates
     spans = sorted({w for e in range(len(context.events)) for w in windows(context.problem, e)})
-    points, groups = [], []
+    points = []
+    groups = []
     for g, push in enumerate(PERTURBATIONS):
         for a, b in spans:
             point = at.place_values(unit, {"window_on": a, "window_off": b})

@@ -47,7 +47,8 @@ def _jumps(context: Context, key: bytes) -> np.ndarray:
     """The errors (k, C, N) [pu] at the jumps, for the bytes of the coordinates as a key that a
     cache can take.
     """
-    at, unit = context.coordinates, np.frombuffer(key)
+    at = context.coordinates
+    unit = np.frombuffer(key)
     there = at.present(unit)
     if not there:
         return np.empty((0, *context.drive.measurements.shape))
@@ -69,7 +70,8 @@ def _at_jumps(added: np.ndarray) -> list[tuple[int, float]]:
     """The samples around the jumps of one channel (N,), each with the standard deviation [pu] of
     its error.
     """
-    off, least = np.abs(off_neighbors(added)), LEAST_JUMP * np.abs(added).max(initial=0.0)
+    off = np.abs(off_neighbors(added))
+    least = LEAST_JUMP * np.abs(added).max(initial=0.0)
     doubt: dict[int, float] = {}
     for k in np.argsort(-off)[:MOST_JUMPS].tolist():
         if off[k] > least:

@@ -239,10 +239,8 @@ class Kernels:
         """The fit problem of one kernel, and where its coordinates stand among all."""
         if key not in self._fit_problems:
             problem = self._problem(key, self.substeps)
-            own, before = (
-                [self._column[n] for n in problem.space.names],
-                np.arange(2 * len(self.events)),
-            )
+            own = [self._column[n] for n in problem.space.names]
+            before = np.arange(2 * len(self.events))
             columns = np.r_[own, len(self._column) + before].astype(int)
             self._fit_problems[key] = (
                 FitProblem(problem=problem, valid=problem.drive.weights > 0),

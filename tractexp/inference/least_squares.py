@@ -44,10 +44,8 @@ class Descent:
 
     def join_descent(self, more: "Descent") -> "Descent":
         """These ends and further ones."""
-        unit, deviance = (
-            np.concatenate([self.unit, more.unit]),
-            np.concatenate([self.deviance, more.deviance]),
-        )
+        unit = np.concatenate([self.unit, more.unit])
+        deviance = np.concatenate([self.deviance, more.deviance])
         return Descent(unit, deviance, self.simulations + more.simulations)
 
 
@@ -86,7 +84,8 @@ def normal(
         The gradient.
     NormalMatrix
     """
-    n, parts = len(unit), []
+    n = len(unit)
+    parts = []
     together = max(1, MOST_NUMBERS // (len(apart.moves(unit.shape[1])) * base.shape[1]))
     for first in range(0, n, together):
         part = slice(first, first + together)
@@ -107,11 +106,14 @@ def _products(
     """Gradient (n, D) and the blocks of a `NormalMatrix`, of derivatives (n, k + m, R) as the
     differences have them.
     """
-    shared, m = apart.find_shared_columns(size), apart.count
+    shared = apart.find_shared_columns(size)
+    m = apart.count
     n, k, events = len(J), len(shared), len(apart.rows)
-    gradient, own = np.zeros((n, size)), J[:, :k]
+    gradient = np.zeros((n, size))
+    own = J[:, :k]
     gradient[:, shared] = (own @ base[:, :, None])[:, :, 0]
-    cross, blocks = np.empty((n, events, m, k)), np.empty((n, events, m, m))
+    cross = np.empty((n, events, m, k))
+    blocks = np.empty((n, events, m, m))
     for e, mine in enumerate(apart.rows if m else ()):
         columns = J[:, :, mine]
         acting = columns[:, k:]

@@ -142,12 +142,14 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     injected, groups = perturbations(context, fit.unit)
     k = len(nuisances)
     raw = context.residuals(np.concatenate([fit.unit[None], moved]), fit.names)
-    base, nuisance = raw[0], slopes(raw[1:], width)
+    base = raw[0]
+    nuisance = slopes(raw[1:], width)
     beside = [candidate.name for candidate, _, first, last in labels for _ in range(first, last)]
     changes = context.changes(
         fit.unit, np.concatenate([points, injected]), fit.names, beside + [PUSHES] * len(injected)
     )
-    further, perturbed = changes[: len(points)] / spans[:, None, None], changes[len(points) :]
+    further = changes[: len(points)] / spans[:, None, None]
+    perturbed = changes[len(points) :]
     columns = tuple(CandidateColumn(c, s, further[a:b]) for c, s, a, b in labels)
     members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
     white = context.whiten(noise, np.concatenate([nuisance, base[None]]))

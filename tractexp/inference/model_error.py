@@ -124,7 +124,8 @@ class Change(Generic[M]):
         the noise by more than there was before, which was within the error of the noise's level
         then.
         """
-        square, rest = self.before.error.square, self.after.error.square
+        square = self.before.error.square
+        rest = self.after.error.square
         return 1 - rest / square if 0 < square < np.inf and rest >= -square else np.nan
 
 
@@ -254,8 +255,10 @@ def _block_sums(played: Playback, length: float) -> np.ndarray:
     squared response less the noise's variance, and squared S; gaps are left out, and what cannot be
     simulated is infinite.
     """
-    event, record = played.event, played.event.record
-    S, S_0 = record.P + 1j * record.Q, event.P0 + 1j * event.Q0
+    event = played.event
+    record = played.event.record
+    S = record.P + 1j * record.Q
+    S_0 = event.P0 + 1j * event.Q0
     squares = np.stack(
         [np.abs(played.P + 1j * played.Q - S) ** 2, np.abs(S - S_0) ** 2, np.abs(S) ** 2]
     )

@@ -73,7 +73,8 @@ class QuietNoise:
         UserError
             Where too few samples are quiet.
         """
-        context, problem = self.context, self.context.problem
+        context = self.context
+        problem = self.context.problem
         errors = [
             shapes for shapes in (self.input_modes, jumps(context, unit)) if shapes is not None
         ]

@@ -144,7 +144,8 @@ class Observed:
         """Power (shapes, 2, N) under the smoothed voltages, each with one of its errors; all in one
         simulation.
         """
-        problem, count = self.problem, len(shapes)
+        problem = self.problem
+        count = len(shapes)
         events = [s.event if k is None else s.off_by(k) for k in shapes for s in self.smoothed]
         drive = Drive.from_events(
             [problem.domain.excitation(event, problem.model) for event in events]

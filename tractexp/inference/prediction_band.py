@@ -83,7 +83,8 @@ def measure_band(played: Sequence[Playback]) -> PredictionBand | None:
     missed = []
     noises = []
     for one in played:
-        event, record = one.event, one.event.record
+        event = one.event
+        record = one.event.record
         left = np.stack([one.P - record.P, one.Q - record.Q])
         calculated = one.P + 1j * one.Q - complex(event.P0, event.Q0)
         change = find_largest_change(calculated[event.start :], record.step, event.f0)

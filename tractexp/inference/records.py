@@ -92,7 +92,8 @@ def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
             )
     for event in (*train, *validate):
         for channel in ("f", "U2"):
-            has, first = getattr(event.record, channel) is not None, train[0]
+            has = getattr(event.record, channel) is not None
+            first = train[0]
             if has != (getattr(first.record, channel) is not None):
                 one, other = (event, first) if has else (first, event)
                 raise UserError(
@@ -110,9 +111,11 @@ def check_channels(model: Model, events: Sequence[Event]) -> None:
         if channel in event.channels or channel in COMPARED:
             continue
         if isinstance(part, Effect):
-            what, mend = f"effect '{part.name}'", f"leave the effect out of {MODEL.effects}"
+            what = f"effect '{part.name}'"
+            mend = f"leave the effect out of {MODEL.effects}"
         else:
-            what, mend = f"{part.group} '{part.name}'", f"choose another {part.group}"
+            what = f"{part.group} '{part.name}'"
+            mend = f"choose another {part.group}"
         raise UserError(
             f"the {what} reads {channel}, which {event.record.where} does not have; record"
             f" {channel}, or {mend}"

@@ -36,7 +36,8 @@ def windows(problem: Problem, event: int) -> list[tuple[float, float]]:
         Since the event's first sample.
     """
     e = problem.events[event]
-    start, end = e.t_start - e.record.t[0], e.t_end - e.record.t[0]
+    start = e.t_start - e.record.t[0]
+    end = e.t_end - e.record.t[0]
     last = e.record.t[-1] - e.record.t[0]
     edges = [0.0, start, (start + end) / 2, *(end + w for w in WINDOWS if end + w < last), last]
     return [(a, b) for a, b in itertools.pairwise(edges) if b > a]
@@ -100,7 +101,8 @@ def residual_windows(problem: Problem) -> list[ResidualWindow]:
     for e, event in enumerate(problem.events):
         first, step, origin = int(problem.drive.first[e]), event.record.step, event.record.t[0]
         for a, b in windows(problem, e):
-            i, j = round(a / step), min(round(b / step), event.record.samples)
+            i = round(a / step)
+            j = min(round(b / step), event.record.samples)
             if j - i < 2:
                 continue
             part = slice(first + i, first + j)

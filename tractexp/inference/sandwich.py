@@ -73,12 +73,15 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     -------
     Scatter
     """
-    problem, whole = likelihood.problem, likelihood.of_records.with_initial_power
+    problem = likelihood.problem
+    whole = likelihood.of_records.with_initial_power
     rows, J = whole.jacobian(whole.place_parameters(unit[None])[0])
-    free, drive = likelihood.free, problem.drive
+    free = likelihood.free
+    drive = problem.drive
     blocks = blocks_of(problem.events, drive, free)
     held_by = _prior_jacobian(likelihood, unit)
-    rows, power = rows.reshape(drive.channels, -1), _of_power(whole, blocks)
+    rows = rows.reshape(drive.channels, -1)
+    power = _of_power(whole, blocks)
 
     def influences(columns: np.ndarray) -> np.ndarray:
         return _influences(J, rows, columns, blocks, power, held_by, likelihood.prior)
@@ -86,7 +89,8 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     shared = np.concatenate([J.shared_columns, held_by])
     every = np.arange(free)
     inside = every[off_walls(unit[:free])]
-    root, ratio = np.zeros((free, free)), np.ones(free)
+    root = np.zeros((free, free))
+    ratio = np.ones(free)
     own, ratio[inside], spread = robust_root(shared[:, inside], influences(inside))
     root[np.ix_(every[: len(own)], inside)] = own
     if len(inside) < free:
@@ -136,12 +140,14 @@ def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> list[tuple[int
     """The event of each block, and the change (2,) of its P0 and Q0 in ranges when the block is
     left out of their means.
     """
-    drive, changes = likelihood.problem.drive, list[tuple[int, np.ndarray]]()
+    drive = likelihood.problem.drive
+    changes = list[tuple[int, np.ndarray]]()
     width = likelihood.free_set.box.width[likelihood.free :].reshape(drive.events, 2)
     means = likelihood.problem.steady or [slice(0, 0)] * drive.events  # of waves there are none
     for block in blocks:
         e = int(np.searchsorted(drive.first, block.start, "right")) - 1
-        steady, change = means[e], np.zeros(2)
+        steady = means[e]
+        change = np.zeros(2)
         a, z, n = (
             max(block.start, steady.start),
             min(block.stop, steady.stop),
@@ -168,7 +174,8 @@ def _influences(
     `held_by` (k, d) are derivatives of the rows of a prior, of this weight. They are never left
     out; each moves the estimate by what one standard deviation of it does.
     """
-    flat, prior = J.shared_columns[:, columns], held_by[:, columns]
+    flat = J.shared_columns[:, columns]
+    prior = held_by[:, columns]
     cross = [flat[mine].T @ J.own(e) for e, mine in enumerate(J.rows)]
     total = flat.T @ flat + prior.T @ prior
     shifts = [cross[e] @ change for e, change in power]
@@ -206,10 +213,12 @@ def moves_without_blocks(
     -----
     Source: the jackknife of Bell and McCaffrey 2002, blocks in place of clusters.
     """
-    k, scale = len(whole), np.sqrt(np.maximum(np.diag(whole), 1e-300))
+    k = len(whole)
+    scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     moves = []
     for block, shift in zip(blocks, shifts or [0.0] * len(blocks), strict=True):
-        a, r = J[:, block].reshape(-1, k), rows[:, block].ravel()
+        a = J[:, block].reshape(-1, k)
+        r = rows[:, block].ravel()
         rest = (whole - a.T @ a) / np.outer(scale, scale)
         moves.append(
             np.linalg.pinv(rest, STRUCTURAL**2, hermitian=True)

@@ -107,7 +107,8 @@ class ScoreTest:
         """Drop of the deviance (columns, b) by adding each column, sizes in their allowed
         direction, and its p.
         """
-        drops, ps = [], []
+        drops = []
+        ps = []
         for column, block in zip(self.columns, self.blocks, strict=True):
             signs = np.array([column.candidate.sign(p) for p in column.candidate.sizes])
             drop, p = signed_drop(block, self.r, signs)
@@ -126,7 +127,8 @@ class ScoreTest:
             inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
             size = -inverse @ (block @ self.r[0])
             spread = np.where(np.diag(gram) > 0, np.sqrt(np.maximum(np.diag(inverse), 0.0)), np.inf)
-            labels, name = [p.name for p in column.candidate.sizes], column.candidate.name
+            labels = [p.name for p in column.candidate.sizes]
+            name = column.candidate.name
             sizes, deviations = (
                 dict(zip(labels, row.tolist(), strict=True)) for row in (size, spread)
             )

@@ -260,12 +260,15 @@ class NormalMatrix:
         -------
         (n, q, D) array
         """
-        at, apart = self.positions, self.columns.coordinates
-        mask, own_mask = kept[:, at], kept[:, apart]
+        at = self.positions
+        apart = self.columns.coordinates
+        mask = kept[:, at]
+        own_mask = kept[:, apart]
         A = self.shared * (mask[:, :, None] & mask[:, None, :])
         B = self.cross * (own_mask[:, :, :, None] & mask[:, None, None, :])
         C = self.own * (own_mask[:, :, :, None] & own_mask[:, :, None, :])
-        A, C = A[:, None], C[:, None]
+        A = A[:, None]
+        C = C[:, None]
         for diagonals in added:
             A = A + np.eye(len(at)) * diagonals[:, :, None, at]
             C = C + np.eye(apart.shape[1]) * diagonals[:, :, apart][..., None, :]

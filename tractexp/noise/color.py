@@ -92,10 +92,12 @@ class Autoregression:
 
     def _whiten(self, rows: np.ndarray, parts: Sequence[slice], out: np.ndarray) -> None:
         """Write the prediction errors of rows (n, N) to `out`, within parts that have no gap."""
-        weights, p = np.r_[1.0, -self.coefficients[-1]] / self.deviation[-1], self.order
+        weights = np.r_[1.0, -self.coefficients[-1]] / self.deviation[-1]
+        p = self.order
         if self.white or np.iscomplexobj(rows):
             for part in parts:
-                y, white = rows[:, part], out[:, part]
+                y = rows[:, part]
+                white = out[:, part]
                 np.multiply(y, weights[0], out=white)
                 for lag in range(1, p + 1):
                     white[:, lag:] += weights[lag] * y[:, :-lag]
@@ -211,7 +213,8 @@ def fit_autoregression(
     power = sum(float(x @ x) for x in stretches) / max(count, 1)
     highest = min(highest, count // 10, max(map(len, stretches), default=1) - 1)
     errors = [(x[1:], x[:-1]) for x in stretches]  # of prediction, forward and backward
-    table, variance = [np.empty(0)], [max(power, SMALLEST_DEVIATION**2)]
+    table = [np.empty(0)]
+    variance = [max(power, SMALLEST_DEVIATION**2)]
     for _ in range(highest):
         both = sum(float(f @ b) for f, b in errors)
         energy = sum(float(f @ f + b @ b) for f, b in errors)

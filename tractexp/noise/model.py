@@ -260,7 +260,8 @@ class Noise:
 
     def describe(self, names: Sequence[str] = ("P", "Q")) -> str:
         """Level and color, as a run prints them."""
-        pair, levels = self.pairs[0], zip(names, self.levels, strict=True)
+        pair = self.pairs[0]
+        levels = zip(names, self.levels, strict=True)
         color = (
             "white"
             if all(a.white for a in pair)
@@ -311,7 +312,8 @@ class Noise:
         """Mixed channels (n, C, samples) of one event without the color of the fast noise, in
         `out`.
         """
-        pair, alone = self.pair(event), 0
+        pair = self.pair(event)
+        alone = 0
         if self.vector:
             white = pair[0].whiten(mixed[:, 0] + 1j * mixed[:, 1], valid[0])
             out[:, 0], out[:, 1], alone = np.real(white), np.imag(white), 2
@@ -360,7 +362,8 @@ class Noise:
         self, rng: np.random.Generator, count: int, part: slice, event: int
     ) -> np.ndarray:
         """Mixed channels (count, C, samples) of one event."""
-        colored, pair = [], self.pair(event)
+        colored = []
+        pair = self.pair(event)
         size = (count, part.stop - part.start + BURN_IN)
         if self.vector:
             shocks = rng.standard_normal((2, *size)) * pair[0].deviation[-1]

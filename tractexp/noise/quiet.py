@@ -49,7 +49,8 @@ def quiet_stretches(events: Sequence[Event], drive: Drive) -> list[slice]:
     """
     parts = []
     for e, event in enumerate(events):
-        first, n = int(drive.first[e]), event.record.samples
+        first = int(drive.first[e])
+        n = event.record.samples
         tail = round(n - QUIET_TAIL_SHARE * (n - event.end))
         parts += [slice(first + event.first, first + event.start), slice(first + tail, first + n)]
     return [p for p in parts if p.stop - p.start >= SHORTEST_QUIET_STRETCH]

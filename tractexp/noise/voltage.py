@@ -71,14 +71,16 @@ def smooth_voltage(event: Event) -> SmoothedEvent:
     SmoothedEvent
         With no errors where the voltage has less than `SILENT` [pu] of noise.
     """
-    U, deviation = event.record.U, noise_of(event.record.U[event.steady])
+    U = event.record.U
+    deviation = noise_of(event.record.U[event.steady])
     if deviation < SILENT:
         return SmoothedEvent(event, np.empty((0, len(U))))
     rough = _edges(U, deviation)
     rough[[event.start, min(event.end, len(U) - 1)]] = True
     rough = _widen_rough_stretches(rough)
     while True:
-        smooth, errors = U.copy(), []
+        smooth = U.copy()
+        errors = []
         for part in runs(~rough):
             curve, own = _curve(U[part], deviation)
             smooth[part] = curve
@@ -119,14 +121,17 @@ def noise_of(U: np.ndarray) -> float:
 
 def _edges(U: np.ndarray, deviation: float) -> np.ndarray:
     """Where the voltage (N,) moves faster than averages can follow."""
-    index, sums = np.arange(len(U)), np.concatenate(([0.0], np.cumsum(U)))
-    low, high = U - AGREE * deviation, U + AGREE * deviation
+    index = np.arange(len(U))
+    sums = np.concatenate(([0.0], np.cumsum(U)))
+    low = U - AGREE * deviation
+    high = U + AGREE * deviation
     for half in HALF_WIDTHS:
         # symmetric at the ends too, or a slope would bend
         h = np.minimum(half, np.minimum(index, index[::-1]))
         mean = (sums[index + h + 1] - sums[index - h]) / (2 * h + 1)
         reach = AGREE * deviation / np.sqrt(2 * h + 1)
-        low, high = np.maximum(low, mean - reach), np.minimum(high, mean + reach)
+        low = np.maximum(low, mean - reach)
+        high = np.minimum(high, mean + reach)
     return low > high
 
 

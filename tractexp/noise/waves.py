@@ -162,7 +162,8 @@ def solve_levinson(covariance: np.ndarray) -> Autoregression:
     >>> solve_levinson(np.array([1.0, 0.5, 0.25])).coefficients[-1].tolist()
     [0.5]
     """
-    table, variance = [np.empty(0, dtype=covariance.dtype)], [float(covariance[0].real)]
+    table = [np.empty(0, dtype=covariance.dtype)]
+    variance = [float(covariance[0].real)]
     for m in range(1, len(covariance)):
         last = table[-1]
         reflection = (covariance[m] - last @ covariance[m - 1 : 0 : -1]) / variance[-1]

@@ -141,7 +141,8 @@ class NextEvent:
         them = (
             f"{first} from {others[0]}" if len(others) == 1 else f"these {len(self.rivals)} apart"
         )
-        what, p = self.best.event.words, self.probability
+        what = self.best.event.words
+        p = self.probability
         missed = f", where they miss {in_percent(self.error)} of a response" if self.error else ""
         if p >= DECIDED:
             return f"record {what}: it tells {them} with a probability of {p:.0%}{missed}"
@@ -187,9 +188,11 @@ def next_event(
     """
     context.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
     sides = [linearize_side(context, noise, fit) for fit in (bare, *rivals)]
-    separation, truths = Separation(sides, context.criteria, FEW, seed), range(1, len(sides))
+    separation = Separation(sides, context.criteria, FEW, seed)
+    truths = range(1, len(sides))
     reads = context.catalogue.list_channels(name for fit in rivals for name in fit.names)
-    events, denied = [], []
+    events = []
+    denied = []
     by_rate = sorted(imagine_dips(context, sorted(reads)), key=lambda e: e.rate)
     # sampled alike
     for group in (list(alike) for _, alike in itertools.groupby(by_rate, key=lambda e: e.rate)):
@@ -236,7 +239,8 @@ def _choose_mildest_event(
     error: float,
 ) -> EventTrial:
     """The mildest event that is sure enough after refits, too."""
-    left, checked = list(tried), []
+    left = list(tried)
+    checked = []
     while left and len(checked) < CHECKED:
         best = mildest(left, DECIDED)
         chance = best.least

@@ -105,7 +105,8 @@ def imagine_dips(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDi
     """What is tried on this context; unbalanced dips that need the channel U2 where one of the
     rivals `reads` it.
     """
-    domain, durations = context.domain, context.domain.dips.durations
+    domain = context.domain
+    durations = context.domain.dips.durations
     pairs = list(itertools.product(DEPTHS, durations))
     few = list(itertools.product(DEPTHS[::2], durations[::2]))
     imagine = functools.partial(ImaginedDip, domain=domain)
@@ -126,7 +127,8 @@ def imagine_dips(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDi
 
 def driven(context: Context, event: ImaginedDip) -> Excitation | WaveformDrive:
     """The voltage of an imagined event, at the power before the first recorded one."""
-    like, dips = context.events[0], context.domain.dips
+    like = context.events[0]
+    dips = context.domain.dips
     step = like.record.step / event.rate
     t = np.arange(round((dips.lead + dips.length) / step)) * step
     course = _course(t - dips.lead, event.duration, dips.edge)

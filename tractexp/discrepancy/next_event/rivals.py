@@ -73,10 +73,8 @@ def event_for(
         )
         base = base_fit(context)
         effort.say(f"fitting {len(sets)} explanations")
-        noise, begin = (
-            base.noise,
-            [start for names in sets for start in _starts(context, base.fit.unit, names)],
-        )
+        noise = base.noise
+        begin = [start for names in sets for start in _starts(context, base.fit.unit, names)]
         for _ in range(2):  # the second time under the noise that the best of them leaves
             fits = refit(context, noise, begin)
             noise = base.quiet.of_fit(fits[0].unit, fits[0].names)
@@ -111,7 +109,8 @@ def _starts(context: Context, unit: np.ndarray, names: Names) -> list[Start]:
     """The base fit with every setting of each effect and its sizes at what matters least, either
     way.
     """
-    at, result = context.coordinates, []
+    at = context.coordinates
+    result = []
     for name in names:
         candidate = context.catalogue[name]
         for setting in candidate.settings:

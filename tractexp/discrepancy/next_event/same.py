@@ -60,7 +60,8 @@ def _shrunk(context: Context, fit: Refit, size: float) -> np.ndarray:
     measurement.
     """
     at = context.coordinates
-    unit, sizes = at.without_faults(fit.unit, ()), at.sizes(fit.names)
+    unit = at.without_faults(fit.unit, ())
+    sizes = at.sizes(fit.names)
     unit[sizes] = at.null[sizes] + size * (unit[sizes] - at.null[sizes])
     return unit
 
@@ -100,7 +101,8 @@ def _follow_truth(
 
     mild = np.zeros(valid.shape, bool)  # first: near a stall a descent from afar goes astray
     mild[:, : drive.first[drive.events // 2]] = True
-    nearest_point, off = start[columns], np.inf
+    nearest_point = start[columns]
+    off = np.inf
     for rows in (mild[valid], np.ones(len(truth), bool)):
         if not rows.any():  # the load stalls in all of them
             continue
@@ -124,7 +126,8 @@ def _find_recovering_samples(answer: np.ndarray, drive: Drive) -> np.ndarray:
     alive = np.zeros(answer.shape, bool)
     for e in range(drive.events):
         own = answer[:, drive.part(e)]
-        first, last = own[:, :20].mean(axis=1), own[:, -20:].mean(axis=1)
+        first = own[:, :20].mean(axis=1)
+        last = own[:, -20:].mean(axis=1)
         alive[:, drive.part(e)] = (
             np.isfinite(own).all() and np.abs(last - first).max() < SETTLED * np.abs(first).max()
         )

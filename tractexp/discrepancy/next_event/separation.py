@@ -109,7 +109,8 @@ def seen(
 
     What the recorder did to earlier events says nothing of the load, but it may go on.
     """
-    at, names = context.coordinates, side.fit.names
+    at = context.coordinates
+    names = side.fit.names
     drives = [driven(context, event) for event in events]
     inside = list(side.columns[: len(side.columns) - len(at.before)])
     middle = at.without_faults(side.fit.unit, ())
@@ -129,12 +130,14 @@ def seen(
         for channel in ("P0", "Q0")
         for sign in (1, -1)
     ]
-    one, k = Drive.from_events(drives[:1]), len(inside)
+    one = Drive.from_events(drives[:1])
+    k = len(inside)
     missed = [0.0] * len(events)
     if error:
         still = replace(events[0], depth=0.0, jump=0.0, unbalance=0.0)
         (rest,) = _simulate_drives(context, names, middle[None], [driven(context, still)])[0]
-        variance, step = float(np.mean(np.square(noise.levels))), drives[0].step
+        variance = float(np.mean(np.square(noise.levels)))
+        step = drives[0].step
         responses = [float(np.mean((rows[0] - rest) ** 2)) for rows in moved]
         missed = [weigh_error(error, response, variance, step) for response in responses]
     white = noise_of(noise, one, events[0].rate, context.events[0].record.step)
@@ -169,7 +172,8 @@ class Separation:
         """Reduce what the records say of each rival to a few rows, from which draws are decided."""
         self.sides, self.criteria, self.draws, self.seed = sides, criteria, draws, seed
         rows = _reduce_blocks([np.vstack([x.r, x.J]) for x in sides])
-        self.r, self.J = [x[0] for x in rows], [x[1:] for x in rows]
+        self.r = [x[0] for x in rows]
+        self.J = [x[1:] for x in rows]
         self.precision = [x.precision for x in sides]
 
     def find_denied_rivals(
@@ -185,10 +189,12 @@ class Separation:
             return np.zeros((len(self.sides) - 1, self.draws), bool)
         weight = np.sqrt(times / (1 + times * max(x.missed for x in seen)))
         rows = _reduce_blocks([weight * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
-        f, K = [x[0] for x in rows], [x[1:] for x in rows]
+        f = [x[0] for x in rows]
+        K = [x[1:] for x in rows]
         rng = np.random.default_rng([self.seed, truth])
         side = self.sides[truth]
-        k, here = len(side.columns), side.fit.unit[list(side.columns)]
+        k = len(side.columns)
+        here = side.fit.unit[list(side.columns)]
         h = (
             rng.standard_normal((self.draws, k))
             @ np.linalg.cholesky(np.linalg.inv(self.precision[truth])).T

@@ -131,7 +131,8 @@ def carried_over(other: Context, original: Context, unit: np.ndarray) -> np.ndar
     """Coordinates (D',) of the context of terms with base model, faults and power before as at
     coordinates (D,).
     """
-    to, old = other.coordinates, original.coordinates
+    to = other.coordinates
+    old = original.coordinates
     moved = to.null.copy()
     faults = to.catalogue.parameters(to.catalogue.of_measurement)
     for name in (*(to.names[k] for k in to.base), *(p.name for p in faults)):

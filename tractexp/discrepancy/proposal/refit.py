@@ -136,10 +136,8 @@ def term_fits(
     listed = shortlist(screened)
     chosen = zoom_settings(ground, [*listed, *further(screened, listed[:AGAIN])])
     likely = [f.term for f in chosen]
-    context, noise = (
-        with_terms(ground.context, [*likely, *(s for t in likely for s in siblings(t))]),
-        ground.noise,
-    )
+    context = with_terms(ground.context, [*likely, *(s for t in likely for s in siblings(t))])
+    noise = ground.noise
     bare = refit(context, noise, [((), ground.unit)])[0]
     fits = rough_refit(context, noise, _starts(context, chosen, [ground.unit]))
     best = {f.names[0] for f in fits[:AGAIN]}
