@@ -15,7 +15,7 @@ from tractexp.discrepancy.disagreement import disagreement, examine_fit
 from tractexp.inference.base_fit import fitted_from
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Names, Refit, best_of, refit
+from tractexp.inference.fitting import Names, Refit, best_of, leave_each_out, refit
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.wide_fit import wide_refit
 from tractexp.noise import Noise
@@ -120,13 +120,13 @@ class AllEvents:
         """
         if len(fit.names) < 2:
             return {}
-        rest = {name: tuple(n for n in fit.names if n != name) for name in fit.names}
+        fewer = leave_each_out(self.fitted, fit)
         at = self.fitted.coordinates
-        wanted = [(names, at.remove_effects(fit.unit, [left])) for left, names in rest.items()]
-        there = [self.refits[names] for names in rest.values() if names in self.refits]
-        wanted += [(f.names, at.without_faults(f.unit, self.faults)) for f in there]
-        fits = {f.names: f for f in refit(self.fitted, self.noise, wanted, self.faults)}
-        return {left: fits[names] for left, names in rest.items()}
+        there = [self.refits[names] for names, _ in fewer if names in self.refits]
+        found = [(f.names, at.without_faults(f.unit, self.faults)) for f in there]
+        fits = refit(self.fitted, self.noise, [*fewer, *found], self.faults)
+        by_names = {f.names: f for f in fits}
+        return {left: by_names[names] for left, (names, _) in zip(fit.names, fewer, strict=True)}
 
     def fit_to_all(self, fits: Mapping[str, Refit]) -> dict[str, Refit]:
         """{member: fit} of given fits, fitted to all events."""

@@ -11,7 +11,7 @@ from tractexp.inference.chance import BLURRED, Chance, chance_at, is_noise_exact
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.fit_effort import NOISE_ROUNDS, QUIETER
-from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.fitting import Refit, refit_from
 from tractexp.inference.goodness_of_fit import GoodnessOfFit
 from tractexp.inference.linearization import Linearization, rich_residuals, tangent
 from tractexp.inference.noise_in_quiet import QuietNoise
@@ -201,7 +201,7 @@ def examine_fit(
         noise = quiet.estimate_noise(
             fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining_columns
         )
-        fit = refit(context, noise, [(fit.names, fit.unit)])[0]
+        fit = refit_from(context, noise, fit.names, fit.unit)
         t = tangent(context, fit, noise)
         if fit.deviance > QUIETER * context.samples:
             break  # else this is the noise of a worse fit

@@ -30,9 +30,11 @@ from tractexp.inference.fitting import (
     Refit,
     Start,
     best_of,
+    leave_each_out,
     no_worse_than_subsets,
     off_bounds,
     refit,
+    refit_from,
     rough_refit,
 )
 from tractexp.inference.multistart import DISTINCT
@@ -133,14 +135,9 @@ def without_needless(
     """
     fit = tests.fit
     context = base.context
-    at = context.coordinates
     if len(fit.names) < 2:
         return tests
-    wanted = [
-        (tuple(n for n in fit.names if n != left), at.remove_effects(fit.unit, [left]))
-        for left in fit.names
-    ]
-    fewer = refit(context, tests.noise, wanted)[0]
+    fewer = refit(context, tests.noise, leave_each_out(context, fit))[0]
     if worth(fit, fewer, context.criteria.further_name_p):
         return tests
     refits[fewer.names] = fewer
@@ -198,9 +195,8 @@ def beneath(first: Disagreement, fit: Refit) -> Disagreement:
     is another.
     """
     context = first.context
-    bare = refit(
-        context, first.noise, [((), context.coordinates.remove_effects(fit.unit, fit.names))]
-    )[0]
+    start = context.coordinates.remove_effects(fit.unit, fit.names)
+    bare = refit_from(context, first.noise, (), start)
     away = np.linalg.norm((bare.unit - first.fit.unit)[context.coordinates.base])
     return first.score_fit(context, bare, first.noise) if away > DISTINCT else first
 

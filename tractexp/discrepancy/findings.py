@@ -171,7 +171,7 @@ class Findings:
         if chosen is None or there is None:
             return chosen and chosen.gap
         units = [row.held_out_prediction.unit for row in (self.evidence.base, chosen)]
-        left = there.residuals(units[1][None], chosen.fit.names)[0]
+        left = there.residual(units[1], chosen.fit.names)
         noise = QuietNoise.from_context(there, units[1]).estimate_noise(units[1], left)
         return gap(there, units[0], units[1], chosen.fit.names, noise, there.coordinates.before)
 

@@ -13,7 +13,7 @@ from tractexp.inference.injection import PUSHES, perturbations
 from tractexp.inference.linearization import find_active_bounds
 from tractexp.inference.model_error import Change, Misfit
 from tractexp.noise import Noise
-from tractexp.noise.span import compute_basis
+from tractexp.noise.span import compute_basis, project_out
 
 SHOWN, MILD, DENIED = "shown", "mild", "denied"  # what events say of an extension
 # roots of what is expected: in 95 % of cases no more than so many are lacking of it
@@ -236,5 +236,5 @@ def beyond_chance(
     nuisance = rows[1 : 1 + k] - rows[1 + k :]
     nuisance = nuisance[~find_active_bounds(context, unit, fitted, nuisance @ r)]
     Q = np.linalg.qr(nuisance.T)[0]
-    basis = compute_basis(changes - (changes @ Q) @ Q.T, LEAST_DISTINCT_PUSH)
+    basis = compute_basis(project_out(changes, Q.T), LEAST_DISTINCT_PUSH)
     return float(np.sum((basis @ r) ** 2) - len(basis))

@@ -12,7 +12,7 @@ from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.gap import SHOWN, GapTest, beyond_chance, compute_pushed_changes, gap
 from tractexp.inference.context import Context
-from tractexp.inference.fitting import Names, Refit, fit_initial_power, refit
+from tractexp.inference.fitting import Names, Refit, fit_initial_power, refit, refit_from
 from tractexp.inference.noise_in_quiet import QuietNoise, white
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -32,9 +32,8 @@ def judge_held_out(
     noise = explained.last.noise
     criteria = explained.last.criteria
     at = context.coordinates
-    bare = refit(
-        context, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=()
-    )[0]
+    start = at.without_faults(explained.steps[0].fit.unit, ())
+    bare = refit_from(context, noise, (), start, faults=())
     faults = find_telling_faults(explained, bare)
     adequate = find_adequate(evidence, criteria)
     wanted = adequate or [row for row in evidence.rows if not criteria.rejects(row.behind)][:1]
@@ -80,7 +79,7 @@ def find_telling_faults(explained: Explanations, bare: Refit) -> Names:
 
     def fit_with(retained: Names) -> float:
         unit = context.coordinates.without_faults(fit.unit, retained)
-        return refit(context, noise, [(fit.names, unit)], faults=retained)[0].deviance
+        return refit_from(context, noise, fit.names, unit, retained).deviance
 
     most = fit_with(faults) if faults else 0.0
     while faults:
@@ -190,7 +189,7 @@ def carry_fits(
     units = [fit_initial_power(other, at(fit.unit), white(other), fit.names) for fit in fits]
     noise = white(other)
     for unit, fit in zip(reversed(units), reversed(fits), strict=True):
-        if np.isfinite(left := other.residuals(unit[None], fit.names)[0]).all():
+        if np.isfinite(left := other.residual(unit, fit.names)).all():
             noise = QuietNoise.from_context(other, unit).estimate_noise(unit, left)
             break
     return (

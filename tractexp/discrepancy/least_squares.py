@@ -32,7 +32,7 @@ def residual_noise(context: Context, fit: Refit) -> Noise:
 
     Under it the deviance is the sum of squares by which names are judged.
     """
-    residual = context.residuals(fit.unit[None], fit.names)[0]
+    residual = context.residual(fit.unit, fit.names)
     level = float(np.sqrt(np.mean(residual[context.valid] ** 2)))
     return Noise(Noise.white(*[level] * len(residual)).pairs, np.eye(len(residual)))
 

@@ -95,7 +95,7 @@ def on_held_out(
     fits = [bare, *([nearest.row.fit] if nearest else [])]
     other, units, noise = carry_fits(context, withheld, fits)
     before, *near = [
-        other.residuals(unit[None], fit.names)[0] + other.drive.measurements
+        other.residual(unit, fit.names) + other.drive.measurements
         for unit, fit in zip(units, fits, strict=True)
     ]
     return _each(other, noise, (before, None, near[0] if near else None), (), held_out=True)
@@ -122,7 +122,7 @@ def draw_graded(
 
 def of_fit(context: Context, fit: Refit, noise: Noise) -> list[Overlay]:
     """The fitted events by one fit alone."""
-    calculated = context.residuals(fit.unit[None], fit.names)[0] + context.drive.measurements
+    calculated = context.residual(fit.unit, fit.names) + context.drive.measurements
     return _each(context, noise, (calculated, None, None), (), held_out=False)
 
 

@@ -38,7 +38,7 @@ from tractexp.discrepancy.ranking import MOST_NAMED, find_nearest, rank_sets
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Refit, best_of, refit
+from tractexp.inference.fitting import Refit, best_of, refit, refit_from
 from tractexp.inference.model_error import block_sums, noise_variance
 from tractexp.inference.wide_fit import wide_refits
 from tractexp.noise import Noise
@@ -93,7 +93,7 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
     family = context.catalogue.textbook
     if context.prior:  # its rows stand beside what the base model leaves, as in an identification
         start = plain.coordinates.at_measured_power(explained.steps[0].fit.unit)
-        noise = residual_noise(plain, refit(plain, noise, [((), start)], faults=())[0])
+        noise = residual_noise(plain, refit_from(plain, noise, (), start, faults=()))
     there = context.move_to_events(events)
 
     def fill(fits: Sequence[Refit]) -> list[SetEvidence]:
@@ -243,7 +243,7 @@ def select_grounds(catalogue: Catalogue, refits: Iterable[Refit]) -> list[Refit]
 def predict(there: Context, fit: Refit) -> PredictedError:
     """What a fit leaves of other events."""
     unit = there.coordinates.at_measured_power(fit.unit)
-    calculated = there.residuals(unit[None], fit.names)[0] + there.drive.measurements
+    calculated = there.residual(unit, fit.names) + there.drive.measurements
     played = [
         there.domain.comparison(event, calculated[:, there.drive.part(e)])
         for e, event in enumerate(there.events)

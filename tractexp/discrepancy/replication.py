@@ -15,7 +15,7 @@ from tractexp.discrepancy.gap import SPREAD
 from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.prediction import predict
 from tractexp.inference.context import Context
-from tractexp.inference.fitting import Names, Refit, refit
+from tractexp.inference.fitting import Names, Refit, leave_each_out, refit
 from tractexp.inference.model_error import noise_variance
 from tractexp.record import Event
 
@@ -72,10 +72,7 @@ def replicate(
     noise = residual_noise(plain, replace(chosen, unit=at.at_measured_power(chosen.unit)))
     smaller: list[tuple[Names, np.ndarray]] = [((), base.unit)]
     if len(chosen.names) > 1:
-        smaller += [
-            (tuple(n for n in chosen.names if n != left), at.remove_effects(chosen.unit, [left]))
-            for left in chosen.names
-        ]
+        smaller += leave_each_out(plain, chosen)
 
     own = chosen.names, chosen.unit
 

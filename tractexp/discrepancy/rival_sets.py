@@ -13,7 +13,7 @@ from tractexp.discrepancy.decide import MOST_TESTED
 from tractexp.discrepancy.disagreement import examine_fit
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.inference.fitting import refit
+from tractexp.inference.fitting import refit, refit_from
 
 RIVAL_SEED_OFFSET = 100  # added to the seed of the draws at rivals
 
@@ -48,7 +48,7 @@ def rank_rivals(explained: Explanations) -> list[SetEvidence]:
     context, noise, chosen = explained.base.context, explained.last.noise, explained.chosen.names
     wanted = [(f.names, f.unit) for f in explained.refits.values() if len(f.names) == len(chosen)]
     fits = sorted(refit(context, noise, wanted), key=lambda fit: fit.names != chosen)
-    base = refit(context, noise, [((), explained.steps[0].fit.unit)])[0]
+    base = refit_from(context, noise, (), explained.steps[0].fit.unit)
     family = context.catalogue.textbook
     return [
         SetEvidence(

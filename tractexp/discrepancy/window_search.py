@@ -14,7 +14,7 @@ from tractexp.discrepancy.disagreement import Disagreement, disagreement, examin
 from tractexp.inference.base_fit import BaseFit, fitted_from
 from tractexp.inference.chance import BLURRED
 from tractexp.inference.context import Context
-from tractexp.inference.fitting import Refit, refit, rough_refit
+from tractexp.inference.fitting import Refit, refit_from, rough_refit
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.recorder_window import windows_of
 from tractexp.inference.records import Records
@@ -45,7 +45,7 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
         behind = context.move_to_records(Records.from_events(context.records.recorded, window))
         local_minima = (first.fit.unit, *base.local_minima)  # the load's: no window moves them far
         begun = rough_refit(behind, noise, [((), start) for start in local_minima])[0]
-        tried.append((behind, refit(behind, noise, [((), begun.unit)])[0]))
+        tried.append((behind, refit_from(behind, noise, (), begun.unit)))
     believed = _choose_window(tried, first) if tried else None
     if believed is None:
         return base, first
@@ -89,7 +89,7 @@ def behind_window(
     tests = examine_fit(base.quiet, best, noise, seed, plain=True)
     for window in windows_of(context.events) if tests.faults else ():
         behind = context.move_to_records(Records.from_events(context.records.recorded, window))
-        fit = refit(behind, tests.noise, [(best.names, best.unit)])[0]
+        fit = refit_from(behind, tests.noise, best.names, best.unit)
         if not fit.deviance < bare.deviance:
             break  # it costs more than the explanation gains
         there = examine_fit(

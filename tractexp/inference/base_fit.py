@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.inference.context import Context
-from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.fitting import Refit, refit, refit_from
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.multistart import valleys
 from tractexp.inference.noise_in_quiet import QuietNoise, white
@@ -121,5 +121,5 @@ def fitted_from(
     quiet = QuietNoise.from_context(context, fit.unit)
     for _ in range(BASE_FIT_ROUNDS):
         noise = quiet.of_fit(fit.unit)
-        fit = refit(context, noise, [((), fit.unit)])[0]
+        fit = refit_from(context, noise, (), fit.unit)
     return BaseFit(context, fit, noise, quiet, tuple(local_minima))

@@ -259,6 +259,10 @@ class Context:
         key = self.kernels.family.key(names, beside)
         return self.kernels.residuals(key, unit)
 
+    def residual(self, unit: np.ndarray, names: Sequence[str] = ()) -> np.ndarray:
+        """The residual (C, N) [pu] at coordinates (D,), as of `residuals`."""
+        return self.residuals(unit[None], names)[0]
+
     def residuals_of(self, unit: np.ndarray, sets: Sequence[Sequence[str]]) -> np.ndarray:
         """The residuals at n points, each with a set of effects of its own.
 

@@ -84,6 +84,28 @@ def refit(
     return best_of(run_descents(context, noise, wanted, faults, fit_effort.EXACT_DESCENT))
 
 
+def refit_from(
+    context: Context,
+    noise: Noise,
+    names: Sequence[str],
+    unit: np.ndarray,
+    faults: Sequence[str] | None = None,
+) -> Refit:
+    """Fit one set of effects from coordinates (D,), as of `refit`."""
+    return refit(context, noise, [(names, unit)], faults)[0]
+
+
+def leave_each_out(context: Context, fit: Refit) -> list[tuple[Names, np.ndarray]]:
+    """Starts of a set without each of its effects in turn, in their order: all else as it fits."""
+    return [
+        (
+            tuple(name for name in fit.names if name != left),
+            context.coordinates.remove_effects(fit.unit, [left]),
+        )
+        for left in fit.names
+    ]
+
+
 def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
     """Fit sets of effects as far as is needed to rank those that are far apart.
 

@@ -55,7 +55,7 @@ def _jumps(context: Context, key: bytes) -> np.ndarray:
     without = unit.copy()
     columns = at.sizes(there)
     without[columns] = at.null[columns]
-    added = context.residuals(unit[None], there)[0] - context.residuals(without[None], there)[0]
+    added = context.residual(unit, there) - context.residual(without, there)
     shapes = []
     for e in range(len(context.events)):
         part = context.drive.part(e)

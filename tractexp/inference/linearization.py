@@ -15,7 +15,7 @@ from tractexp.inference.fitting import Refit
 from tractexp.inference.injection import PUSHES, perturbations
 from tractexp.inference.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
-from tractexp.noise.span import compute_basis
+from tractexp.noise.span import compute_basis, project_out
 
 CANDIDATE_STEP = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 LARGEST_MOVE_AT_BOUND = 1e-6  # of it: how far a parameter that rests on a wall may move
@@ -90,7 +90,7 @@ class Linearization:
         ]
         ends = np.cumsum([len(part) for part in raw])
         white = self.context.whiten(noise, np.concatenate(raw))
-        rows = np.concatenate([white, np.zeros((len(white), len(self.prior)))], axis=1)
+        rows = np.pad(white, ((0, 0), (0, len(self.prior))))
         size = white.shape[1]
         rows[: ends[0], size:] = self.prior.T
         rows[ends[0], size:] = self.prior @ self.estimate
@@ -261,4 +261,4 @@ def rich_residuals(t: Linearization, residuals: np.ndarray) -> np.ndarray:
     right = compute_basis(t.explaining_columns.reshape(-1, residuals[0].size), 1e-6)
     flat = residuals.reshape(len(residuals), -1)
     rest = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_VARIANCE)
-    return ((flat - (flat @ right.T) @ right) / np.sqrt(rest)).reshape(residuals.shape)
+    return (project_out(flat, right) / np.sqrt(rest)).reshape(residuals.shape)

@@ -42,7 +42,7 @@ class QuietNoise:
 
     def of_fit(self, unit: np.ndarray, names: Sequence[str] = ()) -> Noise:
         """The noise of the quiet residuals at coordinates (D,), of a fit with these effects."""
-        return self.estimate_noise(unit, self.context.residuals(unit[None], names)[0])
+        return self.estimate_noise(unit, self.context.residual(unit, names))
 
     def estimate_noise(
         self,

@@ -13,6 +13,7 @@ import numpy as np
 from tractexp.inference.context import Context
 from tractexp.inference.differences import finite
 from tractexp.noise import Noise
+from tractexp.noise.span import project_out
 
 LEAST_DEVIANCE_SHARE = 1e-9  # of the deviance: a change below that is none
 
@@ -72,7 +73,7 @@ def _expect_deviance(
     Q = np.linalg.qr(rows[1:].T)[0]
     r = rows[0] - Q @ (rows[0] @ Q)
     white = context.whiten(noise, finite(context.residuals(units, names) - raw))
-    changes = np.concatenate([white, np.zeros((len(white), len(r) - white.shape[1]))], axis=1)
-    changes -= (changes @ Q) @ Q.T
+    changes = np.pad(white, ((0, 0), (0, len(r) - white.shape[1])))
+    changes = project_out(changes, Q.T)
     power = np.einsum("nr,nr->n", changes, changes)
     return r @ r - (changes @ r) ** 2 / np.maximum(power, LEAST_DEVIANCE_SHARE * (r @ r) + 1e-300)

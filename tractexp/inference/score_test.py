@@ -97,7 +97,7 @@ class ScoreTest:
         -------
         ScoreTest
         """
-        rows = np.concatenate([white, np.zeros((len(white), len(self.Q) - white.shape[1]))], axis=1)
+        rows = np.pad(white, ((0, 0), (0, len(self.Q) - white.shape[1])))
         along = rows @ self.Q
         rows -= along @ self.Q.T
         return replace(self, r=rows, along=along, departure=np.zeros_like(self.departure))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.model.drive import Drive
-from tractexp.noise.span import compute_basis
+from tractexp.noise.span import compute_basis, project_out
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,15 +185,12 @@ class SeparableBasis:
         """Rows (b, R) less their part in the span of each event's own."""
         left = rows.copy()
         for basis, mine in zip(self.own, self.rows, strict=True):
-            part = rows[:, mine]
-            left[:, mine] = part - (part @ basis.T) @ basis
+            left[:, mine] = project_out(rows[:, mine], basis)
         return left
 
     def project_out(self, rows: np.ndarray) -> np.ndarray:
         """Rows (b, R) less their part in the span."""
-        left = self.without_own(rows)
-        left -= (left @ self.shared.T) @ self.shared
-        return left
+        return project_out(self.without_own(rows), self.shared)
 
     def energy(self, rows: np.ndarray) -> np.ndarray:
         """Squares of what the span has of rows (b, R), (b,)."""

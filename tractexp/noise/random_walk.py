@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.model.drive import Drive
 from tractexp.noise.color import Autoregression, fit_autoregression
-from tractexp.noise.span import compute_basis
+from tractexp.noise.span import compute_basis, project_out
 from tractexp.record import Event
 
 MODES = 48
@@ -70,8 +70,8 @@ class Walk:
         -------
         Walk
         """
-        _, values, basis = np.linalg.svd(modes - (modes @ fixed.T) @ fixed, full_matrices=False)
-        return cls(values, basis, basis @ (stretch - (stretch @ fixed.T) @ fixed))
+        _, values, basis = np.linalg.svd(project_out(modes, fixed), full_matrices=False)
+        return cls(values, basis, basis @ project_out(stretch, fixed))
 
     def likelihood(self, grid: np.ndarray) -> np.ndarray:
         """The logarithm of the likelihood of each intensity of a grid (g,), up to a constant."""
@@ -315,7 +315,7 @@ def without_slow(stretch: np.ndarray) -> np.ndarray:
     """A stretch (n,) without its mean and its three slowest cosines."""
     basis = np.vstack([np.ones(len(stretch)), cosines(len(stretch), WANDERING_COSINES)])
     basis /= np.linalg.norm(basis, axis=1, keepdims=True)
-    return stretch - (stretch @ basis.T) @ basis
+    return project_out(stretch, basis)
 
 
 def without_drift(stretches: Sequence[np.ndarray]) -> list[np.ndarray]:

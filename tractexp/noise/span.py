@@ -30,3 +30,14 @@ def compute_basis(rows: np.ndarray, distinct: float, least: float = 0.0) -> np.n
         return rows
     _, values, basis = np.linalg.svd(rows, full_matrices=False)
     return basis[values > distinct * values[0]]
+
+
+def project_out(rows: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """Rows (..., R) without what orthonormal rows (m, R) span.
+
+    Examples
+    --------
+    >>> project_out(np.array([[3.0, 4.0]]), np.array([[1.0, 0.0]])).tolist()
+    [[0.0, 4.0]]
+    """
+    return rows - (rows @ basis.T) @ basis

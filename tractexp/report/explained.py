@@ -32,7 +32,7 @@ def answer_clicks(findings: Findings) -> list[list[Answer]]:
     rows = [findings.evidence.base, *chosen]
     names = [join_words(row.fit.names) for row in rows]
     deviation, fits = noise.deviation(drive), [row.reported_fit for row in rows]
-    left = [context.residuals(fit.unit[None], fit.names)[0] / deviation for fit in fits]
+    left = [context.residual(fit.unit, fit.names) / deviation for fit in fits]
     answers: list[list[Answer]] = [[] for _ in problem.events]
     for window in residual_windows(problem):
         c = drive.labels.index(window.channel)

@@ -103,9 +103,9 @@ def _assess_models(
 
     `original` has the same events; coordinates `fitted` were fitted to them.
     """
-    without = context.residuals(bare[None], ())[0]
+    without = context.residual(bare)
     apart = [
-        (context.residuals(unit[None], fit.names)[0] - without) * context.valid
+        (context.residual(unit, fit.names) - without) * context.valid
         for fit, unit in zip(fits, units, strict=True)
     ]
     terms = context.whiten(noise, np.array(apart))

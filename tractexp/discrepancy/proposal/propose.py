@@ -27,6 +27,7 @@ from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.model_error import Change
 from tractexp.noise import Noise
+from tractexp.noise.span import project_out
 from tractexp.record import Event
 from tractexp.text.wording import join_words
 
@@ -189,9 +190,8 @@ def alike(result: TermFits, fit: Refit, first: Disagreement) -> list[tuple[str, 
     context = result.context
     rows = context.whiten(result.noise, change(result, fit)[None])
     projection = first.projection
-    size = rows.shape[1]
-    wide = np.concatenate([rows, np.zeros((1, projection.Q.shape[0] - size))], axis=1)
-    s = (wide - (wide @ projection.Q) @ projection.Q.T)[0]
+    wide = np.pad(rows, ((0, 0), (0, len(projection.Q) - rows.shape[1])))
+    s = project_out(wide, projection.Q.T)[0]
     shares: dict[str, float] = {}
     for column, block in zip(projection.columns, projection.blocks, strict=True):
         gram = block @ block.T

@@ -17,7 +17,15 @@ from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, ter
 from tractexp.discrepancy.proposal.screen import Ground, TermScore, scores
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Refit, Start, best_of, off_bounds, refit, rough_refit
+from tractexp.inference.fitting import (
+    Refit,
+    Start,
+    best_of,
+    off_bounds,
+    refit,
+    refit_from,
+    rough_refit,
+)
 from tractexp.inference.information import free_standard_errors
 from tractexp.inference.wide_fit import wide_refit
 from tractexp.noise import Noise
@@ -138,7 +146,7 @@ def term_fits(
     likely = [f.term for f in chosen]
     context = with_terms(ground.context, [*likely, *(s for t in likely for s in siblings(t))])
     noise = ground.noise
-    bare = refit(context, noise, [((), ground.unit)])[0]
+    bare = refit_from(context, noise, (), ground.unit)
     fits = rough_refit(context, noise, _starts(context, chosen, [ground.unit]))
     best = {f.names[0] for f in fits[:AGAIN]}
     others = [*off_bounds(context, ground.unit, MIDDLE), *local_minima]

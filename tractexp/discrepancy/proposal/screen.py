@@ -17,6 +17,7 @@ from tractexp.discrepancy.proposal.library import Term
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.noise import Noise
+from tractexp.noise.span import project_out
 
 TERM_STEP = 0.02  # of a size's relevant value: how large a term is whose column is taken
 COLUMNS_AT_ONCE = 384  # columns held at once
@@ -52,7 +53,7 @@ class Ground:
 
     def off(self, rows: np.ndarray) -> np.ndarray:
         """Rows (n, R) without what the nuisances explain."""
-        return rows - (rows @ self.Q) @ self.Q.T
+        return project_out(rows, self.Q.T)
 
     def columns(self, points: np.ndarray, spans: np.ndarray, kind: str) -> np.ndarray:
         """What points (n, D) of one kind of terms change for each unit of their size, whitened (n,
@@ -69,9 +70,7 @@ class Ground:
         white = self.noise.draw_white(
             np.random.default_rng(seed), draws, context.drive, context.valid
         )
-        return self.off(
-            np.concatenate([white, np.zeros((draws, len(self.r) - white.shape[1]))], axis=1)
-        )
+        return self.off(np.pad(white, ((0, 0), (0, len(self.r) - white.shape[1]))))
 
 
 @dataclass(frozen=True, eq=False)
