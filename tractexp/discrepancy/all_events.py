@@ -15,7 +15,7 @@ from tractexp.discrepancy.disagreement import disagreement, examine_fit
 from tractexp.inference.base_fit import fitted_from
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Names, Refit, best_of, leave_each_out, refit
+from tractexp.inference.fitting import Names, Refit, best_of, key_by_names, leave_each_out, refit
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.wide_fit import wide_refit
 from tractexp.noise import Noise
@@ -93,7 +93,7 @@ class AllEvents:
         """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from
         every setting.
         """
-        by_name = {fit.names: fit for fit in alone}
+        by_name = key_by_names(alone)
         effort = self.context.effort
         _ = self.plain  # once, before processes are forked
         refitted = each_apart(lambda fit: self._refit(fit, anew=anew), alone, effort)
@@ -125,7 +125,7 @@ class AllEvents:
         there = [self.refits[names] for names, _ in fewer if names in self.refits]
         found = [(f.names, at.without_faults(f.unit, self.faults)) for f in there]
         fits = refit(self.fitted, self.noise, [*fewer, *found], self.faults)
-        by_names = {f.names: f for f in fits}
+        by_names = key_by_names(fits)
         return {left: by_names[names] for left, (names, _) in zip(fit.names, fewer, strict=True)}
 
     def fit_to_all(self, fits: Mapping[str, Refit]) -> dict[str, Refit]:

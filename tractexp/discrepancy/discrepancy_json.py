@@ -187,9 +187,9 @@ def write_left(investigation: Findings, path: Path) -> Path:
     nearest = investigation.nearest
     near = (investigation.train.after if nearest is None else nearest.fitted.after).calculated
     lines = [",".join(["event", "t", *drive.names])]
-    for e, event in enumerate(investigation.context.events):
-        left = drive.measurements[:, drive.part(e)] - near[:, drive.part(e)]
-        rows = list(zip(event.record.t, *left, strict=True))[event.first :]
+    left = drive.measurements - near
+    for event, part in zip(investigation.context.events, drive.parts, strict=True):
+        rows = list(zip(event.record.t, *left[:, part], strict=True))[event.first :]
         lines += [
             ",".join([quoting.csv(event.record.name), *(f"{x:.9g}" for x in row)]) for row in rows
         ]

@@ -30,6 +30,7 @@ from tractexp.inference.fitting import (
     Refit,
     Start,
     best_of,
+    key_by_names,
     leave_each_out,
     no_worse_than_subsets,
     off_bounds,
@@ -95,7 +96,7 @@ def explanations(
         size = len(steps[-1].fit.names) + 1
         ground = beneath(first, steps[-1].fit) if size > 1 else first
         fits = search_effect_sets([ground, *steps[1:]], refits, size, base.context.effort.say)
-        refits |= {f.names: f for f in fits}
+        refits |= key_by_names(fits)
         if not window_settled and (
             behind := behind_window(base, first.fit, fits[0], steps[-1].noise, seed)
         ):
@@ -103,7 +104,7 @@ def explanations(
         tests = sufficient(base, fits, steps[-1].noise, seed + size)
         if size == 1:
             if wider := searched_widely(base, first, refits, tests):
-                refits |= {f.names: f for f in wider}
+                refits |= key_by_names(wider)
                 fits = best_of(f for f in refits.values() if f.names)
                 tests = sufficient(base, fits, first.noise, seed + size)
             tests = with_families(base, tests, refits, seed)
@@ -156,7 +157,7 @@ def with_families(
     if not base.context.domain.calibrated or not base.context.criteria.further_name_p:
         return tests
     tests, fits = against_members(base, tests, refits, seed + FAMILY_SEED_OFFSET)
-    refits |= {f.names: f for f in fits}
+    refits |= key_by_names(fits)
     return tests
 
 
@@ -176,9 +177,7 @@ def search_effect_sets(
     if size == 1:
         boxes = each_apart(lambda fit: in_the_box(context, fit), fits, context.effort)
         fits = best_of([*fits, *refit_sets(context, noise, list(itertools.chain(*boxes)))])
-    return best_of(
-        no_worse_than_subsets(context, noise, {**refits, **{f.names: f for f in fits}}, fits)
-    )
+    return best_of(no_worse_than_subsets(context, noise, {**refits, **key_by_names(fits)}, fits))
 
 
 def refit_sets(context: Context, noise: Noise, begin: Sequence[Start]) -> list[Refit]:
@@ -186,7 +185,7 @@ def refit_sets(context: Context, noise: Noise, begin: Sequence[Start]) -> list[R
     fits = rough_refit(context, noise, begin)
     # the best itself is near, though it diverges and its cost is infinite
     near = [f for f in fits if f.cost <= fits[0].cost + NEAR_BEST]
-    exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in near])}
+    exact = key_by_names(refit(context, noise, [f.start for f in near]))
     return [exact.get(f.names, f) for f in fits]
 
 
@@ -224,7 +223,7 @@ def wide_starts(context: Context, bare: np.ndarray, refits: Refits) -> list[list
     unlike = [f for f in singles if len(context.catalogue[f.names[0]].settings) > 1]
     grounds = bare, *off_bounds(context, bare)
     return [
-        [(f.names, f.unit), *(s for unit in grounds for s in _every_setting(context, f, unit))]
+        [f.start, *(s for unit in grounds for s in _every_setting(context, f, unit))]
         for f in unlike
     ]
 

@@ -116,8 +116,8 @@ def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str
     calculated = residual[0] + context.drive.measurements
     deviance = float(np.nan_to_num(white @ white, nan=np.inf))
     each = [
-        context.domain.comparison(event, calculated[:, context.drive.part(e)])
-        for e, event in enumerate(context.events)
+        context.domain.comparison(event, calculated[:, part])
+        for event, part in zip(context.events, context.drive.parts, strict=True)
     ]
     misfit = Misfit.from_played(each)
     chi2 = deviance / max(context.samples, 1)
@@ -169,9 +169,7 @@ def gap(
     rows = np.nan_to_num(context.whiten(noise, apart)[0], nan=np.inf).reshape(
         context.drive.channels, -1
     )
-    by_event = tuple(
-        float(np.sum(rows[:, context.drive.part(e)] ** 2)) for e in range(len(context.events))
-    )
+    by_event = tuple(float(np.sum(rows[:, part] ** 2)) for part in context.drive.parts)
     shown = context.criteria.shown
     units = (base, extended)
     return GapTest(

@@ -12,7 +12,14 @@ from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.gap import SHOWN, GapTest, beyond_chance, compute_pushed_changes, gap
 from tractexp.inference.context import Context
-from tractexp.inference.fitting import Names, Refit, fit_initial_power, refit, refit_from
+from tractexp.inference.fitting import (
+    Names,
+    Refit,
+    fit_initial_power,
+    key_by_names,
+    refit,
+    refit_from,
+)
 from tractexp.inference.noise_in_quiet import QuietNoise, white
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -38,7 +45,7 @@ def judge_held_out(
     adequate = find_adequate(evidence, criteria)
     wanted = adequate or [row for row in evidence.rows if not criteria.rejects(row.behind)][:1]
     starts = [(row.fit.names, at.without_faults(row.fit.unit, faults)) for row in wanted]
-    finals = {fit.names: fit for fit in refit(context, noise, starts, faults=faults)}
+    finals = key_by_names(refit(context, noise, starts, faults=faults))
     rows = [
         replace(
             row, final=finals.get(row.fit.names), names=tuple(sorted((*row.fit.names, *faults)))

@@ -150,13 +150,14 @@ def _each(
     """Curves (C, N) of events end to end, cut into events."""
     deviation = noise.deviation(context.drive)
     overlays = []
-    for e, event in enumerate(context.records.recorded):
-        part = context.drive.part(e)
+    of_events = zip(context.records.recorded, context.events, context.drive.parts, strict=True)
+    for event, smooth, part in of_events:
         before, after, nearest = (None if c is None else c[:, part] for c in curves)
         assert before is not None
-        driving = context.events[e].record.U
         here = tuple(p for p in places if p.event == event.record.name)
         overlays.append(
-            Overlay(event, held_out, driving, before, after, nearest, deviation[:, part], here)
+            Overlay(
+                event, held_out, smooth.record.U, before, after, nearest, deviation[:, part], here
+            )
         )
     return overlays

@@ -38,7 +38,7 @@ from tractexp.discrepancy.ranking import MOST_NAMED, find_nearest, rank_sets
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Refit, best_of, refit, refit_from
+from tractexp.inference.fitting import Refit, best_of, key_by_names, refit, refit_from
 from tractexp.inference.model_error import block_sums, noise_variance
 from tractexp.inference.wide_fit import wide_refits
 from tractexp.noise import Noise
@@ -211,7 +211,7 @@ def _search_all_sets(
     refits: dict[Names, Refit] = {(): bare}
 
     def add(fits: Iterable[Refit]) -> None:
-        refits.update({f.names: f for f in best_of([*refits.values(), *fits])})
+        refits.update(key_by_names(best_of([*refits.values(), *fits])))
 
     add(search_effect_sets([ground], refits, 1, say))
     add(wide_refits(context, noise, wide_starts(context, bare.unit, refits), WIDELY))
@@ -245,8 +245,8 @@ def predict(there: Context, fit: Refit) -> PredictedError:
     unit = there.coordinates.at_measured_power(fit.unit)
     calculated = there.residual(unit, fit.names) + there.drive.measurements
     played = [
-        there.domain.comparison(event, calculated[:, there.drive.part(e)])
-        for e, event in enumerate(there.events)
+        there.domain.comparison(event, calculated[:, part])
+        for event, part in zip(there.events, there.drive.parts, strict=True)
     ]
     left = []
     noise = []

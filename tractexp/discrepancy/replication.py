@@ -15,7 +15,7 @@ from tractexp.discrepancy.gap import SPREAD
 from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.prediction import predict
 from tractexp.inference.context import Context
-from tractexp.inference.fitting import Names, Refit, leave_each_out, refit
+from tractexp.inference.fitting import Names, Refit, key_by_names, leave_each_out, refit
 from tractexp.inference.model_error import noise_variance
 from tractexp.record import Event
 
@@ -87,7 +87,7 @@ def replicate(
         there = plain.move_to_events(some)
         move = there.coordinates.at_measured_power
         starts = [(names, move(forget(names, unit))) for names, unit in (*smaller, own)]
-        return {fit.names: fit for fit in refit(there, noise, starts, faults)}
+        return key_by_names(refit(there, noise, starts, faults))
 
     def measure_gains(fits: dict[Names, Refit], event: Event) -> list[float]:
         there = plain.move_to_events([event])

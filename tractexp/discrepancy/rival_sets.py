@@ -46,7 +46,7 @@ def rank_rivals(explained: Explanations) -> list[SetEvidence]:
     the best first.
     """
     context, noise, chosen = explained.base.context, explained.last.noise, explained.chosen.names
-    wanted = [(f.names, f.unit) for f in explained.refits.values() if len(f.names) == len(chosen)]
+    wanted = [f.start for f in explained.refits.values() if len(f.names) == len(chosen)]
     fits = sorted(refit(context, noise, wanted), key=lambda fit: fit.names != chosen)
     base = refit_from(context, noise, (), explained.steps[0].fit.unit)
     family = context.catalogue.textbook

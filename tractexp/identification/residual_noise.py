@@ -63,8 +63,7 @@ def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
     absorbed = likelihood.free + 2 * drive.events
     back = np.sqrt(likelihood.samples / max(likelihood.samples - absorbed, 1))
     pairs: list[Pair] = []
-    for e in range(drive.events):
-        part = drive.part(e)
+    for part in drive.parts:
         pair = []
         for c in range(drive.channels):
             pieces = stretches(residuals[c, part], likelihood.valid[c, part])
@@ -83,9 +82,8 @@ def drop_outliers(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
     drive = likelihood.problem.drive
     valid = drive.weights > 0
     residuals = np.abs(replace(likelihood, valid=valid).residuals(unit)[0])
-    for e in range(drive.events):
+    for part in drive.parts:
         for c in range(drive.channels):
-            part = drive.part(e)
             sample = residuals[c, part][valid[c, part]]
             if len(sample):
                 valid[c, part] &= residuals[c, part] <= max(

@@ -43,7 +43,7 @@ def blocks_of(
     list of slice
         In the order of the samples; each lies within one event.
     """
-    parts = [drive.part(e) for e in range(drive.events)]
+    parts = drive.parts
     starts = [part.start + event.start for part, event in zip(parts, events, strict=True)]
     first = starts if from_dip else [part.start for part in parts]
     seconds = sum(

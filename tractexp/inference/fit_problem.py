@@ -96,8 +96,8 @@ class FitProblem:
         if not self.valid.all():
             with np.errstate(invalid="ignore"):  # what diverged is no number in gaps either
                 rows *= self.valid
-        for e, missed in enumerate(response.miss > 0):
-            rows[missed, :, drive.part(e)] = np.nan
+        for part, missed in zip(drive.parts, response.miss > 0, strict=True):
+            rows[missed, :, part] = np.nan
         return rows
 
     @functools.cached_property

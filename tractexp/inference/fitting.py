@@ -40,6 +40,11 @@ class Refit:
     parameters: int  # of the effects
 
     @property
+    def start(self) -> Start:
+        """The set and where it fits: another fit may begin there."""
+        return self.names, self.unit
+
+    @property
     def cost(self) -> float:
         """Akaike's criterion of the set, but for a constant: the deviance, and 2 for each
         parameter.
@@ -50,6 +55,11 @@ class Refit:
         14.0
         """
         return self.deviance + 2 * self.parameters
+
+
+def key_by_names(fits: Iterable[Refit]) -> dict[Names, Refit]:
+    """{names: fit}."""
+    return {fit.names: fit for fit in fits}
 
 
 def best_of(fits: Iterable[Refit]) -> list[Refit]:
@@ -170,7 +180,7 @@ def no_worse_than_subsets(
             again.append((fit.names, best.unit))
     if not again:
         return list(fits)
-    redone = {f.names: f for f in refit(context, noise, again)}
+    redone = key_by_names(refit(context, noise, again))
     return [min(f, redone.get(f.names, f), key=lambda r: r.deviance) for f in fits]
 
 

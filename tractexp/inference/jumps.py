@@ -57,8 +57,7 @@ def _jumps(context: Context, key: bytes) -> np.ndarray:
     without[columns] = at.null[columns]
     added = context.residual(unit, there) - context.residual(without, there)
     shapes = []
-    for e in range(len(context.events)):
-        part = context.drive.part(e)
+    for part in context.drive.parts:
         for c, change in enumerate(np.nan_to_num(added[:, part])):
             for k, size in _at_jumps(change):
                 shapes.append(np.zeros(context.drive.measurements.shape))

@@ -216,9 +216,8 @@ def find_active_bounds(
 def _by_event(context: Context, columns: np.ndarray) -> np.ndarray:
     """Columns (k, C, N) cut into one for each event, (k E, C, N)."""
     split = np.zeros((len(context.events), *columns.shape))
-    for e in range(len(split)):
-        part = context.drive.part(e)
-        split[e, ..., part] = columns[..., part]
+    for own, part in zip(split, context.drive.parts, strict=True):
+        own[..., part] = columns[..., part]
     return split.reshape(-1, *columns.shape[1:])
 
 

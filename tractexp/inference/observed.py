@@ -75,11 +75,7 @@ class Observed:
         # the fit took the others
         rest = np.maximum(1 - J.basis().leverage, LEAST_REST).reshape(residuals.shape)
         columns = J.columns.reshape(-1, *residuals.shape)
-        where = (
-            [self.drive.part(e) for e in range(self.drive.events)]
-            if whole
-            else self._noisy(residuals, valid)
-        )
+        where = self.drive.parts if whole else self._noisy(residuals, valid)
         try:
             return estimate_noise(
                 self.problem,

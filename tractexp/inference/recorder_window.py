@@ -71,8 +71,7 @@ class RecorderWindow(Measurement):
         The current is averaged over the window, and multiplied by the voltage recorded.
         """
         shown = np.empty_like(power)
-        for e in range(drive.events):
-            part = drive.part(e)
+        for e, part in enumerate(drive.parts):
             weights = self.weights(drive.event[e, -1])
             u = drive.find_phasors(e)
             shown[:, :, part] = averaged_power(power[:, :, part], u, weights)

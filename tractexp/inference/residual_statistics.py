@@ -187,8 +187,8 @@ def measure_steps(channels: np.ndarray, problem: Problem) -> np.ndarray:
         Squares of the sums from every `STRIDE`-th instant to the end, of each event and channel.
     """
     columns = []
-    for e in range(len(problem.events)):
-        sums = np.cumsum(channels[:, :, problem.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
+    for part in problem.drive.parts:
+        sums = np.cumsum(channels[:, :, part][:, :, ::-1], axis=2)[:, :, ::STRIDE]
         columns.append(sums**2)
     return np.concatenate(columns, axis=2).reshape(len(channels), -1)
 
@@ -239,8 +239,8 @@ def measure_tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
         Power over all events and channels: in the dips, after them and in both.
     """
     power = np.zeros((len(channels), 3, SPECTRUM_BINS // 2 + 1))
-    for e, event in enumerate(problem.events):
-        own = channels[:, :, problem.drive.part(e)]
+    for event, of_event in zip(problem.events, problem.drive.parts, strict=True):
+        own = channels[:, :, of_event]
         for k, part in enumerate(
             (slice(event.start, event.end), slice(event.end, None), slice(event.start, None))
         ):

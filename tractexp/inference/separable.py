@@ -40,7 +40,7 @@ class SeparableColumns:
         where they are held.
         """
         index = np.arange(drive.measurements.size).reshape(drive.measurements.shape)
-        rows = tuple(index[:, drive.part(e)].ravel() for e in range(drive.events))
+        rows = tuple(index[:, part].ravel() for part in drive.parts)
         count = 0 if first is None else 2
         return cls(
             (first or 0) + np.arange(count * drive.events).reshape(drive.events, count), rows

@@ -62,7 +62,7 @@ def _around(
         if others[0].deviance > fits[0].deviance - fit_effort.LEAST_GAIN:
             break
         fits = others
-    near = [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + fit_effort.NEAR_BEST]
+    near = [f.start for f in fits if f.cost < fits[0].cost + fit_effort.NEAR_BEST]
     return refit(context, noise, near, faults)
 
 
@@ -169,7 +169,7 @@ def wide_refits(
         )
     )
     begun = sorted(begun, key=lambda fits: fits[0].cost)[:most]
-    again = [[(f.names, f.unit) for f in fits] for fits in begun]
+    again = [[f.start for f in fits] for fits in begun]
     turned = each_apart(
         lambda starts: _in_turns(context, noise, starts, None), again, context.effort
     )

@@ -270,6 +270,11 @@ class Drive:
         """The samples of one event."""
         return slice(int(self.first[event]), int(self.first[event + 1]))
 
+    @property
+    def parts(self) -> list[slice]:
+        """The samples of each event."""
+        return [self.part(event) for event in range(self.events)]
+
     def find_phasors(self, event: int) -> NDArray[np.complex128]:
         """The voltage (n,) [pu] of one event's phasors, in a frame of nominal frequency."""
         part = self.part(event)

@@ -149,8 +149,7 @@ class Noise:
         # what diverges has a deviance that is not finite
         with np.errstate(over="ignore", invalid="ignore"):
             mixed = self._mix_channels(residuals)
-            for e in range(drive.events):
-                part = drive.part(e)
+            for e, part in enumerate(drive.parts):
                 self._fast(mixed[:, :, part], valid[:, part], e, rows[:, :, part])
                 self._shrink(rows[:, :, part], valid[:, part], part, e)
         return rows.reshape(len(rows), math.prod(rows.shape[1:]))  # of no rows, too
@@ -160,8 +159,8 @@ class Noise:
         be forked.
         """
         valid = self._select_common_samples(valid, drive)
-        for e in range(drive.events):
-            self._shrinkage(valid[:, drive.part(e)], drive.part(e), e)
+        for e, part in enumerate(drive.parts):
+            self._shrinkage(valid[:, part], part, e)
 
     def _select_common_samples(self, valid: np.ndarray, drive: Drive) -> np.ndarray:
         """The samples (C, N) that count: where channels are mixed, those at which every measured
@@ -173,7 +172,7 @@ class Noise:
         if self.mix is None:
             return valid
         if self.channels > 2 and drive.events > 1:
-            parts = [valid[:, drive.part(e)] for e in range(drive.events)]
+            parts = [valid[:, part] for part in drive.parts]
             return np.concatenate([_all_measured(part) for part in parts], axis=1)
         return _all_measured(valid)
 
@@ -272,8 +271,7 @@ class Noise:
     def deviation(self, drive: Drive) -> np.ndarray:
         """The standard deviation (C, N) [pu] of every sample of each channel, shapes included."""
         variance = np.empty(drive.measurements.shape)
-        for e in range(drive.events):
-            part = drive.part(e)
+        for e, part in enumerate(drive.parts):
             shapes = np.einsum("ij,kjt->kit", self._unmixing_matrix, self._shapes(part, e))
             variance[:, part] = self._fast_variance(e)[:, None] + (shapes**2).sum(axis=0)
         return np.sqrt(variance)

@@ -289,7 +289,7 @@ def walk_of_load(
     -------
     RandomWalk or None
     """
-    parts = [drive.part(e) for e in range(drive.events)]
+    parts = drive.parts
     before = [
         drive.measurements[:, part][:, event.steady]
         for part, event in zip(parts, events, strict=True)

@@ -78,7 +78,7 @@ def event_for(
         for _ in range(2):  # the second time under the noise that the best of them leaves
             fits = refit(context, noise, begin)
             noise = base.quiet.of_fit(fits[0].unit, fits[0].names)
-            begin = [(fit.names, fit.unit) for fit in fits]
+            begin = [fit.start for fit in fits]
         bare, *fits = sorted(
             refit(context, noise, [((), base.fit.unit), *begin]), key=lambda fit: bool(fit.names)
         )

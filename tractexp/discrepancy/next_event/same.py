@@ -124,11 +124,11 @@ def _find_recovering_samples(answer: np.ndarray, drive: Drive) -> np.ndarray:
     rounding does.
     """
     alive = np.zeros(answer.shape, bool)
-    for e in range(drive.events):
-        own = answer[:, drive.part(e)]
+    for part in drive.parts:
+        own = answer[:, part]
         first = own[:, :20].mean(axis=1)
         last = own[:, -20:].mean(axis=1)
-        alive[:, drive.part(e)] = (
+        alive[:, part] = (
             np.isfinite(own).all() and np.abs(last - first).max() < SETTLED * np.abs(first).max()
         )
     return alive

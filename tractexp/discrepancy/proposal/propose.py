@@ -164,8 +164,8 @@ def _find_acting_places(result: TermFits, fit: Refit) -> list[dict[str, Any]]:
     context = result.context
     added = change(result, fit)
     terms = []
-    for e, event in enumerate(context.events):
-        own = added[:, context.drive.part(e)]
+    for event, part in zip(context.events, context.drive.parts, strict=True):
+        own = added[:, part]
         channel, _ = np.unravel_index(np.abs(own).argmax(), own.shape)
         seen = np.flatnonzero((np.abs(own) > LEAST_ACTING_SHARE * np.abs(added).max()).any(axis=0))
         if len(seen):

@@ -159,9 +159,7 @@ def term_fits(
     near = fits[0].cost + max(EXACT_FIT_SHARE * (bare.deviance - fits[0].deviance), 20.0)
     exact = {
         f.names: f
-        for f in refit(
-            context, noise, [(f.names, f.unit) for f in fits[:MOST_EXACT_FITS] if f.cost <= near]
-        )
+        for f in refit(context, noise, [f.start for f in fits[:MOST_EXACT_FITS] if f.cost <= near])
     }
     ranked = sorted((exact.get(f.names, f) for f in fits), key=lambda f: f.cost)
     return TermFits(context, noise, bare, tuple(ranked))
@@ -179,7 +177,7 @@ def _searched_anew(
         return wide_refit(
             context,
             noise,
-            [choose_grid_start(context, noise, fit), (fit.names, fit.unit)],
+            [choose_grid_start(context, noise, fit), fit.start],
             again=again,
         )
 
