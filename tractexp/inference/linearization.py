@@ -216,8 +216,8 @@ def find_active_bounds(
 def _by_event(context: Context, columns: np.ndarray) -> np.ndarray:
     """Columns (k, C, N) cut into one for each event, (k E, C, N)."""
     split = np.zeros((len(context.events), *columns.shape))
-    for own, part in zip(split, context.drive.parts, strict=True):
-        own[..., part] = columns[..., part]
+    for e, part in enumerate(context.drive.parts):
+        split[e, ..., part] = columns[..., part]
     return split.reshape(-1, *columns.shape[1:])
 
 
