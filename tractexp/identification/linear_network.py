@@ -176,10 +176,10 @@ def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
 def _fit(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
     """The networks of `networks`, each from the poles of the one before."""
     fit = Projection.from_ports(ports)
-    fits = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none).coefficients)]
+    fits = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none)[0])]
     while len(fits) <= most and _samples(ports) >= SAMPLES * unknowns(len(fits), ports[0]):
         poles = fit.optimum(np.append(fits[-1].poles, fit.start(fits[-1].poles)))
-        fits.append(LinearNetwork(poles, fit.linear_part(poles).coefficients))
+        fits.append(LinearNetwork(poles, fit.linear_part(poles)[0]))
     return fits
 
 

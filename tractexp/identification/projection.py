@@ -8,7 +8,6 @@ Source: Golub and Pereyra 2003; Kaufman 1975 (the Jacobian).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,24 +20,6 @@ FREQUENCIES = (0.0, 2.0, 5.0, 12.0, 25.0, 50.0, 100.0)
 FASTEST, HIGHEST = 0.5, 0.25  # of the sampling rate: a decay [1/s], a frequency [Hz]
 MOST_PROJECTION_STEPS = 40  # of the nonlinear least squares
 PARALLEL = 1e-6  # of a response: where the others leave no more of it, it is theirs
-
-
-class LinearPart(NamedTuple):
-    """The best linear part for given poles.
-
-    Attributes
-    ----------
-    coefficients : (k,) complex
-        Of the responses.
-    base : (R, k) complex
-        An orthonormal base of these.
-    residual : (R,) complex
-        What they leave of the current.
-    """
-
-    coefficients: Complex
-    base: Complex
-    residual: Complex
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +54,22 @@ class Projection:
         current = _rows(ports, lambda port: port.i - port.steady_response)
         return cls(ports, current, 1 / seconds, 1 / max(port.step for port in ports))
 
-    def linear_part(self, poles: Complex) -> LinearPart:
-        """The best linear part for poles (n,) [rad/s]."""
+    def linear_part(self, poles: Complex) -> tuple[Complex, Complex, Complex]:
+        """The best linear part for poles (n,) [rad/s].
+
+        Returns
+        -------
+        (k,) complex
+            Coefficients of the responses.
+        (R, k) complex
+            An orthonormal base of these.
+        (R,) complex
+            What they leave of the current.
+        """
         base, triangle = np.linalg.qr(_rows(self.ports, lambda port: basis(port, poles)))
         inside = base.conj().T @ self.current
-        return LinearPart(
-            np.linalg.lstsq(triangle, inside, rcond=None)[0], base, self.current - base @ inside
-        )
+        coefficients = np.linalg.lstsq(triangle, inside, rcond=None)[0]
+        return coefficients, base, self.current - base @ inside
 
     @property
     def grid(self) -> list[complex]:
@@ -131,7 +121,7 @@ class Projection:
         ).T
         first = np.concatenate([np.log(-poles.real), poles.imag])[: bounds.shape[1]]
         optimum = least_squares(
-            lambda x: _parts(self.linear_part(_poles(x, n)).residual),
+            lambda x: _parts(self.linear_part(_poles(x, n))[2]),
             np.clip(first, *bounds),
             lambda x: self.jacobian(_poles(x, n)),  # pyright: ignore[reportArgumentType]
             bounds=bounds,
