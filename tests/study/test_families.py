@@ -240,11 +240,8 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
         coordinates=SimpleNamespace(parameters=lambda names: []),
         rows=lambda *_: rows,
     )
-    monkeypatch.setattr(
-        rival_sets,
-        "refit",
-        lambda bench, noise, wanted: [bare] if wanted[0][0] == () else [better, chosen, far],
-    )
+    monkeypatch.setattr(rival_sets, "refit_from", lambda *_: bare)
+    monkeypatch.setattr(rival_sets, "refit", lambda *_: [better, chosen, far])
     monkeypatch.setattr(
         rival_sets, "examine_fit", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, p_left=0.0)
     )
