@@ -307,7 +307,9 @@ def test_noise_of_a_wandering_load_is_white_once_whitened():
     power = np.stack([np.where(np.arange(600) < 300, 1.0, 0.5), np.zeros(600)])
     wander = RandomWalk(np.array([2.0, 0.0]), 0.002, Load(power, np.array([[1.0, 0.0]])))
     noise = PowerNoise(PowerNoise.white(1.0, 1.0).pairs, random_walk=wander)
-    drive = SimpleNamespace(events=1, samples=600, part=lambda e: slice(0, 600))
+    drive = SimpleNamespace(
+        events=1, samples=600, part=lambda e: slice(0, 600), parts=[slice(0, 600)]
+    )
     drawn = noise.draw(np.random.default_rng(9), 400, [600])
     rows = noise.whiten(drawn, drive, np.ones((2, 600), dtype=bool)).reshape(400, 2, 600)
     slow = np.cos(np.pi * (np.arange(600) + 0.5) / 600) * np.sqrt(2 / 600)
@@ -330,7 +332,7 @@ def test_noise_drawn_white_has_the_law_of_noise_that_is_whitened():
     noise = PowerNoise(
         ((color, white_noise(1.0)),), np.array([[1.0, 0.0], [-0.5, 1.0]]), shocks, wander
     )
-    drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n))
+    drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n), parts=[slice(0, n)])
     valid = np.ones((2, n), dtype=bool)
     valid[1, 250:300] = False
     whitened = noise.whiten(noise.draw(rng, 1000, [n]), drive, valid).reshape(1000, 2, n)
@@ -391,7 +393,7 @@ def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_act
         mix,
         random_walk=RandomWalk(np.array([20.0, 0.0]), 0.002, load),
     )
-    drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n))
+    drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n), parts=[slice(0, n)])
     rows = noise.whiten(recorded, drive, np.ones((2, n), dtype=bool)).reshape(count, 2, n)
     slow = (np.arange(n) >= 300) / np.sqrt(300)
     assert np.var((mix @ recorded)[:, 1] @ slow) > 20

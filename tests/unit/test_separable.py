@@ -18,8 +18,8 @@ from tractexp.inference.separable import (
 RNG = np.random.default_rng(7)
 LENGTHS = (6, 9, 7)
 K, M, E = 4, 2, len(LENGTHS)
-DRIVE = SimpleNamespace(measurements=np.zeros((2, sum(LENGTHS))), events=E)
-DRIVE.part = lambda e: slice(sum(LENGTHS[:e]), sum(LENGTHS[: e + 1]))
+PARTS = [slice(sum(LENGTHS[:e]), sum(LENGTHS[: e + 1])) for e in range(E)]
+DRIVE = SimpleNamespace(measurements=np.zeros((2, sum(LENGTHS))), events=E, parts=PARTS)
 APART = SeparableColumns.of_power(DRIVE, K)  # type: ignore[arg-type]
 SIZE = DRIVE.measurements.size
 J = Sensitivities(RNG.normal(size=(K + M, SIZE)), K, APART.rows)

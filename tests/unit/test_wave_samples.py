@@ -86,7 +86,8 @@ def test_a_voltage_that_nobody_recorded_is_an_event_of_its_load():
 
 def test_blocks_are_counted_from_the_start_of_each_dip():
     """Tenths of a second; what is left over of them is before the dip, or in the last block."""
-    drive = SimpleNamespace(events=2, part=lambda e: (slice(0, 1050), slice(1050, 2100))[e])
+    parts = [slice(0, 1050), slice(1050, 2100)]
+    drive = SimpleNamespace(events=2, part=parts.__getitem__, parts=parts)
     events = [SimpleNamespace(start=230, record=SimpleNamespace(step=0.001)) for _ in range(2)]
     whole, after = blocks_of(events, drive), blocks_of(events, drive, from_dip=True)
     assert [b.start for b in whole[:4]] == [0, 30, 130, 230]
