@@ -322,7 +322,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
     monkeypatch.setattr(module, "_remembered", type(module._remembered)())
     found = estimate(problem, TRUTH)
     np.testing.assert_allclose(found.uncertainty.values, whole.values, rtol=1e-3)
-    assert found.starts[0].origin in ("search", "beside the best")
+    assert found.starts[0]["from"] in ("search", "beside the best")
 
 
 def test_a_model_that_takes_its_error_for_slow_noise_is_found_out_by_least_squares():
