@@ -189,7 +189,8 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
 
 def promising(named, score):
     """The investigation with another score first."""
-    first = replace(named.first, scores=[score, *named.first.scores])
+    first = replace(named.first)
+    vars(first)["scores"] = [score, *named.first.scores]
     base = replace(named.evidence.base, tests=first)
     return replace(named, evidence=replace(named.evidence, base=base))
 
