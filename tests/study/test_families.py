@@ -15,8 +15,8 @@ import tractexp.discrepancy.investigate as investigating
 from tractexp.configuration.plugin import discover, get
 from tractexp.discrepancy import families, held_out, rival_sets
 from tractexp.discrepancy.all_events import AllEvents, JointFit
-from tractexp.discrepancy.decide import Verdict, decide, find_adequate, holds
-from tractexp.discrepancy.evidence import Evidence, SetEvidence
+from tractexp.discrepancy.decide import decide, find_adequate, holds
+from tractexp.discrepancy.evidence import Evidence, SetEvidence, Verdict
 from tractexp.discrepancy.explanations import worth_another
 from tractexp.discrepancy.families import against_members, open_settings, starts, worth
 from tractexp.discrepancy.forms import forms

@@ -22,9 +22,8 @@ fitted and of the held-out events.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from tractexp.discrepancy.evidence import Evidence, SetEvidence
+from tractexp.discrepancy.evidence import Evidence, SetEvidence, Verdict
 from tractexp.discrepancy.gap import DENIED, SHOWN, share_gone
 from tractexp.discrepancy.ranking import MOST_NAMED, beats, find_leading
 from tractexp.inference.criteria import Criteria
@@ -35,40 +34,6 @@ WRONG_MODEL = "wrong_model"  # the grade of a model that has no name
 ADEQUATE = "adequate"  # of a model that leaves noise alone
 MOST_TESTED = 6  # sets whose rest is tested
 CONFIRMED_SHARE = 0.5  # of what an event shows of a set: so much of it confirms the set
-
-
-@dataclass(frozen=True, eq=False)
-class Verdict:
-    """What an investigation decides.
-
-    Attributes
-    ----------
-    word : str
-        `none`, `candidate`, `named`, `tied` or `unexplained`.
-    kept : tuple of SetEvidence
-        The sets that are kept; the extended model has the first.
-    complete : bool
-        Whether nothing but noise is left.
-    """
-
-    word: str
-    kept: tuple[SetEvidence, ...]
-    complete: bool
-
-    @property
-    def chosen(self) -> SetEvidence | None:
-        """The set that the extended model has."""
-        return self.kept[0] if self.kept else None
-
-    @property
-    def sets(self) -> tuple[Names, ...]:
-        """The names of all sets kept."""
-        return tuple(row.names for row in self.kept)
-
-    @property
-    def names(self) -> Names:
-        """The effects added."""
-        return self.sets[0] if self.kept else ()
 
 
 def decide(evidence: Evidence, criteria: Criteria) -> Verdict:

@@ -201,3 +201,37 @@ class Evidence:
             steps.append(min(found, key=lambda row: row.held_out_prediction.excess))
             missing -= set(steps[-1].fit.names)
         return steps
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What an investigation decides.
+
+    Attributes
+    ----------
+    word : str
+        `none`, `candidate`, `named`, `tied` or `unexplained`.
+    kept : tuple of SetEvidence
+        The sets that are kept; the extended model has the first.
+    complete : bool
+        Whether nothing but noise is left.
+    """
+
+    word: str
+    kept: tuple[SetEvidence, ...]
+    complete: bool
+
+    @property
+    def chosen(self) -> SetEvidence | None:
+        """The set that the extended model has."""
+        return self.kept[0] if self.kept else None
+
+    @property
+    def sets(self) -> tuple[Names, ...]:
+        """The names of all sets kept."""
+        return tuple(row.names for row in self.kept)
+
+    @property
+    def names(self) -> Names:
+        """The effects added."""
+        return self.sets[0] if self.kept else ()

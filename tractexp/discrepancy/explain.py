@@ -13,12 +13,11 @@ from tractexp.discrepancy.decide import (
     NONE,
     TIED,
     UNEXPLAINED,
-    Verdict,
     chose_by_all,
     find_adequate,
     is_confirmed,
 )
-from tractexp.discrepancy.evidence import SLIGHT_ERROR, Evidence, SetEvidence
+from tractexp.discrepancy.evidence import SLIGHT_ERROR, Evidence, SetEvidence, Verdict
 from tractexp.discrepancy.gap import DENIED, MILD, SHOWN
 from tractexp.discrepancy.nearest import Nearest, measure_least_error
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event

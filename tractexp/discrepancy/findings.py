@@ -12,10 +12,9 @@ from tractexp.discrepancy.decide import (
     NONE,
     TIED,
     UNEXPLAINED,
-    Verdict,
 )
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.evidence import Evidence
+from tractexp.discrepancy.evidence import Evidence, Verdict
 from tractexp.discrepancy.explain import explain
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.gap import GapTest, gap, share_gone

@@ -10,13 +10,12 @@ import numpy as np
 from tractexp.discrepancy.decide import (
     NONE,
     UNEXPLAINED,
-    Verdict,
     chose_by_all,
     decide,
     shows_more,
 )
 from tractexp.discrepancy.disagreement import disagreement
-from tractexp.discrepancy.evidence import Evidence
+from tractexp.discrepancy.evidence import Evidence, Verdict
 from tractexp.discrepancy.explain import choose_next_event
 from tractexp.discrepancy.explanations import Explanations, explanations
 from tractexp.discrepancy.findings import Findings

@@ -7,9 +7,8 @@ import numpy as np
 
 from tractexp.discrepancy.decide import (
     UNEXPLAINED,
-    Verdict,
 )
-from tractexp.discrepancy.evidence import Evidence, SetEvidence
+from tractexp.discrepancy.evidence import Evidence, SetEvidence, Verdict
 from tractexp.discrepancy.gap import Curves, curves
 from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.ranking import (
