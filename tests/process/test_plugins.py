@@ -241,6 +241,7 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site(tmp_
         "real_states",
         "real_starts",
         "real_balances",
+        "list_expressions",
         "parts",
         "real",
         "latex",
