@@ -271,11 +271,11 @@ def keys_of(arguments):
     from hydra import compose
     from omegaconf import OmegaConf
 
-    from tractexp.configuration.composition import leaves
-    from tractexp.configuration.overrides import overrides
+    from tractexp.configuration.composition import list_leaves
+    from tractexp.configuration.overrides import quote_overrides
 
-    whole = OmegaConf.to_container(compose("config", overrides(arguments)))
-    keys = [key for key, _ in leaves(whole)]
+    whole = OmegaConf.to_container(compose("config", quote_overrides(arguments)))
+    keys = [key for key, _ in list_leaves(whole)]
     sections = sorted({key.rpartition(".")[0] for key in keys} - {""})
     groups = [
         "optimizer",
@@ -298,13 +298,13 @@ def perform(arguments, folder):
 
     from tractexp.api.job import Job
     from tractexp.cli.chosen import collect_chosen_settings, refuse_unread
-    from tractexp.configuration.overrides import overrides
+    from tractexp.configuration.overrides import quote_overrides
     from tractexp.configuration.plugin import build
     from tractexp.configuration.refusal import explain_errors
     from tractexp.configuration.schema import check
 
     with explain_errors():
-        config = compose("config", overrides(arguments), return_hydra_config=True)
+        config = compose("config", quote_overrides(arguments), return_hydra_config=True)
         choices, told = dict(config.hydra.runtime.choices), list(config.hydra.overrides.task)
         with open_dict(config):
             del config["hydra"]

@@ -130,9 +130,9 @@ def _dispatch_command(arguments: list[str]) -> int:
         survey = choose_command(*arguments)
         return _run(survey) if survey else 0
     if {"--help", "-h"} & {*arguments}:
-        from tractexp.configuration.usage import usage
+        from tractexp.configuration.usage import describe_usage
 
-        print(usage())
+        print(describe_usage())
         return 0
     return _run(arguments)
 
@@ -179,7 +179,7 @@ def _run(arguments: list[str]) -> int:
 
     from tractexp.compat.hydra_versions import behavior
     from tractexp.configuration.choices import CONF
-    from tractexp.configuration.overrides import overrides
+    from tractexp.configuration.overrides import quote_overrides
     from tractexp.configuration.refusal import explain_errors
     from tractexp.configuration.run_command import remember_command
     from tractexp.sweep.hydra_groups import register
@@ -188,7 +188,7 @@ def _run(arguments: list[str]) -> int:
     remember_command(arguments)
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
     with explain_errors():
-        sys.argv[1:] = overrides(arguments)  # where Hydra reads them
+        sys.argv[1:] = quote_overrides(arguments)  # where Hydra reads them
     ended: list[Exception] = []
 
     @hydra.main(**behavior(), config_path=str(CONF), config_name="config")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from site_pages import markdown, pictures
 from site_pages.markdown import folded, plain, table
-from tractexp.configuration.choices import defaults, sentence
+from tractexp.configuration.choices import read_default_choices, take_first_sentence
 from tractexp.configuration.plugin import Plugin, discover
 from tractexp.model import sites
 from tractexp.model.declaration import motor_alone
@@ -38,9 +38,13 @@ def write(folder: Path) -> list[Path]:
 def _page(group: str, folder: Path) -> Path:
     title, how = GROUPS[group]
     classes = [cls for _, cls in sorted(discover()[group].items())]
-    chosen = f"`{defaults()[group]}` is chosen by default." if defaults().get(group) else ""
+    chosen = (
+        f"`{read_default_choices()[group]}` is chosen by default."
+        if read_default_choices().get(group)
+        else ""
+    )
     items = [
-        f"- [`{cls.name}`](#{_anchor(cls)}): {plain(sentence(cls.__doc__ or ''))}"
+        f"- [`{cls.name}`](#{_anchor(cls)}): {plain(take_first_sentence(cls.__doc__ or ''))}"
         for cls in classes
     ]
     head = "\n\n".join([f"# {title}", f"Chosen by `{how}`. {chosen}", "\n".join(items)])

@@ -7,7 +7,7 @@ from site_pages import commands, markdown
 from site_pages.commands import Command
 from site_pages.markdown import plain, table
 from tractexp.api.task import Task
-from tractexp.configuration.choices import defaults, sentence
+from tractexp.configuration.choices import read_default_choices, take_first_sentence
 from tractexp.configuration.plugin import discover
 from tractexp.storage import files
 
@@ -26,9 +26,12 @@ def write(folder: Path) -> list[Path]:
     ]
     tasks = sorted(discover()["task"].items())
     pages = [files.write(folder / f"{name}.md", _page(cls, shown)) for name, cls in tasks]
-    rows = [[f"[`{name}`]({name}.md)", plain(sentence(cls.__doc__ or ""))] for name, cls in tasks]
+    rows = [
+        [f"[`{name}`]({name}.md)", plain(take_first_sentence(cls.__doc__ or ""))]
+        for name, cls in tasks
+    ]
     toctree = "```{toctree}\n:hidden:\n\n" + "\n".join(name for name, _ in tasks) + "\n```\n"
-    intro = f"Chosen by `task=NAME`; `{defaults()['task']}` where none is named.\n"
+    intro = f"Chosen by `task=NAME`; `{read_default_choices()['task']}` where none is named.\n"
     listed = files.write(
         folder / "index.md",
         "\n".join(["# Tasks\n", intro, table(["task", "what it does"], rows), toctree]),
@@ -61,7 +64,11 @@ def _task(command: Command) -> str:
     ):
         return ""
     named = [word.partition("=")[2] for word in arguments if word.startswith("task=")]
-    return named[0] if named else defaults()["task"] * ("experiment=" not in " ".join(arguments))
+    return (
+        named[0]
+        if named
+        else read_default_choices()["task"] * ("experiment=" not in " ".join(arguments))
+    )
 
 
 def _example(command: Command) -> str:

@@ -7,7 +7,7 @@ import pytest
 from waves_of import dip, event
 
 import tractexp
-from tractexp.configuration.overrides import overrides
+from tractexp.configuration.overrides import quote_overrides
 from tractexp.configuration.plugin import build, get
 from tractexp.errors import UserError
 from tractexp.model.drive import Drive, Excitation
@@ -125,17 +125,17 @@ def test_a_steady_state_that_a_group_lacks_names_the_group():
 
 
 def test_the_command_line_takes_a_list():
-    assert overrides(["model/motor=[stator_flux, double_cage]", "seed=3"]) == [
+    assert quote_overrides(["model/motor=[stator_flux, double_cage]", "seed=3"]) == [
         "model/motor=motor_groups",
         "model.motor.of=[stator_flux,double_cage]",
         "seed=3",
     ]
-    assert overrides(["model/motor=stator_flux"]) == ["model/motor=stator_flux"]
+    assert quote_overrides(["model/motor=stator_flux"]) == ["model/motor=stator_flux"]
     for several in ("model/motor=[a,b],c", "model/motor=[a,b],[c,d]"):
         with pytest.raises(
             UserError, match="a sweep over lists is written model/motor=motor_groups"
         ) as told:
-            overrides([several])
+            quote_overrides([several])
         assert several in str(told.value)
 
 

@@ -25,7 +25,7 @@ from test_settings import check, hydra  # noqa: F401  a fixture of this module, 
 
 import tractexp
 from site_pages import commands
-from tractexp.configuration.overrides import overrides
+from tractexp.configuration.overrides import quote_overrides
 from tractexp.configuration.plugin import build
 from tractexp.filetypes.comtrade_writer import write
 
@@ -137,7 +137,7 @@ def composed(arguments):
     given = [
         a for a in arguments if not a.startswith("-") and a != "job" and not a.startswith("hydra")
     ]
-    config = check(*map(single, overrides(given)))
+    config = check(*map(single, quote_overrides(given)))
     from omegaconf import OmegaConf
 
     plain = OmegaConf.to_container(config, resolve=False)

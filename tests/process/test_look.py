@@ -18,7 +18,7 @@ from pages import charts
 import tractexp
 import tractexp.text.progress
 from tractexp.blocks import style
-from tractexp.configuration.overrides import format_assignment, override
+from tractexp.configuration.overrides import format_assignment, quote_override
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.recording import StatusChannel
@@ -511,7 +511,7 @@ def test_stages_are_told_to_who_listens_and_to_a_log_after_two_seconds(
 def test_a_name_in_a_command_is_read_back(name):
     from hydra.core.override_parser.overrides_parser import OverridesParser
 
-    told = override(format_assignment("data.train", [name, "other.csv"]))
+    told = quote_override(format_assignment("data.train", [name, "other.csv"]))
     assert OverridesParser.create().parse_override(told).value() == [name, "other.csv"]
 
 

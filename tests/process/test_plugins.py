@@ -19,7 +19,7 @@ import pytest
 from command_line import start_command
 
 from tractexp.configuration import plugin as framework
-from tractexp.configuration.plugin import CONF, Plugin, build, discover, get, plugin, schema
+from tractexp.configuration.plugin import CONF, Plugin, build, discover, get, make_schema, plugin
 from tractexp.errors import UserError
 from tractexp.extend import Optimizer
 from tractexp.model.parts import Effect, Measurement, Motor, Static
@@ -298,7 +298,7 @@ def test_every_plugin_has_a_schema_that_says_its_name():
     assert {"model/motor", "model/static", "optimizer", "data", "task"} <= groups.keys()
     for classes in groups.values():
         for name, cls in classes.items():
-            assert schema(cls)().name == name == cls.__module__.rpartition(".")[2]
+            assert make_schema(cls)().name == name == cls.__module__.rpartition(".")[2]
 
 
 def test_an_unknown_name_gets_the_nearest_one():

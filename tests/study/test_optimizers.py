@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tractexp_plugins.optimizers as folder
-from tractexp.configuration.plugin import build, discover, schema
+from tractexp.configuration.plugin import build, discover, make_schema
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import REFUSED, Box
 from tractexp.identification.search import Limits, search
@@ -391,7 +391,7 @@ def test_every_variant_composes_builds_and_searches(variant):
     from hydra.core.config_store import ConfigStore
 
     for name, cls in discover()["optimizer"].items():
-        ConfigStore.instance().store(group="optimizer", name=name, node=schema(cls))
+        ConfigStore.instance().store(group="optimizer", name=name, node=make_schema(cls))
     with initialize_config_dir(str(CONF), version_base=None):
         config = compose(overrides=[f"+optimizer={variant}"])
     from omegaconf import OmegaConf

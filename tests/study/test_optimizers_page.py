@@ -12,7 +12,7 @@ import optimizers
 import optimizers_tables
 import pytest
 
-from tractexp.configuration.plugin import build, discover, schema
+from tractexp.configuration.plugin import build, discover, make_schema
 from tractexp.studies.comparison.statistics import vargha_delaney
 
 STORED = json.loads(optimizers.STORED.read_text(encoding="utf-8"))
@@ -80,7 +80,7 @@ def test_settings_are_those_that_the_command_line_composes():
     from omegaconf import OmegaConf
 
     for name, cls in discover()["optimizer"].items():
-        ConfigStore.instance().store(group="optimizer", name=name, node=schema(cls))
+        ConfigStore.instance().store(group="optimizer", name=name, node=make_schema(cls))
     assert optimizers.settings("cobyqa") == {"name": "cobyqa"}
     with initialize_config_dir(str(optimizers.ROOT / "conf"), version_base=None):
         for name in ("issa_polish", "issa_to_the_letter", "ssa_plus_levy"):

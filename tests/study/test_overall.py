@@ -231,5 +231,5 @@ def test_the_page_opens_for_a_person_at_a_desktop_only(
     monkeypatch.setattr(sweeper.sys.stdout, "isatty", lambda: terminal, raising=False)
     monkeypatch.setenv("DISPLAY", display)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    sweeper.show(tmp_path / "comparison.html")
+    sweeper.open_page(tmp_path / "comparison.html")
     assert len(shown) == opened

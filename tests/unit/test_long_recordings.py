@@ -14,7 +14,7 @@ from tractexp.filetypes import comtrade, comtrade_samples
 from tractexp.recording import Feeder
 from tractexp.recording.excursion import SLIDING, _count_samples_inside
 from tractexp.recording.measure import FeederWaves, phasors_of
-from tractexp.recording.overview import overview
+from tractexp.recording.overview import describe_loads
 from tractexp.recording.quality import _variances, quality
 
 RATE, SECONDS = 10_000.0, 60
@@ -78,9 +78,9 @@ def test_a_large_file_is_mapped(long, tmp_path, monkeypatch, kind, name):
 def test_loads_are_measured_a_block_at_a_time(long):
     reader = build("data", {"name": "comtrade", "path": "made.cfg"})
     whole = sum(c.raw.nbytes for c in long.channels)
-    [shown] = overview(reader, long)  # what is imported at first counts not
+    [shown] = describe_loads(reader, long)  # what is imported at first counts not
     # all the waveforms at once took four times as much
-    assert peak(lambda: overview(reader, long)) < 1.1 * whole
+    assert peak(lambda: describe_loads(reader, long)) < 1.1 * whole
     assert [(e.what.kind, round(e.what.start), e.worth) for e in shown.events] == [
         ("dip", 20, True),
         ("dip", 40, True),

@@ -7,8 +7,8 @@ import pytest
 import tractexp
 from tractexp.configuration.composition import read_choice
 from tractexp.configuration.model_file import LARGEST, read_model_file
-from tractexp.configuration.overrides import overrides
-from tractexp.configuration.repeatable import refusal
+from tractexp.configuration.overrides import quote_overrides
+from tractexp.configuration.repeatable import explain_refusal
 from tractexp.errors import UserError
 from tractexp.storage.files import DEEPEST
 
@@ -95,15 +95,19 @@ def test_a_file_that_is_missing_or_no_text_is_refused(tmp_path):
 def test_a_path_is_a_model_on_the_command_line(write, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = write(GOOD)
-    assert overrides(["model=mine.yaml", "data=tibet"]) == [f"model='{path}'", "data=tibet"]
+    assert quote_overrides(["model=mine.yaml", "data=tibet"]) == [f"model='{path}'", "data=tibet"]
     odd = write(GOOD, "mein, 'Modell' [1].yaml")
-    assert overrides([f"model={odd.name}"]) == ["model='" + str(odd).replace("'", "\\'") + "'"]
-    kept = overrides(["model=mine.yaml"]) + overrides([f"model={odd.name}"])
-    assert [*map(refusal, kept)] == ["", ""]  # a folder keeps them so, and repeats the run
-    assert refusal("model='/a/b.yaml' + 'c'") != ""
-    assert overrides(["model=mine.yaml,third_order_zip"]) == [f"model='{path}',third_order_zip"]
+    assert quote_overrides([f"model={odd.name}"]) == [
+        "model='" + str(odd).replace("'", "\\'") + "'"
+    ]
+    kept = quote_overrides(["model=mine.yaml"]) + quote_overrides([f"model={odd.name}"])
+    assert [*map(explain_refusal, kept)] == ["", ""]  # a folder keeps them so, and repeats the run
+    assert explain_refusal("model='/a/b.yaml' + 'c'") != ""
+    assert quote_overrides(["model=mine.yaml,third_order_zip"]) == [
+        f"model='{path}',third_order_zip"
+    ]
     with pytest.raises(UserError, match="there is no such file"):
-        overrides(["model=other.yaml"])
+        quote_overrides(["model=other.yaml"])
 
 
 @pytest.mark.parametrize("flag", [["--config-dir", "conf"], ["--config-dir=conf"], ["-cd", "conf"]])
@@ -112,10 +116,10 @@ def test_a_model_of_a_folder_is_its_file(write, tmp_path, monkeypatch, flag):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "conf" / "model").mkdir(parents=True)
     path = write(GOOD, "conf/model/extended.yaml")
-    assert overrides([*flag, "model=extended"]) == [f"model='{path}'"]
-    assert overrides([*flag, "model=third_order_zip"]) == [*flag, "model=third_order_zip"]
+    assert quote_overrides([*flag, "model=extended"]) == [f"model='{path}'"]
+    assert quote_overrides([*flag, "model=third_order_zip"]) == [*flag, "model=third_order_zip"]
     own = write(GOOD, "conf/model/third_order_zip.yaml")  # one's own folder replaces ours
-    assert overrides([*flag, "model=third_order_zip"]) == [f"model='{own}'"]
+    assert quote_overrides([*flag, "model=third_order_zip"]) == [f"model='{own}'"]
     (tmp_path / "conf" / "experiment").mkdir()
     write("", "conf/experiment/own.yaml")
-    assert overrides([*flag, "model=extended"]) == [*flag, f"model='{path}'"]
+    assert quote_overrides([*flag, "model=extended"]) == [*flag, f"model='{path}'"]

@@ -12,8 +12,8 @@ from omegaconf import OmegaConf
 from tractexp.configuration.overrides import (
     build_typed_command,
     format_assignment,
-    override,
-    overrides,
+    quote_override,
+    quote_overrides,
     survey_of,
 )
 from tractexp.errors import UserError
@@ -45,7 +45,7 @@ def read(argument):
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_path_is_read_as_it_stands(name):
-    assert read(override(f"data.path={name}")) == name
+    assert read(quote_override(f"data.path={name}")) == name
 
 
 @pytest.mark.parametrize("name", ["a,b.cfg", "[1,2].csv", "{a: b}"])
@@ -54,7 +54,7 @@ def test_a_file_that_is_there_is_meant_though_hydra_would_read_something_else(
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / name).touch()
-    assert str(read(override(f"data.path={name}"))) == name
+    assert str(read(quote_override(f"data.path={name}"))) == name
 
 
 @pytest.mark.parametrize(
@@ -70,11 +70,11 @@ def test_a_file_that_is_there_is_meant_though_hydra_would_read_something_else(
     ],
 )
 def test_a_list_of_names_is_read_as_it_stands(names):
-    assert read(override(f"data.voltages=[{','.join(names)}]")) == names
+    assert read(quote_override(f"data.voltages=[{','.join(names)}]")) == names
 
 
 def test_numbers_of_channels_stay_numbers_beside_names():
-    assert read(override("data.voltages=[4,UA(kV),'5']")) == [4, "UA(kV)", "5"]
+    assert read(quote_override("data.voltages=[4,UA(kV),'5']")) == [4, "UA(kV)", "5"]
 
 
 @pytest.mark.parametrize(
@@ -94,20 +94,20 @@ def test_numbers_of_channels_stay_numbers_beside_names():
     ],
 )
 def test_what_hydra_reads_is_left_alone(argument):
-    assert override(argument) == argument
+    assert quote_override(argument) == argument
 
 
 def test_a_setting_that_takes_names_of_its_own_is_added():
-    assert override("model.bounds.C=[0.5,0.9]") == "++model.bounds.C=[0.5,0.9]"
+    assert quote_override("model.bounds.C=[0.5,0.9]") == "++model.bounds.C=[0.5,0.9]"
     columns = "data.columns={U: 'Voltage (kV)', t: time}"
-    assert override(columns) == f"++{columns}"
-    assert override("data.columns.U=Voltage (kV)") == "++data.columns.U='Voltage (kV)'"
-    assert override("data.units.t=ms") == "++data.units.t=ms"
+    assert quote_override(columns) == f"++{columns}"
+    assert quote_override("data.columns.U=Voltage (kV)") == "++data.columns.U='Voltage (kV)'"
+    assert quote_override("data.units.t=ms") == "++data.units.t=ms"
 
 
 def composed(words):
     """The values that arguments have in a configuration."""
-    for word in overrides(words):
+    for word in quote_overrides(words):
         yield OmegaConf.to_container(OmegaConf.create({"a": read(word)}), resolve=True)["a"]
 
 
@@ -124,7 +124,7 @@ def test_a_command_that_is_printed_means_the_name_that_it_holds(name):
 @pytest.mark.parametrize("name", [name for name in NASTY if name and not name.isprintable()])
 def test_a_name_that_cannot_be_printed_is_refused_in_one_line(name):
     with pytest.raises(UserError) as refused:
-        overrides([format_assignment("data.path", name)])
+        quote_overrides([format_assignment("data.path", name)])
     assert len(str(refused.value).splitlines()) == 1
 
 

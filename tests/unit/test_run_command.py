@@ -109,7 +109,7 @@ def test_the_dips_held_out_are_fitted_too(monkeypatch, train, validate, settings
 def test_a_plugin_that_fails_is_named_by_file_and_line(tmp_path, package, line):
     """Not what fails in a task of our own, nor in what is no plugin."""
     folder = Path(
-        next((p.__path__[0] for p in plugin.packages() if p.__name__ == package), tmp_path)
+        next((p.__path__[0] for p in plugin.import_packages() if p.__name__ == package), tmp_path)
     )
     file, scope = folder / "breakaway_load.py", {}
     exec(compile("def edit():\n    return sympy.tanh(1)\n", str(file), "exec"), scope)

@@ -140,7 +140,7 @@ def test_a_terminal_shows_each_variant_under_a_bar(jobs, monkeypatch):
 def test_the_end_of_a_job_whose_worker_did_not_answer_is_what_it_had_written(jobs):
     jobs[0].status.begin(jobs[0].folder)  # begun, not ended
     ends = [ended(jobs[1], FAILED), ended(jobs[2])]
-    assert [launcher._trace(one) for one in jobs] == [True, *ends, False]
+    assert [launcher._find_end(one) for one in jobs] == [True, *ends, False]
 
 
 def test_jobs_in_threads_print_into_their_own_files_and_what_is_beside_them_does_not(capsys):

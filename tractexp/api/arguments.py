@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar, get_type_hints
 
 from tractexp.configuration import plugin
-from tractexp.configuration.choices import defaults
+from tractexp.configuration.choices import read_default_choices
 from tractexp.configuration.composition import read_choice
 from tractexp.configuration.kinds import check_kind
 from tractexp.errors import UserError, among, check_distinct, settings_as
@@ -76,7 +76,7 @@ class Choice(Plain):
         """
         if isinstance(chosen, Choice):
             return cls(chosen.name, complete_settings(group, chosen.node))
-        chosen = defaults()[group] if chosen is None else chosen
+        chosen = read_default_choices()[group] if chosen is None else chosen
         check_kind(group, chosen, str | Mapping[str, Any] | Sequence[Any])
         if isinstance(chosen, Sequence) and not isinstance(chosen, str):
             chosen = plugin.of_several(group, chosen)

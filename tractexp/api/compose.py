@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Table
-from tractexp.configuration.choices import choices, defaults, read_replacements
+from tractexp.configuration.choices import read_choices, read_default_choices, read_replacements
 from tractexp.configuration.composition import read_choice
 from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError, among, check_choice, setting
@@ -325,14 +325,14 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
     None is the usual model of the `domain`. Raises `UserError` for an unknown name.
     """
     if domain is not None:
-        check_choice("domain", domain, sorted(choices()[DOMAIN]))
+        check_choice("domain", domain, sorted(read_choices()[DOMAIN]))
         return replace(
             model_of(given or read_replacements(DOMAIN, domain).get(GROUP)), domain=domain
         )
     if isinstance(given, LoadModel):
         return given
     if given is None or isinstance(given, str | Path):
-        given = read_choice(GROUP, str(given or defaults()[GROUP]))
+        given = read_choice(GROUP, str(given or read_default_choices()[GROUP]))
     elif not isinstance(given, Mapping):
         given = _node(given)
     keys = [f.name for f in dataclasses.fields(LoadModel)]

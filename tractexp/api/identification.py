@@ -172,9 +172,9 @@ class Identification(Written):
     @property
     def doubts(self) -> list[str]:
         """The reasons why this model is no physical load, a clause each."""
-        from tractexp.exchange.operating_point import doubts
+        from tractexp.exchange.operating_point import list_doubts
 
-        return doubts(self.result, self.operating_point)
+        return list_doubts(self.result, self.operating_point)
 
     @property
     def usability(self) -> str:

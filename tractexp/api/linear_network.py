@@ -16,7 +16,7 @@ from tractexp.api.setup import describe_records
 from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.cache import provenance
-from tractexp.configuration.choices import choices, defaults
+from tractexp.configuration.choices import read_choices, read_default_choices
 from tractexp.configuration.plugin import plugin
 from tractexp.configuration.run_command import suggest_run
 from tractexp.errors import TASK, UserError, check_choice, check_range
@@ -144,8 +144,8 @@ def linear_network(
     UserError
         For wrong values, and for records of too few samples or whose voltage does not move.
     """
-    domain = domain or defaults()[DOMAIN]
-    check_choice("domain", domain, sorted(choices()[DOMAIN]))
+    domain = domain or read_default_choices()[DOMAIN]
+    check_choice("domain", domain, sorted(read_choices()[DOMAIN]))
     check_range("task.poles", poles, 0, MOST_ASKED_POLES)
     train, held_out = dips_together(records, validate)
     request = NetworkFit(train, held_out, domain, poles, {})

@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Report, Table
-from tractexp.configuration.composition import choices
+from tractexp.configuration.composition import list_choices
 from tractexp.errors import UserError, among
 from tractexp.outcome import Plain, Tabulated
 from tractexp.record import (
@@ -286,7 +286,7 @@ def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
 def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """The reader that a path, or a choice of `conf/data`, asks for, with its settings."""
     if not files.exists(path):
-        shipped = choices(GROUP, files=True)
+        shipped = list_choices(GROUP, files=True)
         if path in shipped:
             return {**Choice.from_argument(GROUP, path).node, **settings}
         if not Path(path).suffix:

@@ -62,7 +62,10 @@ def folders() -> set[Path]:
     """The folders of this package and of those with plugins."""
     from tractexp.configuration import plugin  # which imports NumPy
 
-    return {PACKAGE, *(Path(path) for package in plugin.packages() for path in package.__path__)}
+    return {
+        PACKAGE,
+        *(Path(path) for package in plugin.import_packages() for path in package.__path__),
+    }
 
 
 def digest(record: Any) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tractexp.cli.chosen import reads
 from tractexp.configuration.plugin import get
-from tractexp.configuration.repeatable import refusal
+from tractexp.configuration.repeatable import explain_refusal
 from tractexp.configuration.run_command import group_of
 from tractexp.errors import UserError
 from tractexp.storage import files
@@ -91,7 +91,7 @@ def _select_kept(arguments: Iterable[str], keys: Collection[str]) -> list[str]:
 
 def _check_taken_over(text: str, folder: Path) -> None:
     """Raise `UserError` for a setting of a run that says more than what is computed."""
-    if why := refusal(text):
+    if why := explain_refusal(text):
         key = text.partition("=")[0]
         raise UserError(
             f"{folder}: {key:.80} is not taken over from the folder of a run ({why}); where it is"

@@ -60,9 +60,9 @@ def _by_experiment(experiment: str) -> Mapping[str, str]:
     """The choices {group: name} of an experiment's file, wherever Hydra looks for it."""
     from hydra.core.hydra_config import HydraConfig
 
-    from tractexp.configuration.composition import folders, set_by_experiment
+    from tractexp.configuration.composition import list_folders, set_by_experiment
 
     sources = HydraConfig.get().runtime.config_sources if HydraConfig.initialized() else ()
     return set_by_experiment(
-        experiment, [*(Path(s.path) for s in sources if s.schema == "file"), *folders()]
+        experiment, [*(Path(s.path) for s in sources if s.schema == "file"), *list_folders()]
     )

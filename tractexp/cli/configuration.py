@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tractexp.configuration.composition import texts
+from tractexp.configuration.composition import list_texts
 
 
 def contents(config: Any) -> Mapping[str, str]:
@@ -25,4 +25,4 @@ def contents(config: Any) -> Mapping[str, str]:
 
 def list_named_files(config: Any) -> frozenset[Path]:
     """The files that a configuration, as plain data, may name and the run reads."""
-    return frozenset(Path(text).absolute() for text in texts(config) if "\0" not in text)
+    return frozenset(Path(text).absolute() for text in list_texts(config) if "\0" not in text)

@@ -20,7 +20,7 @@ def generations(
     rng: np.random.Generator,
     **settings: Any,
 ) -> Iterator[None]:
-    """Evolve, yielding after each generation, until converged; the first comes with the initial
+    """Yield after each generation until the search has converged; first after the initial
     population.
 
     `function` takes points (d, n) and returns their n values; `settings` are

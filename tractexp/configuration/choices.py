@@ -37,7 +37,7 @@ class Option:
     module: str = ""
 
 
-def choices(own: Iterable[Path] = ()) -> dict[str, dict[str, Option]]:
+def read_choices(own: Iterable[Path] = ()) -> dict[str, dict[str, Option]]:
     """{group: {name: option}}. Its sentence is a plugin's docstring, or a configuration's leading
     comment.
 
@@ -48,9 +48,11 @@ def choices(own: Iterable[Path] = ()) -> dict[str, dict[str, Option]]:
         for file in folder.rglob("*.yaml"):
             place = file.relative_to(folder).with_suffix("")
             if len(place.parts) > 1 and not any(part.startswith("_") for part in place.parts):
-                options[place.parent.as_posix()][place.name] = Option(place.name, _comment(file))
+                options[place.parent.as_posix()][place.name] = Option(
+                    place.name, _read_comment(file)
+                )
     for package, folder in plugin_folders():
-        for module in modules(package, [str(folder)]):
+        for module in list_modules(package, [str(folder)]):
             for group, about in list_declared_plugins(module):
                 name = module.rpartition(".")[2]
                 options[group][name] = Option(name, about, module)
@@ -58,7 +60,7 @@ def choices(own: Iterable[Path] = ()) -> dict[str, dict[str, Option]]:
 
 
 @functools.cache
-def defaults() -> dict[str, str]:
+def read_default_choices() -> dict[str, str]:
     """{group: what is chosen where nothing else is}: that of `conf/config.yaml`."""
     import yaml
 
@@ -71,14 +73,14 @@ def defaults() -> dict[str, str]:
     }
 
 
-def elsewhere(group: str, name: str) -> str:
+def describe_elsewhere(group: str, name: str) -> str:
     """The end of a sentence on a name that is another group's: ", but there is task=plan"; "" where
     it is none's.
     """
     holders = [
         g
-        for g, names in choices().items()
-        if name in names and g != group and (g in defaults() or "/" in g)
+        for g, names in read_choices().items()
+        if name in names and g != group and (g in read_default_choices() or "/" in g)
     ]
     return (
         f", but there is {' and '.join(f'{g}={name}' for g in sorted(holders))}" if holders else ""
@@ -144,7 +146,7 @@ def group_variants(names: Mapping[str, Option]) -> dict[str, list[str]]:
 def describe_available(group: str, name: str, names: Iterable[str]) -> str:
     """Return the end of a sentence on an unknown choice: the nearest, and all but variants."""
     names = sorted(names)
-    plugins = choices().get(group, {})
+    plugins = read_choices().get(group, {})
     grouped = group_variants({name: plugins.get(name, Option(name, "")) for name in names})
     parts = [
         f"{base} and {len(varied)} variants" if varied else base
@@ -155,7 +157,7 @@ def describe_available(group: str, name: str, names: Iterable[str]) -> str:
 
 def describe_nameless(group: str) -> str:
     """Return the sentence on a choice that names no plugin of its group, with those there are."""
-    plugins = sorted(o.name for o in choices().get(group, {}).values() if o.module)
+    plugins = sorted(o.name for o in read_choices().get(group, {}).values() if o.module)
     return (
         f"{group} lacks the name of what is chosen; write {group}=NAME, or begin its file with"
         f" 'defaults: [NAME]'. Names: {', '.join(plugins) or 'none'}"
@@ -173,7 +175,7 @@ def entry_points() -> list[importlib.metadata.EntryPoint]:
 def plugin_folders() -> tuple[tuple[str, Path], ...]:
     """(package, folder) of the plugin packages that are there."""
     names = dict.fromkeys(point.module for point in entry_points())
-    return tuple((name, folder) for name in names for folder in _folders(name))
+    return tuple((name, folder) for name in names for folder in _find_folders(name))
 
 
 def configuration_folders() -> list[Path]:
@@ -183,23 +185,23 @@ def configuration_folders() -> list[Path]:
     return [folder / "conf" for _, folder in plugin_folders() if (folder / "conf").is_dir()]
 
 
-def modules(package: str, folders: Iterable[str]) -> Iterator[str]:
+def list_modules(package: str, folders: Iterable[str]) -> Iterator[str]:
     """The modules below a package, in its subpackages too, that do not start with an underscore."""
     for folder in folders:
         for info in pkgutil.iter_modules([folder]):
             if not info.name.startswith("_"):
                 yield f"{package}.{info.name}"
             if info.ispkg:
-                yield from modules(f"{package}.{info.name}", [str(Path(folder, info.name))])
+                yield from list_modules(f"{package}.{info.name}", [str(Path(folder, info.name))])
 
 
-def sentence(text: str) -> str:
+def take_first_sentence(text: str) -> str:
     """The first sentence of a text, on one line."""
     first = " ".join(text.strip().partition("\n\n")[0].split())
     return re.split(r"(?<=[.!?])\s+(?=[A-Z])", first)[0]
 
 
-def _comment(file: Path) -> str:
+def _read_comment(file: Path) -> str:
     """The first sentence of the comment a file begins with, beyond Hydra's directives and the
     command it stands for.
     """
@@ -210,22 +212,22 @@ def _comment(file: Path) -> str:
         text = line.lstrip("# ")
         if not text.startswith(("@package", "python -m", "tractexp ")):
             lines.append(text)
-    return sentence("\n".join(lines))
+    return take_first_sentence("\n".join(lines))
 
 
 def list_declared_plugins(module: str) -> Iterator[tuple[str, str]]:
     """(group, first sentence) of the plugins that a module declares."""
-    for node in _tree(module).body:
+    for node in _parse_module(module).body:
         if not (
             isinstance(node, ast.ClassDef)
             and any(_name_last_part(d) == "plugin" for d in node.decorator_list)
         ):
             continue
-        if group := _group(node, module, ()):
-            yield group, sentence(ast.get_docstring(node) or "")
+        if group := _find_group(node, module, ()):
+            yield group, take_first_sentence(ast.get_docstring(node) or "")
 
 
-def _group(node: ast.ClassDef, module: str, passed: tuple[ast.ClassDef, ...]) -> str:
+def _find_group(node: ast.ClassDef, module: str, passed: tuple[ast.ClassDef, ...]) -> str:
     """The group that a class or its first base to know declares; "" where the bases
     lead nowhere.
     """
@@ -235,28 +237,28 @@ def _group(node: ast.ClassDef, module: str, passed: tuple[ast.ClassDef, ...]) ->
             if "group" in map(_name_last_part, targets):
                 return str(item.value.value)
     for base in node.bases:
-        met, there = _class(_name_last_part(base), module, {module})
+        met, there = _find_class(_name_last_part(base), module, {module})
         if (
             met is not None
             and met not in (node, *passed)
-            and (group := _group(met, there, (*passed, node)))
+            and (group := _find_group(met, there, (*passed, node)))
         ):
             return group
     return ""
 
 
-def _class(name: str, module: str, visited: set[str]) -> tuple[ast.ClassDef | None, str]:
+def _find_class(name: str, module: str, visited: set[str]) -> tuple[ast.ClassDef | None, str]:
     """The class that a module calls by this name, and its module: followed through `from ...
     import`, as by Python.
     """
-    for node in _tree(module).body:
+    for node in _parse_module(module).body:
         if isinstance(node, ast.ClassDef) and node.name == name:
             return node, module
         if isinstance(node, ast.ImportFrom):
             there = _imported_module(node, module)
             for alias in node.names:
                 if (alias.asname or alias.name) == name and there not in visited:
-                    return _class(alias.name, there, visited | {there})
+                    return _find_class(alias.name, there, visited | {there})
     return None, module
 
 
@@ -264,7 +266,7 @@ def _imported_module(node: ast.ImportFrom, module: str) -> str:
     """The whole name of what a module imports from, relative or not."""
     if not node.level:
         return node.module or ""
-    package = module.split(".")[: -node.level + bool(_folders(module)) or None]
+    package = module.split(".")[: -node.level + bool(_find_folders(module)) or None]
     return ".".join([*package, *([node.module] if node.module else [])])
 
 
@@ -282,25 +284,25 @@ def _name_last_part(node: ast.expr) -> str:
 
 
 @functools.cache
-def _tree(module: str) -> ast.Module:
+def _parse_module(module: str) -> ast.Module:
     """A module parsed; an empty one where it cannot be, for then Python says why when it is
     imported.
     """
-    file = _source(module)
+    file = _find_source(module)
     try:
         return ast.parse(file.read_bytes()) if file else ast.Module([], [])
     except (SyntaxError, ValueError, OSError):
         return ast.Module([], [])
 
 
-def _source(module: str) -> Path | None:
+def _find_source(module: str) -> Path | None:
     """The file of a module; None where it is not there."""
     package, _, name = module.rpartition(".")
-    own = [folder / "__init__.py" for folder in _folders(module)]
+    own = [folder / "__init__.py" for folder in _find_folders(module)]
     return next(
         (
             f
-            for f in (*own, *(folder / f"{name}.py" for folder in _folders(package)))
+            for f in (*own, *(folder / f"{name}.py" for folder in _find_folders(package)))
             if f.is_file()
         ),
         None,
@@ -308,7 +310,7 @@ def _source(module: str) -> Path | None:
 
 
 @functools.cache
-def _folders(package: str) -> tuple[Path, ...]:
+def _find_folders(package: str) -> tuple[Path, ...]:
     """The folders of a package; none where there is none. Only the topmost is looked up, so that no
     code runs.
     """

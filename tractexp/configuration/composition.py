@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.configuration import plugin
-from tractexp.configuration.choices import describe_available, elsewhere
+from tractexp.configuration.choices import describe_available, describe_elsewhere
 from tractexp.configuration.model_file import is_model_path, read_model_file
 from tractexp.errors import UserError
 
@@ -28,12 +28,14 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
     """
     if group == MODEL and is_model_path(name):
         content = read_model_file(name)
-    elif (file := _file(group, name, folders())) is not None:
-        content = _content(group, file)
+    elif (file := _find_file(group, name, list_folders())) is not None:
+        content = _read_content(group, file)
     elif plugin.find(group, name) is not None:
         return {"name": name}
     else:
-        where = elsewhere(group, name) or describe_available(group, name, choices(group))
+        where = describe_elsewhere(group, name) or describe_available(
+            group, name, list_choices(group)
+        )
         raise UserError(f"{group}={name}: there is no such choice{where}")
     composed: dict[str, Any] = {}
     for item in content.pop("defaults", []):
@@ -63,10 +65,10 @@ def set_by_experiment(name: str, places: Sequence[Path]) -> dict[str, str]:
     """{"task": "paper", "task.parts": "['table1']"}: what an experiment's file and those that it
     builds on set.
     """
-    file = _file("experiment", name, places)
+    file = _find_file("experiment", name, places)
     if file is None:
         return {}
-    content = _content("experiment", file)
+    content = _read_content("experiment", file)
     values: dict[str, str] = {}
     for item in content.pop("defaults", []):
         if isinstance(item, dict):
@@ -77,46 +79,46 @@ def set_by_experiment(name: str, places: Sequence[Path]) -> dict[str, str]:
         elif item != "_self_":
             values |= set_by_experiment(item.rpartition("/")[2], places)
     content.pop("hydra", None)  # of the run, not of the task
-    return values | {key: str(value) for key, value in leaves(content)}
+    return values | {key: str(value) for key, value in list_leaves(content)}
 
 
-def leaves(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def list_leaves(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """The values of a configuration by their keys: ("model.per_event", [])."""
     for key, value in node.items():
         if isinstance(value, dict) and value:
-            yield from leaves(value, f"{prefix}{key}.")
+            yield from list_leaves(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
 
 
-def texts(content: Any) -> Iterator[str]:
+def list_texts(content: Any) -> Iterator[str]:
     """Every text in a configuration."""
     if isinstance(content, str):
         yield content
     elif isinstance(content, Mapping | list | tuple):
         for inner in content.values() if isinstance(content, Mapping) else content:
-            yield from texts(inner)
+            yield from list_texts(inner)
 
 
-def choices(group: str, *, files: bool = False) -> list[str]:
+def list_choices(group: str, *, files: bool = False) -> list[str]:
     """The names one may choose in a group, or those among them that have a file."""
-    named = {file.stem for folder in folders() for file in (folder / group).glob("*.yaml")}
+    named = {file.stem for folder in list_folders() for file in (folder / group).glob("*.yaml")}
     return sorted(named if files else {*named, *plugin.discover().get(group, {})})
 
 
-def folders() -> list[Path]:
+def list_folders() -> list[Path]:
     """The folders of configurations: of plugin packages first, whose files replace ours."""
     return [*plugin.configuration_folders(), plugin.CONF]
 
 
-def _file(group: str, name: str, places: Iterable[Path]) -> Path | None:
+def _find_file(group: str, name: str, places: Iterable[Path]) -> Path | None:
     """The file of a choice in the first place that has one; None where none has."""
     files = (folder / group / f"{name}.yaml" for folder in places)
     # not `Path.is_file`, which raises for a name that is too long for any file
     return next((file for file in files if os.path.isfile(file)), None)
 
 
-def _content(group: str, file: Path) -> dict[str, Any]:
+def _read_content(group: str, file: Path) -> dict[str, Any]:
     """The content of a configuration's file. Raises `UserError` where it cannot be read."""
     import yaml
 

@@ -54,7 +54,7 @@ WORD = re.compile(r"[^\W\d_].*[^\W\d_]|[^\w.+\-]")  # in what is no number
 PLAIN = re.compile(r"[A-Za-z0-9_./:\-]*", re.ASCII)  # what Hydra's grammar takes as it stands
 
 
-def overrides(arguments: Iterable[str]) -> list[str]:
+def quote_overrides(arguments: Iterable[str]) -> list[str]:
     """The command's arguments as Hydra reads them.
 
     `model/motor=[a,b]` is several motors, for which Hydra would merge the settings of both.
@@ -70,7 +70,7 @@ def overrides(arguments: Iterable[str]) -> list[str]:
             result += _expand_choices(group, value)
         else:
             _check(argument, group, value)
-            result.append(override(argument))
+            result.append(quote_override(argument))
     return _put_options_first(result)
 
 
@@ -105,11 +105,11 @@ def _refuse_word(word: str) -> None:
     """Raise `UserError` for an argument that is neither KEY=VALUE nor anything else that could be
     meant.
     """
-    from tractexp.configuration.choices import elsewhere
+    from tractexp.configuration.choices import describe_elsewhere
 
     raise UserError(
         f"{' '.join(word.split()):.200} is no setting (KEY=VALUE), no command, and no file or"
-        f" folder that is there{elsewhere('', word)}; tractexp --help shows what there is"
+        f" folder that is there{describe_elsewhere('', word)}; tractexp --help shows what there is"
     )
 
 
@@ -118,7 +118,7 @@ def _without_plus(argument: str) -> str:
     it twice.
     """
     key = argument.partition("=")[0]
-    return argument[1:] if key[:1] == "+" and key[1:] in groups() else argument
+    return argument[1:] if key[:1] == "+" and key[1:] in list_groups() else argument
 
 
 def _check(argument: str, key: str, value: str) -> None:
@@ -147,7 +147,7 @@ def _check(argument: str, key: str, value: str) -> None:
             " as it is"
         )
     group = key.lstrip("+").partition("@")[0].replace("model.", "model/")
-    if NO_NAME.fullmatch(value) and group in groups():
+    if NO_NAME.fullmatch(value) and group in list_groups():
         raise UserError(
             f"{group}={value:.80}: what is chosen there has a name; tractexp --help shows the names"
         )
@@ -190,11 +190,11 @@ def _take_config_folder(arguments: list[str]) -> tuple[list[str], Path | None, l
 
 
 @functools.cache
-def groups() -> tuple[str, ...]:
+def list_groups() -> tuple[str, ...]:
     """The groups whose members are chosen by name."""
-    from tractexp.configuration.choices import defaults
+    from tractexp.configuration.choices import read_default_choices
 
-    own = (name.removeprefix("override ") for name in defaults())
+    own = (name.removeprefix("override ") for name in read_default_choices())
     return ("hydra", *own, "model/motor", "model/static")
 
 
@@ -202,7 +202,7 @@ def _expand_choices(group: str, value: str) -> list[str]:
     """The overrides that a list chosen in a group stands for."""
     from tractexp.configuration.plugin import of_several
 
-    listed = _parts(value.strip()[1:-1])
+    listed = _split_at_commas(value.strip()[1:-1])
     node = of_several(group, [part.strip() for part in listed])
     name, ((setting, names),) = node.pop("name"), node.items()
     key = f"{group.replace('/', '.')}.{setting}"
@@ -216,7 +216,7 @@ def _expand_choices(group: str, value: str) -> list[str]:
     return [f"{group}={name}", f"{key}=[{','.join(names)}]"]
 
 
-def override(argument: str) -> str:
+def quote_override(argument: str) -> str:
     """An argument as Hydra reads it.
 
     `model.bounds.C=[0.5,0.9]` adds the entry it names, for which Hydra would ask a plus sign. Names
@@ -225,7 +225,7 @@ def override(argument: str) -> str:
     """
     key, equals, value = argument.partition("=")
     if equals and key == MODEL:
-        chosen = [value] if _names_a_file(value) else _parts(value)  # a sweep has several
+        chosen = [value] if _names_a_file(value) else _split_at_commas(value)  # a sweep has several
         return f"{key}={','.join(map(_model_choice, chosen))}"
     if equals and key.lstrip("+~").startswith(NAMING) and not _read_by_hydra(argument, value):
         argument = f"{key}={_quote_override_value(value)}"
@@ -289,7 +289,9 @@ def _write_for_hydra(value: object) -> str:
 
 def _read_by_hydra(argument: str, value: str) -> bool:
     """Whether Hydra takes the value as it stands, and what names a file as that name."""
-    return PLAIN.fullmatch(value) is not None or (not _names_a_file(value) and _parses(argument))
+    return PLAIN.fullmatch(value) is not None or (
+        not _names_a_file(value) and _is_readable(argument)
+    )
 
 
 def _names_a_file(value: str) -> bool:
@@ -297,7 +299,7 @@ def _names_a_file(value: str) -> bool:
     return bool(value) and files.exists(value)
 
 
-def _parses(argument: str) -> bool:
+def _is_readable(argument: str) -> bool:
     """Whether Hydra can read an argument."""
     from hydra.core.override_parser.overrides_parser import OverridesParser
     from hydra.errors import HydraException
@@ -312,11 +314,13 @@ def _parses(argument: str) -> bool:
 def _quote_override_value(value: str) -> str:
     """A value in quotes; of a list, each of its elements that Hydra would not read."""
     if value.startswith("[") and value.endswith("]") and not _names_a_file(value):
-        return f"[{','.join(_element(part.strip()) for part in _parts(value[1:-1]))}]"
+        return (
+            f"[{','.join(_quote_element(part.strip()) for part in _split_at_commas(value[1:-1]))}]"
+        )
     return quoting.hydra(value, literal=_names_a_file(value))
 
 
-def _element(text: str) -> str:
+def _quote_element(text: str) -> str:
     """An element of a list, with quotes where it needs some."""
     quoted = len(text) > 1 and text[0] == text[-1] and text[0] in "'\""
     return text if quoted or PLAIN.fullmatch(text) else _quote_override_value(text)
@@ -325,7 +329,7 @@ def _element(text: str) -> str:
 DEEPER = {"[": 1, "(": 1, "{": 1, "]": -1, ")": -1, "}": -1}  # levels of brackets, by letter
 
 
-def _parts(inner: str) -> list[str]:
+def _split_at_commas(inner: str) -> list[str]:
     """The parts of a text between commas that stand outside quotes and brackets."""
     parts, depth, mark, start = [], 0, "", 0
     for i, letter in enumerate(inner):

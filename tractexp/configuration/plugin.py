@@ -31,7 +31,7 @@ from tractexp.configuration.choices import (
     describe_nameless,
     entry_points,
     list_declared_plugins,
-    modules,
+    list_modules,
     plugin_folders,
 )
 from tractexp.errors import Unknown, UserError, among, setting
@@ -136,7 +136,7 @@ def plugin(cls: Class) -> Class:
     _check_typed(cls, where)
     plugin_class = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     plugin_class.name = name
-    plugin_class.parameters = _parameters(plugin_class, where)
+    plugin_class.parameters = _collect_parameters(plugin_class, where)
     plugin_class.check_class(where)
     others[name] = plugin_class
     return plugin_class
@@ -182,7 +182,7 @@ def _check_typed(cls: type[Any], where: str) -> None:
             )
 
 
-def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
+def _collect_parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
     """The parameters of a class, inherited ones first, by name: its own replaces an inherited one
     of that name.
 
@@ -202,7 +202,7 @@ def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
     return tuple(parameters.values())
 
 
-def schema(cls: type[Plugin]) -> type:
+def make_schema(cls: type[Plugin]) -> type:
     """The dataclass Hydra checks a plugin's configuration against: its name and its settings."""
     if cls not in _schemas:
         fields: list[Any] = [("name", str, dataclasses.field(default=cls.name))]
@@ -215,12 +215,12 @@ def schema(cls: type[Plugin]) -> type:
 
 
 @functools.cache
-def packages() -> tuple[Any, ...]:
+def import_packages() -> tuple[Any, ...]:
     """The packages behind the entry points that can be imported, in order of name."""
     found = [
         package
         for point in entry_points()
-        for package in _try_import(point.module, _package, point)
+        for package in _try_import(point.module, _import_package, point)
     ]
     return tuple(dict.fromkeys(found))
 
@@ -230,7 +230,9 @@ def place_in_plugin(error: BaseException) -> str:
 
     Our own tasks come in as plugins do; what fails in them is our mistake.
     """
-    others = [package for package in packages() if not package.__name__.startswith("tractexp.")]
+    others = [
+        package for package in import_packages() if not package.__name__.startswith("tractexp.")
+    ]
     folders = [Path(path) for package in others for path in package.__path__]
     frames = [
         (frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)
@@ -250,8 +252,12 @@ def discover() -> Mapping[str, Mapping[str, type[Plugin]]]:
     A module that cannot be used hides none of the others: `list_refused` tells why it cannot, and
     so does `get` where its plugin is chosen.
     """
-    names = [name for package in packages() for name in modules(package.__name__, package.__path__)]
-    for module in [module for name in names for module in _try_import(name, _module, name)]:
+    names = [
+        name
+        for package in import_packages()
+        for name in list_modules(package.__name__, package.__path__)
+    ]
+    for module in [module for name in names for module in _try_import(name, _import_module, name)]:
         _try_import(module.__name__, _check_decorated, module)
     return _registry
 
@@ -292,15 +298,15 @@ def import_all(packages: Iterable[ModuleType]) -> None:
     it that is not decorated with `@plugin`.
     """
     imported = [
-        _module(name)
+        _import_module(name)
         for package in packages
-        for name in modules(package.__name__, package.__path__)
+        for name in list_modules(package.__name__, package.__path__)
     ]
     for module in imported:
         _check_decorated(module)
 
 
-def _package(point: "EntryPoint") -> ModuleType:
+def _import_package(point: "EntryPoint") -> ModuleType:
     """The package of an entry point. Raises `UserError` for one that cannot be imported, or is a
     single file.
     """
@@ -315,7 +321,7 @@ def _package(point: "EntryPoint") -> ModuleType:
     return package
 
 
-def _module(name: str) -> ModuleType:
+def _import_module(name: str) -> ModuleType:
     """The module of a plugin. Raises `UserError` with the reason where it cannot be imported."""
     with _import_error(f"the plugin module '{name}'"):
         return importlib.import_module(name)
@@ -395,8 +401,8 @@ def find(group: str, name: str) -> type[Any] | None:
     Raises `UserError` with the reason for a plugin whose file cannot be used.
     """
     if name not in _registry.get(group, {}):
-        for module in _modules().get(name, ()):
-            _try_import(module, _module, module)
+        for module in _find_modules_by_name().get(name, ()):
+            _try_import(module, _import_module, module)
     _check_usable(group, name)
     return _registry.get(group, {}).get(name) or discover().get(group, {}).get(name)
 
@@ -412,11 +418,11 @@ def _check_usable(group: str, name: str) -> None:
 
 
 @functools.cache
-def _modules() -> Mapping[str, Sequence[str]]:
+def _find_modules_by_name() -> Mapping[str, Sequence[str]]:
     """{name: modules of this name} of the plugin packages."""
     named: dict[str, list[str]] = {}
     for package, folder in plugin_folders():
-        for module in modules(package, [str(folder)]):
+        for module in list_modules(package, [str(folder)]):
             named.setdefault(module.rpartition(".")[2], []).append(module)
     return named
 

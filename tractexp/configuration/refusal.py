@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.configuration.choices import (
-    choices,
     describe_available,
+    describe_elsewhere,
     describe_nameless,
-    elsewhere,
+    read_choices,
 )
 from tractexp.errors import UserError, among
 
@@ -50,7 +50,7 @@ def explain_errors() -> Iterator[None]:
     except MissingConfigException as error:
         raise UserError(_describe_missing_choice(error)) from error
     except (HydraException, OmegaConfBaseException) as error:
-        raise UserError(_sentence(error)) from error
+        raise UserError(_describe_error(error)) from error
     except OSError as error:
         if not _of_hydra(error):
             raise
@@ -61,7 +61,7 @@ def explain_errors() -> Iterator[None]:
     except Exception as error:
         if not _of_hydra(error):
             raise
-        raise UserError(_unforeseen(error)) from error
+        raise UserError(_describe_unforeseen(error)) from error
 
 
 def _of_hydra(error: BaseException) -> bool:
@@ -74,14 +74,14 @@ def _of_hydra(error: BaseException) -> bool:
     return bool(foreign) and bool(set(HYDRA) & set(foreign[-1].parts))
 
 
-def _unforeseen(error: BaseException) -> str:
+def _describe_unforeseen(error: BaseException) -> str:
     """The sentence for an error of Hydra's that no rule of ours knows."""
     if isinstance(error, RecursionError):
         return (
             "an argument has brackets within brackets, or a reference to itself, deeper than can be"
             " read"
         )
-    argument = _argument(error)
+    argument = _find_argument(error)
     if argument is None:
         return (
             "the arguments make no configuration: one names a part of a value that has no parts, or"
@@ -93,7 +93,7 @@ def _unforeseen(error: BaseException) -> str:
     )
 
 
-def _argument(error: BaseException | None) -> str | None:
+def _find_argument(error: BaseException | None) -> str | None:
     """The argument that Hydra was about to apply."""
     while error is not None:
         for frame, _ in reversed(list(traceback.walk_tb(error.__traceback__))):
@@ -124,7 +124,7 @@ def _describe_missing_choice(error: Any) -> str:
         return _describe_missing_default(*named.groups())
     if not group or not options:
         return _read_first_line(error)
-    where = elsewhere(group, choice) or describe_available(group, choice, options)
+    where = describe_elsewhere(group, choice) or describe_available(group, choice, options)
     if extra := EXTRAS.get(f"{group}={choice}"):
         where = f" before it is installed: pip install 'tractexp[{extra}]'"
     return f"{group}={choice}: there is no such choice{where}"
@@ -133,11 +133,11 @@ def _describe_missing_choice(error: Any) -> str:
 def _describe_missing_default(file: str, group: str, name: str) -> str:
     """That a file of configurations begins with a choice that is not there, with those that are."""
     group = group.removeprefix("schema/")
-    available = describe_available(group, name, choices().get(group, ()))
+    available = describe_available(group, name, read_choices().get(group, ()))
     return f"{file}.yaml: its defaults name {group}={name}, and there is no such choice{available}"
 
 
-def _sentence(error: BaseException) -> str:
+def _describe_error(error: BaseException) -> str:
     """The sentence of an error, by what caused it."""
     for link in _list_causes(error):
         key = getattr(link, "full_key", None)
@@ -148,7 +148,7 @@ def _sentence(error: BaseException) -> str:
             return sentence
     group = re.search(r"Could not override '([^']*)'", first_line(error))
     if group and "No match in the defaults list" in str(error):
-        groups = _groups()
+        groups = _list_groups()
         return f"there is no group '{group[1]}'{among(group[1], groups, 'Groups')}"
     return _read_first_line(error)
 
@@ -165,7 +165,7 @@ def _list_causes(error: BaseException) -> list[BaseException]:
 
 def _key_of(error: BaseException) -> str:
     """The key of the argument that an error is about."""
-    return (_argument(error) or "").lstrip("+~").partition("=")[0]
+    return (_find_argument(error) or "").lstrip("+~").partition("=")[0]
 
 
 def _wrong_value(key: str, text: str) -> str:
@@ -232,7 +232,7 @@ def _read_first_line(error: BaseException) -> str:
             f"{_shorten(match[1])} cannot be applied: every run may need that setting, or it holds"
             " no such value"
         )
-    return text if not PYTHON.search(text) else _unforeseen(error)
+    return text if not PYTHON.search(text) else _describe_unforeseen(error)
 
 
 def _unknown_key(key: str, error: Any) -> str:
@@ -249,7 +249,7 @@ def _unknown_key(key: str, error: Any) -> str:
     return f"{key}: {where} no key '{last}'{among(last, keys, 'Keys')}"
 
 
-def _groups() -> list[str]:
+def _list_groups() -> list[str]:
     """The groups that a choice can be made in."""
     from tractexp.configuration.plugin import discover
 

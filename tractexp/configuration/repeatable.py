@@ -27,7 +27,7 @@ NAMES = re.compile(r"\[?\w+(\s*,\s*\w+)*\]?|null")  # no path: Hydra would leave
 MODEL = re.compile(r"[^$'\"]+\.ya?ml|'(?:[^$'\\]|\\')+\.ya?ml'")
 
 
-def refusal(setting: str) -> str:
+def explain_refusal(setting: str) -> str:
     """Why KEY=VALUE is not taken over; "" where it is."""
     key, _, value = setting.partition("=")
     match = KEY.fullmatch(key)

@@ -99,7 +99,7 @@ def _not_taken_over(argument: str) -> bool:
     # which is none of the settings that a folder keeps
     if group_of(argument) == "hydra" or "=" not in argument:
         return argument.startswith("--config-dir")
-    return bool(repeatable.refusal(argument))
+    return bool(repeatable.explain_refusal(argument))
 
 
 def _repeat_settings(settings: Collection[str], of: Collection[str]) -> str:

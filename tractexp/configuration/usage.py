@@ -10,11 +10,11 @@ from pathlib import Path
 from tractexp.configuration.choices import (
     FEWEST_VARIANTS,
     Option,
-    choices,
-    defaults,
     find_families,
     group_variants,
-    sentence,
+    read_choices,
+    read_default_choices,
+    take_first_sentence,
 )
 from tractexp.errors import UserError, among
 
@@ -73,19 +73,23 @@ Values are changed by KEY=VALUE
 """
 
 
-def usage() -> str:
+def describe_usage() -> str:
     """The text of `tractexp --help`."""
-    options = choices()
+    options = read_choices()
     tasks = {
         name: re.split("[:;] ", options["task"][name].about)[0]
         for name in _sort_names("task", options["task"])
     }
     groups = {
-        group: _summary(group, options[group])
+        group: _summarize_group(group, options[group])
         for group in _order_groups(options)
         if group not in LATER
     }
-    return TEXT.format(task=defaults()["task"], tasks=_columns(tasks), groups=_columns(groups))
+    return TEXT.format(
+        task=read_default_choices()["task"],
+        tasks=_fold_columns(tasks),
+        groups=_fold_columns(groups),
+    )
 
 
 def print_choices(arguments: list[str]) -> int:
@@ -95,11 +99,15 @@ def print_choices(arguments: list[str]) -> int:
     Of a NAME that has variants these are printed. Raises `UserError` for what is neither.
     """
     given = _parse_list_arguments(arguments)
-    options = choices([] if given.config_dir is None else [given.config_dir])
+    options = read_choices([] if given.config_dir is None else [given.config_dir])
     chosen = _select_groups(given.group, options)
     options, refused = _import_choices(options)
     width = min(WIDEST_HELP, shutil.get_terminal_size((WIDEST_HELP, 24)).columns)
-    print("\n\n".join(_describe(name, options, width) for name in chosen or _order_groups(options)))
+    print(
+        "\n\n".join(
+            _describe_choices(name, options, width) for name in chosen or _order_groups(options)
+        )
+    )
     for why in refused:
         print(f"\nleft out: {why}")
     return 0
@@ -144,7 +152,7 @@ def _select_groups(typed: Sequence[str], options: Mapping[str, Mapping[str, Opti
     return chosen
 
 
-def _describe(name: str, options: Mapping[str, Mapping[str, Option]], width: int) -> str:
+def _describe_choices(name: str, options: Mapping[str, Mapping[str, Option]], width: int) -> str:
     """Return what there is of a group, or of a name that has variants."""
     if name in options:
         return _describe_group(name, options[name], width)
@@ -185,7 +193,7 @@ def _import_choices(
         # also those registered by a program, which are in no file
         for name, cls in classes.items():
             result.setdefault(group, {})[name] = Option(
-                name, sentence(cls.__doc__ or ""), cls.__module__
+                name, take_first_sentence(cls.__doc__ or ""), cls.__module__
             )
     placed = set()
     for names in result.values():
@@ -199,23 +207,23 @@ def _import_choices(
 def _describe_group(group: str, names: Mapping[str, Option], width: int) -> str:
     """A group and its names, each with its sentence."""
     head = f"{group}: {GROUPS[group]}" if group in GROUPS else group
-    if chosen := defaults().get(group):
+    if chosen := read_default_choices().get(group):
         head += f"; {chosen} by default"
     grouped = group_variants({name: names[name] for name in _sort_names(group, names)})
     rows = {base: names[base].about for base in grouped}
     for base, varied in grouped.items():
         if varied:
             rows[base] += f" {len(varied)} variants: tractexp list {base}"
-    return f"{head}\n{_columns(rows, width)}"
+    return f"{head}\n{_fold_columns(rows, width)}"
 
 
 def _describe_variants(base: str, names: Mapping[str, Option], width: int) -> str:
     """Return a plugin and its variants, each with its sentence."""
     varied = sorted(group_variants(names)[base])
-    return _columns({name: names[name].about for name in [base, *varied]}, width)
+    return _fold_columns({name: names[name].about for name in [base, *varied]}, width)
 
 
-def _summary(group: str, names: Mapping[str, Option]) -> str:
+def _summarize_group(group: str, names: Mapping[str, Option]) -> str:
     """The names of a group, variants counted beside what they vary; of many, how many."""
     families = find_families({name: names[name] for name in _sort_names(group, names)})
     parts = [
@@ -241,10 +249,12 @@ def _sort_names(group: str, names: Collection[str]) -> list[str]:
         name: [(word, int(digits or 0)) for word, digits in re.findall(r"(\D*)(\d*)", name)]
         for name in names
     }
-    return sorted(names, key=lambda name: (name != defaults().get(group), numbered[name]))
+    return sorted(
+        names, key=lambda name: (name != read_default_choices().get(group), numbered[name])
+    )
 
 
-def _columns(rows: Mapping[str, str], width: int = WIDEST_HELP) -> str:
+def _fold_columns(rows: Mapping[str, str], width: int = WIDEST_HELP) -> str:
     """Names in a column, and beside each its text, folded."""
     indent = 4 + max(map(len, rows), default=0)
     folded = textwrap.TextWrapper(max(width, indent + 30), subsequent_indent=" " * indent)

@@ -107,11 +107,11 @@ class OperatingPoint:
         return doubt_division(complex(self.P, self.Q), motor, self.units)
 
 
-def doubts(result: Result, point: OperatingPoint | None) -> list[str]:
-    """The reasons why an identified load is no physical one, a clause each: its division, and
-    parameters that a bound alone holds.
+def list_doubts(result: Result, point: OperatingPoint | None) -> list[str]:
+    """The reasons why an identified load is no physical one, a clause each: its division between
+    motor and static part, and parameters that a bound alone holds.
 
-    A machine at the end of what machines have is one: what that costs is told beside the fit.
+    The end of a physical range is no such bound: what that costs is told beside the fit.
     """
     resting = [
         name

@@ -76,11 +76,11 @@ def _find_meant_column(
 def _find_counting_column(table: TableFile, options: Mapping[str, list[MappedColumn]]) -> str:
     """The one column without a role that counts up as t does; "" for none or several."""
     taken = {one.number for one in itertools.chain(*options.values())}
-    free = [k for k in find_other_columns(table, taken) if _increases(table, k)]
+    free = [k for k in find_other_columns(table, taken) if _is_increasing(table, k)]
     return table.label(free[0]) if len(free) == 1 else ""
 
 
-def _increases(table: TableFile, number: int) -> bool:
+def _is_increasing(table: TableFile, number: int) -> bool:
     """Whether a column increases in every row of the sample, as times do."""
     rows = sum(number < len(row) for row in table.sample)
     values = read_sample_numbers(table, number)

@@ -71,14 +71,14 @@ def _read_clock_times(table: TableFile, mapping: Mapped, time: TableColumn) -> T
     """Times of day, with the date that they have or that stands in a column of its own."""
     start = time.start
     if start is None and mapping.day is not None:
-        start = _midnight(mapping.day) + dt.timedelta(seconds=time.begin)
+        start = _find_midnight(mapping.day) + dt.timedelta(seconds=time.begin)
     said = [f"{table.place(row)}: {words}" for row, words in time.remarks]
     if start is not None:
         said.append(f"t counted from {start.isoformat()}, the first row")
     return TableTimes(time.values, start, tuple(said))
 
 
-def _midnight(day: dt.date) -> dt.datetime:
+def _find_midnight(day: dt.date) -> dt.datetime:
     """The first moment of a day."""
     return dt.datetime.combine(day, dt.time())
 

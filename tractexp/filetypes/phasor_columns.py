@@ -28,12 +28,12 @@ def read_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     values, absolute = _in_units(table, mapping, values)
     voltages = _list_magnitudes(values, "U")
     currents = _list_magnitudes(values, "I")
-    scale, angle_notes = _radians(table, mapping, values)
-    V, turned = _forward(
+    scale, angle_notes = _find_angle_unit(table, mapping, values)
+    V, turned = _turn_forward(
         _join_phasors(values, voltages, scale), [mapping.columns[k] for k in voltages]
     )
-    V1, V2 = _sequences(V, voltages)
-    I1, _ = _sequences(_join_phasors(values, currents, scale), currents)
+    V1, V2 = _compute_sequences(V, voltages)
+    I1, _ = _compute_sequences(_join_phasors(values, currents, scale), currents)
     wiring: list[str] = []
     if absolute:
         V1, wiring = _to_ground(mapping.columns[voltages[0]], V1)
@@ -70,7 +70,7 @@ def _list_magnitudes(keys: Iterable[str], letters: str) -> list[str]:
     return [key for key in keys if key[0] in letters and not key.endswith("_angle")]
 
 
-def _forward(V: np.ndarray, sources: Sequence[MappedColumn]) -> tuple[np.ndarray, list[str]]:
+def _turn_forward(V: np.ndarray, sources: Sequence[MappedColumn]) -> tuple[np.ndarray, list[str]]:
     """Phasors (K, N) of line voltages as AB, BC, CA; a note where all are named the other way, as
     V1 - V2 is.
     """
@@ -150,7 +150,7 @@ def _describe_odd_unit(mapping: Mapped, sizes: Mapping[str, bool | None], level:
     return f"{mapping.columns[odd].label} is per unit and others are not"
 
 
-def _radians(
+def _find_angle_unit(
     table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]
 ) -> tuple[float, list[str]]:
     """The factor from the unit of the angles to rad, and a note where the values decided it."""
@@ -177,7 +177,7 @@ def _are_thirds_apart(angles: Sequence[np.ndarray]) -> bool:
     return abs(apart - 2 * np.pi / 3) < 0.3
 
 
-def _sequences(X: np.ndarray, keys: list[str]) -> tuple[np.ndarray, np.ndarray | None]:
+def _compute_sequences(X: np.ndarray, keys: list[str]) -> tuple[np.ndarray, np.ndarray | None]:
     """Positive and negative sequence (N,) of phasors of three or two phases or lines; of one (1,
     N), it and None.
     """

@@ -108,7 +108,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     remarks = Remarks(str(path))
     content = read_observations(path, encoding, [WAVEFORM], remarks)
     channels: dict[int, tuple[ChannelDefinition, str]] = {}
-    stretches = _fullest(_waves(content, channels, remarks), remarks)
+    stretches = _keep_fullest_set(_read_waves(content, channels, remarks), remarks)
     if not stretches:
         raise UserError(
             f"{path}: there are no waveforms in this PQDIF file; logs of voltage, P and Q are read"
@@ -141,7 +141,7 @@ def _channel(definition: ChannelDefinition, unit: str, values: np.ndarray) -> Ch
     return Channel(definition.name, values, unit, quantity, phase, definition.circuit)
 
 
-def _waves(
+def _read_waves(
     content: Observed, channels: dict[int, tuple[ChannelDefinition, str]], remarks: Remarks
 ) -> list[Stretch]:
     """The waveforms of each observation by the times of their samples; `channels` learns definition
@@ -205,7 +205,7 @@ def _merge_rates(stretches: Sequence[Stretch], remarks: Remarks) -> Sequence[Str
     return [Stretch(t, columns)]
 
 
-def _fullest(stretches: Sequence[Stretch], remarks: Remarks) -> list[Stretch]:
+def _keep_fullest_set(stretches: Sequence[Stretch], remarks: Remarks) -> list[Stretch]:
     """The stretches of the largest set of channels: what others have is no whole load."""
     if not stretches:
         return []
@@ -277,19 +277,19 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     remarks = Remarks(str(path))
     content = read_observations(path, encoding, [LOG, PHASOR], remarks)
     names: dict[int, tuple[str, str]] = {}
-    stretches = _logs(content, names)
+    stretches = _read_logs(content, names)
     if not stretches:
         raise UserError(
             f"{path}: there are no logs of RMS values or powers in this PQDIF file; its waveforms"
             f" are read by data=pqdif data.path={path}"
         )
-    fullest = _fullest(stretches, remarks)
-    t, columns = _longest(fullest, remarks)
+    fullest = _keep_fullest_set(stretches, remarks)
+    t, columns = _join_longest_log(fullest, remarks)
     every = [("t", "s", t - t[0]), *((*names[k], values) for k, values in columns.items())]
     return Rows.from_columns(path, every, 1, remarks.notes())
 
 
-def _logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:
+def _read_logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:
     """The logs of each observation by their times; `names` learns what each column is called, and
     its unit.
     """
@@ -330,7 +330,7 @@ def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value:
     return "" if ending is None else f"{name}{ending}"
 
 
-def _longest(
+def _join_longest_log(
     stretches: Sequence[Stretch], remarks: Remarks
 ) -> tuple[np.ndarray, dict[int, np.ndarray]]:
     """The longest of the logs that follow one another without a gap: times (N,), and values (N,) by

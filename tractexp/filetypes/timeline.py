@@ -72,7 +72,7 @@ def _build_declared_stretch(group: list[tuple[float, int, int]], start: float) -
         Segment(first, stop, rate, start),
         first,
         stop,
-        None if _evenness(t, rate) <= LARGEST_UNEVENNESS else t,
+        None if _measure_unevenness(t, rate) <= LARGEST_UNEVENNESS else t,
     )
 
 
@@ -92,7 +92,7 @@ def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
         )
     stretches = [
         _build_stamped_stretch(t, unit, first, stop)
-        for first, stop in _runs(steps, unit, where)
+        for first, stop in _find_even_runs(steps, unit, where)
         if stop - first > 1
     ]
     if not stretches:
@@ -102,7 +102,7 @@ def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
     return stretches
 
 
-def _runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
+def _find_even_runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
     """(first, stop) of the samples between which the steps are alike; a gap belongs to none."""
     longer, shorter = np.maximum(steps[1:], steps[:-1]), np.minimum(steps[1:], steps[:-1])
     breaks = np.flatnonzero(longer > LARGEST_STEP_RATIO * shorter + 2 * unit) + 1
@@ -116,14 +116,14 @@ def _runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
     runs: list[tuple[int, int]] = []
     taken = 0
     for k, (a, b) in enumerate(pairwise(edges)):
-        if b - a == 1 and len(edges) > 2 and _gap(edges, k):
+        if b - a == 1 and len(edges) > 2 and _is_gap(edges, k):
             continue  # between two segments
         runs.append((max(a, taken), b + 1))
         taken = b + 1
     return runs
 
 
-def _gap(edges: list[int], k: int) -> bool:
+def _is_gap(edges: list[int], k: int) -> bool:
     """A single step between longer runs."""
     before = edges[k] - edges[k - 1] if k else 0
     after = edges[k + 2] - edges[k + 1] if k + 2 < len(edges) else 0
@@ -138,12 +138,12 @@ def _build_stamped_stretch(t: np.ndarray, unit: float, first: int, stop: int) ->
     # a whole number, to the resolution of the stamps
     if abs(round(rate) - rate) <= rate * unit / length:
         rate = float(round(rate))
-    worst = _evenness(own, rate)
+    worst = _measure_unevenness(own, rate)
     uneven = worst > LARGEST_UNEVENNESS + 1.01 * unit * rate
     return Stretch(Segment(first, stop, rate, float(own[0])), first, stop, own if uneven else None)
 
 
-def _evenness(t: np.ndarray, rate: float) -> float:
+def _measure_unevenness(t: np.ndarray, rate: float) -> float:
     """Greatest departure from even steps, in steps."""
     return float(np.abs((t - t[0]) * rate - np.arange(len(t))).max())
 
@@ -180,7 +180,7 @@ def nearest(raw: np.ndarray, stretches: Sequence[Stretch]) -> np.ndarray:
     parts = []
     for s in stretches:
         own = raw[s.first : s.stop]
-        parts.append(own if s.t is None else own[_closest(s.t, _spread_times(s))])
+        parts.append(own if s.t is None else own[_find_closest(s.t, _spread_times(s))])
     return np.concatenate(parts)
 
 
@@ -189,7 +189,7 @@ def _spread_times(s: Stretch) -> np.ndarray:
     return s.segment.start + np.arange(s.stop - s.first) / s.segment.rate
 
 
-def _closest(t: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _find_closest(t: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """The index of the closest time to each one that is wanted."""
     right = np.clip(np.searchsorted(t, wanted), 1, len(t) - 1)
     return np.where(wanted - t[right - 1] <= t[right] - wanted, right - 1, right)
@@ -208,5 +208,5 @@ def _interpolate_stretch(raw: np.ndarray, s: Stretch, missing: float | None) -> 
         values[lacking] = np.interp(s.t[lacking], s.t[~lacking], values[~lacking])
     times = _spread_times(s)
     even = CubicSpline(s.t, values)(times) if len(values) > 3 else np.interp(times, s.t, values)
-    even[lacking[_closest(s.t, times)]] = np.nan
+    even[lacking[_find_closest(s.t, times)]] = np.nan
     return even

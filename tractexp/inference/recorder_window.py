@@ -12,7 +12,7 @@ from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
 from tractexp.record import Event, Window
 from tractexp.record.window import averaged_power, mean_weights, sharpen_voltage
-from tractexp.recording.estimator import estimators
+from tractexp.recording.estimator import list_estimators
 
 CYCLES = (1, 2, 3, 4, 5, 6)
 
@@ -104,6 +104,6 @@ def _usual_windows(frequency: float) -> list[RecorderWindow]:
     """Averages over whole cycles of a nominal frequency [Hz], and the windows of the estimators
     that weight their samples.
     """
-    shapes = [one.window(frequency) for one in estimators(frequency)]
+    shapes = [one.window(frequency) for one in list_estimators(frequency)]
     uneven = [RecorderWindow(w.length, w) for w in shapes if np.ptp(w.weights) > 1e-9]
     return [*(RecorderWindow(k / frequency) for k in CYCLES), *uneven]

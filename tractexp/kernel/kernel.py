@@ -52,9 +52,9 @@ class Kernel:
         self.text, self.room = text, Room.from_text(text)
 
     @functools.cached_property
-    def _function(self) -> tuple[Any, Any, int]:
-        """The compiled function, what must live as long as it does, and the address of Newton's
-        method.
+    def _machine_code(self) -> tuple[Any, Any, int]:
+        """The compiled simulation, what has to live as long as it, and the address in memory of
+        Newton's method, which it calls.
         """
         code, newton = objects.load(self.text), objects.load(steady.text(self.room.width))
         return FUNCTION(code.address), (code, newton), newton.address
@@ -131,7 +131,7 @@ class Kernel:
         block, work, points, signals, space = self._space(n, lengths)
         arrays = (candidates, event, first, inputs, measured, weights, substeps, sums, miss)
         further = _address(outputs) if stored else 0, _address(starts) if started else 0
-        function, _, newton = self._function
+        function, _, newton = self._machine_code
         function(
             *map(_address, arrays),
             *further,

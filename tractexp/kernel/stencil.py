@@ -52,8 +52,8 @@ class Stencil:
         self.sums, self.shifts, self.onward = dict(sums or {}), tuple(shifts), onward
 
     @functools.cached_property
-    def _ir(self) -> tuple[str, int, int]:
-        """The module's text, the number of its rows and of its sums."""
+    def _generated_code(self) -> tuple[str, int, int]:
+        """The LLVM text of the expression at each sample, and how many rows and sums it reads."""
         arrays = self.rows, self.shared, self.numbers, self.sums, self.shifts, self.onward
         settings = repr((self.expression.__qualname__, *arrays))
         description = text_in(
@@ -68,7 +68,7 @@ class Stencil:
     @functools.cached_property
     def _function(self) -> tuple[Any, Any]:
         """The compiled function, and what must live as long as it does."""
-        code = objects.load(self._ir[0])
+        code = objects.load(self._generated_code[0])
         return FUNCTION(code.address), code
 
     def __call__(
@@ -84,7 +84,7 @@ class Stencil:
         axis; `out` may be one of the rows. `shifts` are integers, and they and the numbers fit (E,
         C, n). Raises `ValueError` for another shape or type.
         """
-        _, first, last = self._ir
+        _, first, last = self._generated_code
         channels, count, samples = out.shape
         whole = (len(parts), channels, count)
         named = [shifts[name] for name in self.shifts] if isinstance(shifts, Mapping) else [shifts]

@@ -143,7 +143,7 @@ class WaveformDrive:
 
     @property
     def inputs(self) -> np.ndarray:
-        """The kernel's rows (14, N)."""
+        """What drives the kernel, (14, N): `INPUTS`, then `WAVE_INPUTS`, a row each."""
         n = len(self.v)
         smooth = (self.v.real, self.v.imag, self.v_zero)
         rows = [
@@ -154,8 +154,8 @@ class WaveformDrive:
             np.arange(n) * self.step,
             self.omega_s0 * np.arange(n) * self.step,
         ]
-        bends = (band_limited(y) / self.step for y in smooth)
-        return np.stack([*rows, *smooth, *bends, self.turn.real, self.turn.imag])
+        rates = (band_limited(y) / self.step for y in smooth)
+        return np.stack([*rows, *smooth, *rates, self.turn.real, self.turn.imag])
 
     @property
     def measurements(self) -> np.ndarray:

@@ -645,7 +645,9 @@ class Equations:
             return [self.real(self.evaluate_before(power)) for power in powers]
         # space vectors first by their parts, which are short: products across names are long
         whole = self.parts(self.v * conjugate(self._drawn[sites.current]))
-        return [replace_symbols(power, without_static | self._starts()) for power in whole]
+        return [
+            replace_symbols(power, without_static | self._map_to_values_before()) for power in whole
+        ]
 
     def _derive_starts(self) -> None:
         """Take the values before the event of states that are written in others' by these."""
@@ -679,13 +681,13 @@ class Equations:
         """An expression's value before the event, of constants: `eq.evaluate_before(eq.omega)` is
         the speed there.
         """
-        return replace_symbols(self.expand(expression), self._starts())
+        return replace_symbols(self.expand(expression), self._map_to_values_before())
 
     before, apart = evaluate_before, view_with_suffix  # their names in version 0.2
 
-    def _starts(self) -> dict[Symbol, sympy.Expr]:
-        """The values before the event of all that moves, states and their parts by what they start
-        from.
+    def _map_to_values_before(self) -> dict[Symbol, sympy.Expr]:
+        """{symbol: its value before the event} of all that moves; of a state, and of its real and
+        imaginary part, the symbol that it starts from.
         """
         at_start = {symbol: start_symbol(symbol) for symbol in (*self.states, *self.memories)}
         for symbol, start in list(at_start.items()):

@@ -535,8 +535,9 @@ class Model:
 def _observe_outputs(
     effect: Measurement, outputs: np.ndarray, drive: Drive, columns: dict[str, np.ndarray]
 ) -> np.ndarray:
-    """Outputs (C, n, N) as a recorder shows them: changed are those of candidates with an effect
-    off its null.
+    """Outputs (C, n, N) as a recorder shows them.
+
+    Those of candidates all of whose sizes are at their nulls stay as they are.
     """
     sizes = [columns[p.name] != p.null for p in effect.parameters if p.null is not None]
     off = np.any(sizes, axis=(0, 1)) if sizes else np.ones(outputs.shape[1], dtype=bool)

@@ -118,12 +118,11 @@ class _Cut:
         )
 
 
-def leave_out(record: Record, times: Sequence[float], reach: float) -> Record:
-    """The record without P and Q (nan) where, in a dip, a sample within `reach` [s] was bridged.
+def leave_out_bridged(record: Record, times: Sequence[float], reach: float) -> Record:
+    """The record with P and Q nan wherever, within a dip, a sample nearer than `reach` [s] was
+    bridged; outside of dips a bridged sample is as good as a recorded one.
 
     `times` (K,) [s] are those of bridged samples, ascending.
-
-    Before and after it what is bridged differs from what was by less than noise does.
     """
     if not len(times):
         return record

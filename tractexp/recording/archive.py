@@ -39,10 +39,10 @@ def records(folder: Path, names: list[str], where: str) -> list[Record]:
     there or cannot be fitted.
     """
     see = functools.cache(look_at_file)
-    return [_record(folder, name, where, see) for name in names]
+    return [_read_record(folder, name, where, see) for name in names]
 
 
-def _record(
+def _read_record(
     folder: Path, name: str, where: str, see: "functools._lru_cache_wrapper[View]"
 ) -> Record:
     """The record of an event by its name, FILE#LOAD.DIP. Raises `UserError` with what the file has

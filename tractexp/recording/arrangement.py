@@ -83,7 +83,7 @@ def arrange_feeder(recording: Recording, feeder: Feeder) -> Feeder:
 
 def _arrange_order(recording: Recording, feeder: Feeder) -> Feeder:
     """As `arrange_feeder`; raises `OtherOrder` with an order that nobody has tried yet."""
-    _residuals(recording, feeder)
+    _refuse_residuals(recording, feeder)
     feeder = take_lines_by_label(recording, feeder)
     connection = build_chosen("connection", feeder.connection)
     live = measure_live_phasors(recording, feeder)
@@ -108,7 +108,7 @@ def _arrange_order(recording: Recording, feeder: Feeder) -> Feeder:
     return _note_direction(feeder, live)
 
 
-def _residuals(recording: Recording, feeder: Feeder) -> None:
+def _refuse_residuals(recording: Recording, feeder: Feeder) -> None:
     """Refuse what is measured of all phases together, where a phase or a line is needed."""
     for key, numbers in (("voltages", feeder.voltages), ("currents", feeder.currents)):
         residuals = find_residuals([recording.channels[i] for i in numbers])

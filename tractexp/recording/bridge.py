@@ -32,7 +32,7 @@ def bridge_recording(recording: Recording) -> Recording:
     at = np.unique(np.concatenate([channel.bridged[0] for _, channel in told]))
     names = [f"{k} '{channel.name.strip()}'" for k, channel in told]
     which = list_first(names, NAMED_CHANNELS)
-    said = f"{describe_bridged(_times(recording, at))} ({which})"
+    said = f"{describe_bridged(_find_times(recording, at))} ({which})"
     note = f"{said}: bridged, and in a dip in no sum of P and Q"
     return replace(recording, channels=channels, notes=(*recording.notes, note))
 
@@ -105,7 +105,7 @@ def _may_lack(channel: Channel) -> bool:
     return True
 
 
-def _times(recording: Recording, numbers: np.ndarray) -> list[float]:
+def _find_times(recording: Recording, numbers: np.ndarray) -> list[float]:
     """Times [s] of samples, ascending numbers (K,)."""
     return [
         segment.start + (int(number) - segment.first) / segment.rate

@@ -70,7 +70,7 @@ def _group_by_angles(phasors: Snapshots, numbers: Sequence[int]) -> list[Group]:
     """Threes of channels, one after the other, that are equal and 120 degrees apart."""
     found, k = [], 0
     while k + 3 <= len(numbers):
-        ordered = _symmetric(phasors, numbers[k : k + 3])
+        ordered = _find_symmetric_order(phasors, numbers[k : k + 3])
         if ordered:
             name = f"channels {', '.join(map(str, ordered))}"
             found.append(Group(ordered, False, name, False, "equal, 120 degrees apart"))
@@ -78,7 +78,7 @@ def _group_by_angles(phasors: Snapshots, numbers: Sequence[int]) -> list[Group]:
     return found
 
 
-def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
+def _find_symmetric_order(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
     """The three channels in the order a, b, c where their phasors are equal and 120 degrees apart;
     else ().
     """
@@ -87,7 +87,8 @@ def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
     if not np.isfinite(level).any() or np.nanmax(level) == 0:
         return ()
     X = np.nanmedian(
-        X[:, level > 0.5 * np.nanmax(level)] / _unit(X[0, level > 0.5 * np.nanmax(level)]), axis=1
+        X[:, level > 0.5 * np.nanmax(level)] / _scale_to_unit(X[0, level > 0.5 * np.nanmax(level)]),
+        axis=1,
     )
     size = np.abs(X)
     if not size.min() > 0 or np.ptp(size) > LARGEST_PHASE_DIFFERENCE * size.mean():
@@ -99,7 +100,7 @@ def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
     return ()
 
 
-def _unit(x: np.ndarray) -> np.ndarray:
+def _scale_to_unit(x: np.ndarray) -> np.ndarray:
     """Complex numbers of the same angles and of size 1; 1 where they are 0."""
     size = np.abs(x)
     return np.where(size > 0, x, 1) / np.where(size > 0, size, 1)

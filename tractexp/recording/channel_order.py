@@ -127,8 +127,8 @@ def check_labels(recording: Recording, feeder: Feeder, live: LivePhasors | None)
         return ""
     labelled = tuple(feeder.currents[c.index(k)] for k in v)
     said = (
-        f"{DATA.currents} are the phases {_letters(c)} where {DATA.voltages} are {_letters(v)},"
-        " says "
+        f"{DATA.currents} are the phases {_name_phases(c)} where {DATA.voltages} are"
+        f" {_name_phases(v)}, says "
     )
     both = ""
     if live is not None:
@@ -156,7 +156,7 @@ def _is_balanced(live: LivePhasors, permutation: tuple[int, ...]) -> bool:
     return bool(second < LARGEST_SENSIBLE_UNBALANCE * first) and not SENSIBLE < angle < BACKWARD
 
 
-def _letters(places: Sequence[int]) -> str:
+def _name_phases(places: Sequence[int]) -> str:
     """ "A, C" of the places 0 and 2."""
     return ", ".join("ABC"[k] for k in places)
 
@@ -168,7 +168,7 @@ def check_currents(recording: Recording, feeder: Feeder, live: LivePhasors) -> N
     I1, I2 = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.I))
     S = compute_power(live, (0, 1, 2))
     if I2 > I1:
-        _negative(recording, feeder, live, S, I2 / max(I1, 1e-12))
+        _refuse_negative_sequence(recording, feeder, live, S, I2 / max(I1, 1e-12))
         return
     labelled = [
         order([recording.channels[i] for i in each]) for each in (feeder.voltages, feeder.currents)
@@ -193,7 +193,7 @@ def check_currents(recording: Recording, feeder: Feeder, live: LivePhasors) -> N
         )
 
 
-def _negative(
+def _refuse_negative_sequence(
     recording: Recording, feeder: Feeder, live: LivePhasors, S: complex, ratio: float
 ) -> None:
     """Refuse currents of the opposite sequence where another order, or one turned round, is

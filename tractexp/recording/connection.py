@@ -67,7 +67,7 @@ class Connection(Plugin):
         return (SINGLE,) if len(self.voltage()) == 1 else ()
 
 
-def usual(voltages: int, currents: int, lines: bool = False) -> Any:
+def choose_usual_connection(voltages: int, currents: int, lines: bool = False) -> Any:
     """The default connection of so many channels.
 
     Parameters

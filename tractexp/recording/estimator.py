@@ -95,7 +95,7 @@ def estimator_of(setting: str | Mapping[str, object] | None = None) -> Estimator
     return build_chosen(Estimator.group, setting)
 
 
-def estimators(nominal: float) -> list[Estimator]:
+def list_estimators(nominal: float) -> list[Estimator]:
     """The estimators that support a nominal frequency [Hz], each with its default settings."""
     supporting: list[Estimator] = []
     for name in sorted(discover()[Estimator.group]):

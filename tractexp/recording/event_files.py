@@ -173,7 +173,7 @@ def name_files(sources: Iterable[str]) -> str:
 def _align_moments(sampled: Sequence[SampledFile]) -> Alignment:
     """By the clocks of the files; the first file's samples are the instants that are meant."""
     one = sampled[0]
-    shifts = [_seconds(one, each) * one.rate for each in sampled]
+    shifts = [_measure_delay(one, each) * one.rate for each in sampled]
     ends = [shift + each.count for shift, each in zip(shifts, sampled, strict=True)]
     begin = int(np.ceil(max(shifts) - SAME_INSTANT))
     count = int(np.floor(min(ends) - begin + SAME_INSTANT))
@@ -198,7 +198,7 @@ def _align_moments(sampled: Sequence[SampledFile]) -> Alignment:
     return Alignment(firsts, late, count, tuple(said))
 
 
-def _seconds(one: SampledFile, other: SampledFile) -> float:
+def _measure_delay(one: SampledFile, other: SampledFile) -> float:
     """How much later a file begins than another [s]."""
     assert one.begun is not None
     assert other.begun is not None

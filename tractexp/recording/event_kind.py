@@ -52,15 +52,15 @@ def has_no_system(trace: Trace) -> bool:
 
 def divide_by_kind(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     """The kind of an excursion; two parts of a fault that leaves a pole open."""
-    if (fuse := _fuse(trace, e)) is not None:
+    if (fuse := _find_blown_fuse(trace, e)) is not None:
         return [("blown fuse", fuse)]
     # with the level that it leads to
     until = e.end + 2 * e.new_level * round(trace.cycle / trace.step)
-    if e.dead or _dead(trace, e)[e.start : until].any():
+    if e.dead or _find_dead_samples(trace, e)[e.start : until].any():
         if e.returned and not e.dead:
             return [("interruption", e)]
         return [("dead line", _until_alive(trace, e))]
-    opened = _open(trace, e)
+    opened = _find_open_phase(trace, e)
     if opened is None:
         return [(_name_change(e), e)]
     fault = replace(e, end=opened.start, cleared=False)
@@ -80,20 +80,20 @@ def _name_change(e: Excursion) -> str:
 
 def _until_alive(trace: Trace, e: Excursion) -> Excursion:
     """The excursion up to where a phase is back for good, or to the end."""
-    dead = _dead(trace, e)[e.end :]
+    dead = _find_dead_samples(trace, e)[e.end :]
     return (
         replace(e, end=e.end + int(np.flatnonzero(dead)[-1])) if dead.any() and e.new_level else e
     )
 
 
-def _dead(trace: Trace, e: Excursion) -> np.ndarray:
+def _find_dead_samples(trace: Trace, e: Excursion) -> np.ndarray:
     """When (M,) every phase is gone."""
     return (
         np.concatenate([trace.U[None], trace.phases]).max(axis=0) < DEAD_VOLTAGE_SHARE * e.reference
     )
 
 
-def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
+def _find_blown_fuse(trace: Trace, e: Excursion) -> Excursion | None:
     """The span in which voltages are lost while all currents stay: a fuse of the voltage
     transformers; else None.
     """
@@ -132,7 +132,7 @@ def _is_fuse_pattern(left: np.ndarray, lasts: bool) -> bool:
     return bool(gone.any() and not gone.all() and (lasts or (gone | others).all()))
 
 
-def _open(trace: Trace, e: Excursion) -> Excursion | None:
+def _find_open_phase(trace: Trace, e: Excursion) -> Excursion | None:
     """The part of an excursion in which one phase carries no current, or is unbalanced too long for
     a fault.
     """

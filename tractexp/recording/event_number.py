@@ -18,12 +18,15 @@ def number_events(
 ) -> Iterator[LoadEvent]:
     """The events, each with the dip that the reader cuts out of it."""
     results = {dip.number: dip.result for dip in dips}
-    for what, number in zip(changes, _numbers(changes, dips), strict=True):
-        event, why = _event(results.get(number) if number else None, refused)
+    for what, number in zip(changes, _number_dips(changes, dips), strict=True):
+        event, why = _detect_event(results.get(number) if number else None, refused)
         if event is not None and abs(event.t_start - what.start) > LATEST_START:
             why, event = _explain_start(event.t_start, what.start), None
         yield LoadEvent(
-            what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: "))
+            what,
+            number,
+            event,
+            _explain_worth(what, event, why.removeprefix(f"{source} dip {number}: ")),
         )
 
 
@@ -36,7 +39,7 @@ def _explain_start(start: float, fall: float) -> str:
     )
 
 
-def _event(result: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
+def _detect_event(result: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
     """The event of a record with what the detection noted of it, or why there is none."""
     if not isinstance(result, Record):
         return None, str(result or refused or "it is no dip")
@@ -47,7 +50,7 @@ def _event(result: Record | UserError | None, refused: str) -> tuple[Event | Non
         return None, str(error)
 
 
-def _numbers(changes: Sequence[Happening], dips: Sequence[FileDip]) -> list[int | None]:
+def _number_dips(changes: Sequence[Happening], dips: Sequence[FileDip]) -> list[int | None]:
     """For each happening the dip, counted from 1, that shares more of its time with it than with
     any other.
     """
@@ -60,7 +63,7 @@ def _numbers(changes: Sequence[Happening], dips: Sequence[FileDip]) -> list[int 
     return numbers
 
 
-def _why(what: Happening, event: Event | None, refused: str) -> str:
+def _explain_worth(what: Happening, event: Event | None, refused: str) -> str:
     """The reason why an event is (not) worth fitting: itself, or that it gives no record; and what
     the detection noted.
     """

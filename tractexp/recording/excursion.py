@@ -64,9 +64,9 @@ def _find_dead_beginning(trace: Trace, first: int) -> list[Excursion]:
     return [Excursion(0, end, -1.0, True, False, False, level, True)]
 
 
-def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
+def find_excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
     """All excursions, in order of time; `trigger` [s] is that of the recorder."""
-    levels, limits = _levels(trace)
+    levels, limits = _measure_levels(trace)
     if not levels.any() or len(trace.t) < 4:
         return []
     alive = levels.max(axis=0) > DEAD_VOLTAGE_SHARE * np.percentile(levels.max(axis=0), 95)
@@ -85,15 +85,15 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
             k += inside
             continue
         last = events[-1].end if events else 0
-        event = _one(trace, levels, limits, reference, k, last)
+        event = _find_excursion(trace, levels, limits, reference, k, last)
         slide = _find_slide(trace, event, k, count)
         events.append(slide or event)
         if slide is not None:
             k = slide.end
-            reference = _reference(levels, max(k - SLID, slide.start), SLID)
+            reference = _measure_reference(levels, max(k - SLID, slide.start), SLID)
             continue
         if not event.returned and event.end < len(trace.t):
-            reference = _reference(levels, event.end, count)
+            reference = _measure_reference(levels, event.end, count)
         k = event.end
         if event.returned:
             k, reference = _find_next_reference(trace, levels, limits, reference, k, count)
@@ -133,7 +133,7 @@ def _count_samples_inside(
     return count, references[:, count]
 
 
-def _levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
+def _measure_levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     """The positive sequence and each phase that is ever alive, and by how much of its reference
     each must leave it.
     """
@@ -146,7 +146,7 @@ def _levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     return levels, np.maximum(usual, NOISE_FACTOR * spread)
 
 
-def _one(
+def _find_excursion(
     trace: Trace,
     levels: np.ndarray,
     limits: np.ndarray,
@@ -165,8 +165,8 @@ def _one(
     crossed = (side * off[row] < -limits[row]) & (side * off < 0).any(axis=0)
     back = np.flatnonzero(inside | crossed)
     back = back[back * trace.step <= LONGEST_EXCURSION]
-    start = _onset(levels[row], reference[row], limits[row], k, earliest)
-    flat = _flat(levels, limits, k, trace.step)
+    start = _find_onset(levels[row], reference[row], limits[row], k, earliest)
+    flat = _find_flat_start(levels, limits, k, trace.step)
     leaves = len(back) and (
         inside[back[0]] or flat is None or k + back[0] - flat < FLAT / trace.step
     )
@@ -185,7 +185,7 @@ def _one(
         after = trace.U[end : end + max(2, round(REFERENCE / trace.step))]
         most = float(np.median(after)) / reference[0] - 1 if len(after) else most
     within = max(2, round(LONGEST_ABRUPT_CYCLES * trace.cycle / trace.step))
-    sudden = _fastest(
+    sudden = _measure_fastest_change(
         levels[row, max(start - 2, 0) : end + 1] / reference[row], within
     ) > 0.5 * max(np.abs(whole[row]).max(), limits[row])
     return Excursion(
@@ -193,7 +193,7 @@ def _one(
     )
 
 
-def _onset(level: np.ndarray, reference: float, limit: float, k: int, earliest: int) -> int:
+def _find_onset(level: np.ndarray, reference: float, limit: float, k: int, earliest: int) -> int:
     """The sample after the last one, not before `earliest`, that was still within a tenth of the
     threshold.
     """
@@ -201,13 +201,13 @@ def _onset(level: np.ndarray, reference: float, limit: float, k: int, earliest: 
     return earliest + int(near[-1]) + 1 if len(near) else k
 
 
-def _fastest(level: np.ndarray, within: int) -> float:
+def _measure_fastest_change(level: np.ndarray, within: int) -> float:
     """The greatest change within so many samples."""
     reach = min(within + 1, len(level))
     return float(np.ptp(np.lib.stride_tricks.sliding_window_view(level, reach), axis=1).max())
 
 
-def _flat(levels: np.ndarray, limits: np.ndarray, k: int, step: float) -> int | None:
+def _find_flat_start(levels: np.ndarray, limits: np.ndarray, k: int, step: float) -> int | None:
     """The first sample from k on after which the voltages stay level for a second, or to the end if
     that is nearer.
     """
@@ -237,10 +237,10 @@ def _find_next_reference(
         return k + int(inside[0]), reference
     if len(worse) and worse[0] * trace.step < FLAT:
         return k + int(worse[0]), reference
-    return k, _reference(levels, k, count)
+    return k, _measure_reference(levels, k, count)
 
 
-def _reference(levels: np.ndarray, k: int, count: int) -> np.ndarray:
+def _measure_reference(levels: np.ndarray, k: int, count: int) -> np.ndarray:
     """The level from sample k on; never zero, so that a phase that is dead there is far below what
     it becomes.
     """

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from tractexp.recording.connection import usual
+from tractexp.recording.connection import choose_usual_connection
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,6 @@ class Feeder:
         """The settings of a reader that reads this load."""
         result: dict[str, Any] = {"voltages": list(self.voltages), "currents": list(self.currents)}
         counts = len(self.voltages), len(self.currents)
-        if self.connection != usual(*counts, lines=counts[0] == 2):
+        if self.connection != choose_usual_connection(*counts, lines=counts[0] == 2):
             result["connection"] = self.connection
         return result | ({"reverse_current": True} if self.reverse_current else {})

@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.configuration.plugin import build_chosen
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.channel_group import list_names
-from tractexp.recording.connection import usual
+from tractexp.recording.connection import choose_usual_connection
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.label import Group, words
 from tractexp.recording.recording import Recording
@@ -32,7 +32,7 @@ def list_feeders(
     """
     feeders = []
     for bus, why in find_voltages(recording, phasors, load, buses, level):
-        voltages, connection = _connection(load, bus)
+        voltages, connection = _choose_connection(load, bus)
         said = [
             f"currents {list_names(recording, load.numbers)}: {load.evidence}",
             f"voltages {list_names(recording, bus.numbers)}: {why}",
@@ -84,13 +84,13 @@ def _size_of(recording: Recording, phasors: Snapshots, feeder: Feeder) -> str:
     return f"{U:.4g} kV, P = {S.real:.4g} MW, Q = {S.imag:.4g} Mvar"
 
 
-def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
+def _choose_connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
     """(the voltages used, the connection that makes phase quantities of them)."""
     voltages = bus.numbers
-    connection = usual(len(voltages), len(load.numbers), bus.pairs)
+    connection = choose_usual_connection(len(voltages), len(load.numbers), bus.pairs)
     if connection is None:  # three line-to-line voltages and two currents: two of them say the same
         voltages = voltages[:2]
-        connection = usual(2, len(load.numbers), bus.pairs)
+        connection = choose_usual_connection(2, len(load.numbers), bus.pairs)
     settings: dict[str, Any] = {} if isinstance(connection, str) else {**connection}
     if load.missing not in (None, 1):
         settings["phases"] = "abc".replace("abc"[load.missing], "")
@@ -149,7 +149,7 @@ def _follow_voltages(
     """The voltages that the currents of a load follow best, one of the `ties` of names where it
     follows as well; several where another of these does.
     """
-    stray = {id(bus): _stray(phasors, bus, load) for bus in buses}
+    stray = {id(bus): _measure_stray_current(phasors, bus, load) for bus in buses}
     best = min(buses, key=lambda bus: stray[id(bus)])
     # one of those whose names say as much
     if LARGEST_RESIDUAL_SHARE * min(stray[id(bus)] for bus in ties) <= stray[id(best)]:
@@ -172,7 +172,7 @@ def _named_alike(
     one group).
     """
     texts = [
-        phasors.remember(("text", *g.numbers), lambda g=g: _text(recording, g))
+        phasors.remember(("text", *g.numbers), lambda g=g: _list_shared_words(recording, g))
         for g in (load, *buses)
     ]
     own = sorted(texts[0])
@@ -189,7 +189,7 @@ def _named_alike(
     return ties, f"their names share '{' '.join(shared)}' with the currents'"
 
 
-def _text(recording: Recording, group: Group) -> set[str]:
+def _list_shared_words(recording: Recording, group: Group) -> set[str]:
     """The words that all channels of a group share, by which voltages and currents are matched."""
     channels = [recording.channels[i] for i in group.numbers]
     shared = set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
@@ -198,7 +198,7 @@ def _text(recording: Recording, group: Group) -> set[str]:
     return shared
 
 
-def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
+def _compute_positive_sequence(X: np.ndarray, pairs: bool) -> np.ndarray:
     """Positive sequence (M,) of three phasors; of two line voltages that which they say, to a
     constant factor.
     """
@@ -209,15 +209,15 @@ def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
 
 def _measure_difference(phasors: Snapshots, a: Group, b: Group) -> float:
     """How far two groups of voltages differ at worst, as a share of the larger."""
-    x, y = (_positive(phasors.select_channels(g.numbers), g.pairs) for g in (a, b))
+    x, y = (_compute_positive_sequence(phasors.select_channels(g.numbers), g.pairs) for g in (a, b))
     return float(np.nanmax(np.abs(x - y)) / max(np.nanmax(np.abs(x)), 1e-12))
 
 
-def _stray(phasors: Snapshots, bus: Group, load: Group) -> float:
+def _measure_stray_current(phasors: Snapshots, bus: Group, load: Group) -> float:
     """Norm of the currents' residual about a constant admittance at these voltages."""
     v, i = (
-        _positive(phasors.select_channels(bus.numbers), bus.pairs),
-        _positive(phasors.select_channels(load.numbers), False),
+        _compute_positive_sequence(phasors.select_channels(bus.numbers), bus.pairs),
+        _compute_positive_sequence(phasors.select_channels(load.numbers), False),
     )
     valid = np.isfinite(v) & np.isfinite(i)
     v, i = v[valid], i[valid]

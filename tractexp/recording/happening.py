@@ -21,7 +21,7 @@ from tractexp.recording.excursion import (
     LONGEST_ABRUPT_CYCLES,
     SLID,
     Excursion,
-    excursions,
+    find_excursions,
 )
 from tractexp.recording.pole_slip import find_pole_slips, is_swing_of_slip
 from tractexp.recording.static_exponent import StaticExponent, find_exponents
@@ -77,7 +77,7 @@ def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]
         )
         return [replace(_describe(trace, "dead line", whole, []), why=NO_SYSTEM)]
     slips = find_pole_slips(trace)
-    outside = [e for e in excursions(trace, trigger) if not _is_within(trace, e, slips)]
+    outside = [e for e in find_excursions(trace, trigger) if not _is_within(trace, e, slips)]
     lasting = _extend_lasting_falls(trace, outside)
     spans = [(kind, part) for e in lasting for kind, part in divide_by_kind(trace, e)]
     spans += [("pole slip", slip) for slip in slips]
@@ -181,8 +181,8 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     # of what follows another event at once, the state before is that before both
     onset = min((a for a, b in bounds if b == e.start and a < e.start), default=e.start)
     begin = max((b for _, b in bounds if b <= onset), default=0)
-    before = _power(trace, max(begin, onset - count - 1), max(onset - 1, begin))
-    after = _power(trace, min(e.end + 1, stop), min(e.end + 1 + count // 2, stop))
+    before = _average_power(trace, max(begin, onset - count - 1), max(onset - 1, begin))
+    after = _average_power(trace, min(e.end + 1, stop), min(e.end + 1 + count // 2, stop))
     inside = slice(e.start, max(e.end, e.start + 1))
     extreme = np.max if e.worst > 0 else np.min
     depth = -e.worst if e.new_level or e.dead else 1 - float(extreme(trace.U[inside])) / e.reference
@@ -210,7 +210,7 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     )
 
 
-def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
+def _average_power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
     """Mean P and Q; nan without samples."""
     P, Q = trace.P[first:stop], trace.Q[first:stop]
     valid = np.isfinite(P) & np.isfinite(Q)

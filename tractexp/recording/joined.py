@@ -56,7 +56,7 @@ def _align(recordings: Sequence[Recording]) -> Alignment:
     if all(len(each.segments) == 1 for each in recordings):
         return align([_describe_samples(each) for each in recordings])
     for each in recordings:
-        if [*map(_shape, each.segments)] != [*map(_shape, first.segments)]:
+        if [*map(_describe_segment, each.segments)] != [*map(_describe_segment, first.segments)]:
             raise UserError(
                 f"{each.source} has other stretches of samples than {first.source}: files of one"
                 " event that have several rates, or gaps, are joined where all have the same; read"
@@ -74,7 +74,7 @@ def _align(recordings: Sequence[Recording]) -> Alignment:
     return Alignment([0] * count, [0.0] * count, first.samples, (said,))
 
 
-def _shape(segment: Segment) -> tuple[float, ...]:
+def _describe_segment(segment: Segment) -> tuple[float, ...]:
     """The numbers that segments of files must share to be joined without moving a sample."""
     return segment.first, segment.stop, round(segment.rate, 3), round(segment.start, 6)
 
@@ -98,7 +98,9 @@ def _cut_common(recording: Recording, aligned: Alignment, k: int) -> Recording:
     part = slice(first, first + aligned.count)
     return replace(
         recording,
-        channels=[_move(channel, first, aligned.count, late) for channel in recording.channels],
+        channels=[
+            _move_channel(channel, first, aligned.count, late) for channel in recording.channels
+        ],
         status=[replace(status, raw=status.raw[part]) for status in recording.status],
         segments=[Segment(0, aligned.count, segment.rate, 0.0)],
         start=recording.start and recording.start + timedelta(seconds=gone),
@@ -107,7 +109,7 @@ def _cut_common(recording: Recording, aligned: Alignment, k: int) -> Recording:
     )
 
 
-def _move(channel: Channel, first: int, count: int, late: float) -> Channel:
+def _move_channel(channel: Channel, first: int, count: int, late: float) -> Channel:
     """A channel at other instants: as it was stored, where these are those of samples."""
     if abs(late) <= SAME_INSTANT:
         return replace(channel, raw=channel.raw[first : first + count])

@@ -58,8 +58,8 @@ def _find_closed_sum(
     X = X[:, :, np.isfinite(X).all(axis=(0, 1))]
     if not X.size:
         return None
-    tried = _signs(len(loaded))
-    closes = _closures(X.reshape(len(X), -1), tried)
+    tried = _list_signs(len(loaded))
+    closes = _measure_closures(X.reshape(len(X), -1), tried)
     closed = closes < np.where((tried == 1).all(axis=1), CLOSES, CLOSES_CHANGED)
     if not closed.any():
         return None
@@ -68,7 +68,7 @@ def _find_closed_sum(
     return tried[simple], float(closes[simple])
 
 
-def _signs(count: int) -> np.ndarray:
+def _list_signs(count: int) -> np.ndarray:
     """Signs (T, count) that are tried: all as they are, one left out or turned round, and two left
     out of five.
     """
@@ -82,7 +82,7 @@ def _signs(count: int) -> np.ndarray:
     return signs[np.count_nonzero(signs, axis=1) >= 3]
 
 
-def _closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
+def _measure_closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
     """Sums (T,) of currents (F, M) over the sums of their magnitudes, by signs (T, F), root mean
     square over time.
     """

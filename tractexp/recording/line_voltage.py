@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import DATA, UserError
 from tractexp.record.phasor import sequences
-from tractexp.recording.connection import usual
+from tractexp.recording.connection import choose_usual_connection
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.label import backward, groups, is_to_ground, kind, name_channel, order
 from tractexp.recording.live_phasors import (
@@ -56,12 +56,14 @@ def take_lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
 
 def is_taken_to_ground(feeder: Feeder) -> bool:
     """Whether three voltages are taken as they stand, to ground."""
-    return len(feeder.voltages) == 3 and feeder.connection == usual(3, len(feeder.currents))
+    return len(feeder.voltages) == 3 and feeder.connection == choose_usual_connection(
+        3, len(feeder.currents)
+    )
 
 
 def name_line_connection(feeder: Feeder) -> Any:
     """The connection of the same channels with the voltages between phases."""
-    return usual(len(feeder.voltages), len(feeder.currents), lines=True)
+    return choose_usual_connection(len(feeder.voltages), len(feeder.currents), lines=True)
 
 
 def check_lines(recording: Recording, feeder: Feeder) -> None:
@@ -102,11 +104,11 @@ def explain_lines_by_shape(recording: Recording, feeder: Feeder, live: LivePhaso
             "the voltages add up to zero even in a fault to earth, where the currents do not:"
             f" {used}"
         )
-    size = _level(recording, feeder.voltages)
-    for numbers, other in _levels(recording):
+    size = _measure_level(recording, feeder.voltages)
+    for numbers, other in _measure_levels(recording):
         alike = abs(size / max(other, 1e-12) / np.sqrt(3) - 1) < 5 * ROOT3
         alike &= {*numbers}.isdisjoint(feeder.voltages)
-        if alike and _root3(recording, feeder.voltages, numbers):
+        if alike and _are_differences(recording, feeder.voltages, numbers):
             others = ", ".join(name_channel(recording, i) for i in numbers)
             return (
                 f"the voltages are sqrt 3 times, and 30 degrees ahead of, those of {others}: {used}"
@@ -117,7 +119,7 @@ def explain_lines_by_shape(recording: Recording, feeder: Feeder, live: LivePhaso
     return ""
 
 
-def _levels(recording: Recording) -> list[tuple[tuple[int, ...], float]]:
+def _measure_levels(recording: Recording) -> list[tuple[tuple[int, ...], float]]:
     """The voltages to ground of a recording, three by three, with their median
     positive sequence.
     """
@@ -126,11 +128,13 @@ def _levels(recording: Recording) -> list[tuple[tuple[int, ...], float]]:
         three = [
             group.numbers for group in groups(volts) if len(group.numbers) == 3 and not group.pairs
         ]
-        _known_levels[recording] = [(numbers, _level(recording, numbers)) for numbers in three]
+        _known_levels[recording] = [
+            (numbers, _measure_level(recording, numbers)) for numbers in three
+        ]
     return _known_levels[recording]
 
 
-def _level(recording: Recording, numbers: Sequence[int]) -> float:
+def _measure_level(recording: Recording, numbers: Sequence[int]) -> float:
     """Median positive sequence of three voltages while they are alive; 0 where they have no
     waveform.
     """
@@ -141,7 +145,7 @@ def _level(recording: Recording, numbers: Sequence[int]) -> float:
     return float(np.median(size[size >= LEAST_LIVE_SEQUENCE * size.max()]))
 
 
-def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> bool:
+def _are_differences(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> bool:
     """Whether three voltages are the differences of three others."""
     windows = snapshots(recording, [*ours, *theirs])
     if windows is None:

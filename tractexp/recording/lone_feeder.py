@@ -10,7 +10,7 @@ from tractexp.recording.channel_group import (
     list_names,
     select_free,
 )
-from tractexp.recording.connection import usual
+from tractexp.recording.connection import choose_usual_connection
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.feeder_voltage import add_question, find_voltages
 from tractexp.recording.label import Group, order, shared_name
@@ -52,7 +52,7 @@ def list_railway_feeders(
     arms = [contact_first(recording, pair) for pair in opposite_pairs(phasors, volts)]
     if not arms and len(volts) == 1:
         arms = [(volts[0],)]
-    if not arms or usual(len(arms[0]), 2) is None:
+    if not arms or choose_usual_connection(len(arms[0]), 2) is None:
         return []
     buses = [Group(arm, False, "", False, "") for arm in arms]
     options = []
@@ -81,7 +81,7 @@ def _build_conductor_feeder(
     )
     currents = list_names(recording, load.numbers)
     said = [of, f"the currents {currents} are those of its two conductors"]
-    connection = usual(len(bus.numbers), 2)
+    connection = choose_usual_connection(len(bus.numbers), 2)
     if inward:
         settings = {"name": connection} if isinstance(connection, str) else connection
         connection = {**settings, "feeder": "inward"}
@@ -120,7 +120,14 @@ def list_single_feeders(
             parts = [part for part in (MAYBE_HALF, HALF, ONE_PHASE) if part in " ".join(said)]
             name = f"{group.name} ({parts[0]})" if parts else group.name
             feeders.append(
-                Feeder(bus.numbers, (i,), usual(1, 1), name=name, why=said, loaded=loaded)
+                Feeder(
+                    bus.numbers,
+                    (i,),
+                    choose_usual_connection(1, 1),
+                    name=name,
+                    why=said,
+                    loaded=loaded,
+                )
             )
         single.append(add_question(recording, phasors, feeders))
     return single
@@ -171,7 +178,7 @@ def _half_at(
     lacks = f"no current goes with the other voltage, {list_names(recording, volts[1:])}"
     pure = [i for i in amps if phasors.pure(i)]
     other = unnamed_conductor(recording, phasors, current, pure)
-    connection = usual(2, 2)
+    connection = choose_usual_connection(2, 2)
     if other is None or not isinstance(connection, str):
         return f"{HALF}: {lacks}"
     first, second = sorted((current, other))

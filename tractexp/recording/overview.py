@@ -150,11 +150,13 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
         return View(source, node, [sight_of(record) for record in (*read.train, *read.validate)])
     recording = reader.open_recording()
     if reader.voltages or reader.currents:
-        return View(source, node, [sight(reader, recording, reader.feeder(recording))], recording)
-    return View(source, node, overview(reader, recording), recording)
+        return View(
+            source, node, [describe_load(reader, recording, reader.feeder(recording))], recording
+        )
+    return View(source, node, describe_loads(reader, recording), recording)
 
 
-def _arrange(
+def _arrange_currents(
     recording: Recording, feeder: Feeder, is_examined: bool
 ) -> tuple[Feeder, tuple[str, ...]]:
     """A feeder with its currents in order, where it `is_examined`; and why that cannot be, at most
@@ -167,7 +169,7 @@ def _arrange(
         return feeder, (str(error),)
 
 
-def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
+def describe_loads(reader: WaveformReader, recording: Recording) -> list[Sight]:
     """The loads of a recording as they are proposed, each with what happened to it; `reader` is
     that of its file.
     """
@@ -176,21 +178,23 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
         for feeder in propose(recording)
     ]
     if not feeders:
-        return [sight(reader, recording, bus) for bus in buses_alone(recording)]
+        return [describe_load(reader, recording, bus) for bus in buses_alone(recording)]
     loaded = any(feeder.loaded for feeder in feeders)
     sights = []
     buses = dict[str, _Bus]()
     for proposed in feeders:
-        feeder, said = _arrange(recording, proposed, proposed.loaded or not loaded)
+        feeder, said = _arrange_currents(recording, proposed, proposed.loaded or not loaded)
         bus = buses.setdefault(str((feeder.voltages, feeder.connection)), _Bus())
-        shown = sight(reader, recording, feeder, feeder.loaded or not loaded, bus)
+        shown = describe_load(reader, recording, feeder, feeder.loaded or not loaded, bus)
         shown = replace(shown, said=(*said, *shown.said))
         sights.append(_refuse_events(shown, said[0]) if said else shown)
     return describe_directions(sights)
 
 
 def _refuse_events(shown: Sight, reason: str) -> Sight:
-    """A load whose channels make no sense: no command reads it, whatever happened to it."""
+    """The view of a load whose channels make no sense: each event says that it gives no record, and
+    why.
+    """
     events = (
         replace(each, event=None, why=f"it gives no record: {reason}") if each.worth else each
         for each in shown.events
@@ -248,7 +252,7 @@ def _cut_dips(
         return [], str(error)
 
 
-def sight(
+def describe_load(
     reader: WaveformReader,
     recording: Recording,
     feeder: Feeder,
@@ -300,7 +304,7 @@ def sight(
         dead_phases=" and ".join("abc"[k] for k in dead),
         type_test=_find_type_test(phasors, recording.frequency) if feeder.currents else None,
     )
-    return replace(shown, said=(*said, *_improbable(reader.path, shown)))
+    return replace(shown, said=(*said, *_explain_improbable(reader.path, shown)))
 
 
 def _find_type_test(phasors: Sequence[Phasors], nominal: float) -> TypeTest | None:
@@ -321,7 +325,7 @@ def _describe_slow_segments(recording: Recording) -> str:
     )
 
 
-def _improbable(where: str, shown: Sight) -> list[str]:
+def _explain_improbable(where: str, shown: Sight) -> list[str]:
     """A sentence on a load that no network feeds; [] for others."""
     try:
         known = shown.feeder is not None and shown.feeder.loaded and not shown.secondary

@@ -167,8 +167,9 @@ def spell_marks(name: str, letters: str) -> tuple[str, bool]:
 
 
 def _find_mark(text: str, letters: str) -> PhaseMark | None:
-    """The mark of a name; where U and V are phases, the first letter may be that of the quantity (U
-    U-V, V_W).
+    """The part of a channel's name that says its phases; None where none does.
+
+    Where U and V are phases, a first U or V may stand for the voltage: `U U-V` is between U and V.
     """
     quantity = (
         re.search(r"(?<![a-z])[uv][ _(]*(?=[a-z])", text) if letters.lower() == "uvw" else None

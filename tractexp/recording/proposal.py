@@ -14,7 +14,7 @@ from tractexp.recording.channel_group import (
     list_waves,
     select_free,
 )
-from tractexp.recording.connection import usual
+from tractexp.recording.connection import choose_usual_connection
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.feeder_voltage import are_dead, list_feeders
 from tractexp.recording.kirchhoff import closed_sums
@@ -90,7 +90,7 @@ def buses_alone(recording: Recording) -> list[Feeder]:
     why = (_why_alone(recording),)
     names = [recording.channels[i].name.strip() for i in alone]
     return feeders + [
-        Feeder((i,), (), usual(1, 1), name=name, why=why, loaded=False)
+        Feeder((i,), (), choose_usual_connection(1, 1), name=name, why=why, loaded=False)
         for i, name in zip(alone, names, strict=True)
     ]
 
@@ -117,7 +117,12 @@ def _bus_alone(recording: Recording, phasors: Snapshots, group: Group) -> Feeder
             said.append("they turn in the order a, c, b")
     name = group.name or "the voltages"
     return Feeder(
-        numbers, (), usual(len(numbers), 3, group.pairs), name=name, why=tuple(said), loaded=False
+        numbers,
+        (),
+        choose_usual_connection(len(numbers), 3, group.pairs),
+        name=name,
+        why=tuple(said),
+        loaded=False,
     )
 
 

@@ -17,14 +17,14 @@ from tractexp.record.dips import (
     check_numbers,
     chosen,
     cut_dips,
-    leave_out,
+    leave_out_bridged,
     level,
 )
 from tractexp.record.phasor import Phasors, join_phasors
 from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arrange_feeder, tune_frequency
 from tractexp.recording.bridge import bridge_recording
-from tractexp.recording.connection import usual
+from tractexp.recording.connection import choose_usual_connection
 from tractexp.recording.estimator import estimator_of
 from tractexp.recording.event_files import check_joined, event_paths
 from tractexp.recording.feeder import Feeder
@@ -216,7 +216,7 @@ class WaveformReader(Reader):
             more=phasors.more,
             waves=waves[0] if len(waves) == 1 else None,
         )
-        return leave_out(whole, phasors.bridged, window.length / 2)
+        return leave_out_bridged(whole, phasors.bridged, window.length / 2)
 
     def _numbers(
         self, recording: Recording, key: str, connection: str, wanted: int
@@ -269,7 +269,7 @@ class WaveformReader(Reader):
         ]
         labels = order(channels) if counts[0] == 2 else None
         two = counts[0] == 2 and not (labels and not labels[1])
-        return usual(*counts, lines=two) or usual(3, 3)
+        return choose_usual_connection(*counts, lines=two) or choose_usual_connection(3, 3)
 
     def _only(self, recording: Recording) -> Feeder:
         """The only load that the file shows. Raises `UserError` naming all, where

@@ -130,7 +130,7 @@ def _list_offered() -> dict[str, set[str]]:
 
 def _schema_of(group: str, name: str) -> type:
     """The dataclass that a plugin's configuration is checked against."""
-    return plugin.schema(plugin.get(group, name))
+    return plugin.make_schema(plugin.get(group, name))
 
 
 def _own_folders(arguments: Sequence[str]) -> list[Path]:

@@ -8,13 +8,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from tractexp.cache import provenance
-from tractexp.configuration.composition import texts
+from tractexp.configuration.composition import list_texts
 from tractexp.errors import UserError
 from tractexp.storage import files
 from tractexp.storage.files import locate_file
 
 
-def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
+def hash_configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
     """SHA-256 of a job's settings. Where it is logged and what it returns do not belong to what it
     does.
     """
@@ -22,11 +22,11 @@ def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
     return _digest(json.dumps([settings, dict(choices)], sort_keys=True, default=str).encode())
 
 
-def inputs(config: Mapping[str, Any]) -> str:
+def hash_inputs(config: Mapping[str, Any]) -> str:
     """SHA-256 of the installed code, plugins of all packages included, and of the data files the
     job names.
     """
-    named = sorted(set(texts(config.get("data") or {})))
+    named = sorted(set(list_texts(config.get("data") or {})))
     return _digest("".join([provenance.code(), *map(_file, named)]).encode())
 
 

@@ -118,7 +118,7 @@ class Cores(Launcher):
 
     def run(self, jobs: Sequence[SweepJob], recorder: Recorder) -> list[Status]:
         """Run all jobs, have each logged, and return how they ended, in their order."""
-        warm(jobs)
+        compile_kernels(jobs)
         if self.workers.backend in FORKING:
             recorder.parent()
         callbacks = self.hydra_context.callbacks
@@ -147,7 +147,7 @@ class Cores(Launcher):
         What workers of a cluster have done comes through it: they may share no disk with this one.
         """
         if self.workers.backend not in DISTANT:
-            yield from self.workers.results(work, jobs, self.tries, _trace)
+            yield from self.workers.results(work, jobs, self.tries, _find_end)
             return
         packed = [pack_job(job) for job in jobs]
         results = self.workers.results(work_elsewhere, packed, self.tries)
@@ -166,7 +166,7 @@ class Cores(Launcher):
         return end
 
 
-def _trace(job: SweepJob) -> Status | bool:
+def _find_end(job: SweepJob) -> Status | bool:
     """The end that a job has written whose worker did not answer, or whether it had begun."""
     state = status.read_newest(job.folder)
     if state is not None and state.status in ENDED:
@@ -180,7 +180,7 @@ def _has_ended(folder: Path) -> bool:
     return state is not None and state.status == FINISHED
 
 
-def warm(jobs: Sequence[SweepJob]) -> None:
+def compile_kernels(jobs: Sequence[SweepJob]) -> None:
     """Compile the kernels of the jobs' models, once for each, so that the workers find them on
     disk.
     """

@@ -67,7 +67,7 @@ def _find_own_folder(folder: Path, job: SweepJob, taken: set[Path], above: set[P
     return there
 
 
-def placement(job: SweepJob) -> list[str]:
+def list_placing_overrides(job: SweepJob) -> list[str]:
     """The overrides by which any launcher of Hydra's puts a job into its folder."""
     return [
         f"hydra.sweep.dir={quoting.hydra(str(job.sweep))}",

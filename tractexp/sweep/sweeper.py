@@ -31,7 +31,7 @@ from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.live import PAGE, LivePage, keep_live
 from tractexp.sweep.parent import parent_run
-from tractexp.sweep.placing import await_end, is_finished, place, placement, settle
+from tractexp.sweep.placing import await_end, is_finished, list_placing_overrides, place, settle
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, INTERRUPTED
 from tractexp.text.progress import say
@@ -135,8 +135,8 @@ class Grid(Sweeper):
 
     def _conclude(self, jobs: Sequence[SweepJob], comparison: Any) -> None:
         """Compare the variants, where there is something to compare, and say which jobs failed."""
-        if comparison is None or not comparable(jobs):
-            summary(jobs)
+        if comparison is None or not is_comparable(jobs):
+            print_summary(jobs)
             first = jobs[0]
             pages = sorted(first.folder.glob("*.html")) if first.alone else [first.sweep / PAGE]
             for page in filter(Path.is_file, pages):
@@ -149,13 +149,13 @@ class Grid(Sweeper):
             if self.page is not None:
                 self.page.write("ended")  # and leads to the comparison
             self._open_page(folder / "comparison.html")
-        if failed := failures(jobs):
+        if failed := print_failures(jobs):
             raise UserError(failed)
 
     def _open_page(self, page: Path) -> None:
         """Show a page where that is wanted."""
         if self.open:
-            show(page)
+            open_page(page)
 
     def _run(self, jobs: Sequence[SweepJob], recorder: Recorder) -> None:
         """Run the jobs by the launcher; each has an end, whatever happens to its worker."""
@@ -168,7 +168,7 @@ class Grid(Sweeper):
                 self.launcher.run(jobs, recorder)
             else:
                 recorder.parent()  # which the jobs look up themselves
-                batch = [[*job.overrides, *placement(job)] for job in jobs]
+                batch = [[*job.overrides, *list_placing_overrides(job)] for job in jobs]
                 self.launcher.launch(batch, initial_job_idx=0)
         except KeyboardInterrupt as stop:
             end = INTERRUPTED
@@ -206,7 +206,7 @@ def values_of(override: Override) -> list[str]:
     return values
 
 
-def comparable(jobs: Sequence[SweepJob]) -> bool:
+def is_comparable(jobs: Sequence[SweepJob]) -> bool:
     """Whether a sweep holds several variants under several seeds, of which more than one job has
     ended well.
     """
@@ -218,7 +218,7 @@ def comparable(jobs: Sequence[SweepJob]) -> bool:
     return len(list(itertools.islice(ended, 2))) > 1
 
 
-def show(page: Path) -> None:
+def open_page(page: Path) -> None:
     """Open a page in the browser of a desktop; a terminal elsewhere, or none, is left alone."""
     desktop = sys.platform in ("darwin", "win32") or any(
         map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))
@@ -227,7 +227,7 @@ def show(page: Path) -> None:
         webbrowser.open(page.absolute().as_uri())
 
 
-def summary(jobs: Sequence[SweepJob]) -> None:
+def print_summary(jobs: Sequence[SweepJob]) -> None:
     """Print where the searches of a sweep ended, by variant and data."""
     common = find_shared_overrides(jobs)
     objectives: dict[str, list[float]] = {}
@@ -246,7 +246,7 @@ def summary(jobs: Sequence[SweepJob]) -> None:
         say("objectives in pu² at the end of the search, before the estimate is polished")
 
 
-def failures(jobs: Sequence[SweepJob]) -> str:
+def print_failures(jobs: Sequence[SweepJob]) -> str:
     """Print which jobs failed and why; returns the sentence of the error, "" where none did."""
     common = find_shared_overrides(jobs)
     ends = [(job, status.read(job.folder)) for job in jobs]

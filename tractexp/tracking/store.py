@@ -186,7 +186,7 @@ def sentences(uri: str) -> Iterator[None]:
     from mlflow.exceptions import MlflowException
 
     try:
-        with warnings.catch_warnings(), _silent("mlflow"):
+        with warnings.catch_warnings(), _silence_logger("mlflow"):
             warnings.simplefilter("ignore")
             yield
     except Exception as error:
@@ -204,7 +204,7 @@ def sentences(uri: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _silent(name: str) -> Iterator[None]:
+def _silence_logger(name: str) -> Iterator[None]:
     """Let a logger and those below it say nothing."""
     logger = logging.getLogger(name)
     level = logger.level

@@ -8,7 +8,7 @@ import keyword
 import re
 from pathlib import Path
 
-from tractexp.configuration.choices import choices
+from tractexp.configuration.choices import read_choices
 from tractexp.errors import UserError
 from tractexp.storage import files
 
@@ -79,7 +79,7 @@ def write_package(kind: str, name: str, folder: Path, source: Path | None = None
             f"'{name}' cannot be the name of a plugin, which is that of its file; take lower-case"
             " letters, digits and underscores, such as motor_heating"
         )
-    if taken := choices().get(group, {}).get(name):
+    if taken := read_choices().get(group, {}).get(name):
         raise UserError(
             f"the {group} '{name}' is there already ({taken.module or 'a configuration'}); take"
             " another name"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 from tractexp.api.arguments import Choice, public
 from tractexp.api.setup import Setup
 from tractexp.blocks import Table
-from tractexp.configuration.composition import leaves
+from tractexp.configuration.composition import list_leaves
 from tractexp.errors import UserError, among, check_distinct, check_range
 from tractexp.outcome import Written
 from tractexp.storage import files
@@ -229,7 +229,7 @@ def _describe_run(setup: Setup, choice: Choice, seed: int, end: Any) -> "SearchR
         "seed": seed,
     }
     names = " and ".join(event.record.name for event in setup.train)
-    run = SearchRun(choice.name, names, seed, dict(leaves(content)), f"seed {seed}")
+    run = SearchRun(choice.name, names, seed, dict(list_leaves(content)), f"seed {seed}")
     if isinstance(end, FailedSearch):
         return dataclasses.replace(run, failure=end.why)
     try:

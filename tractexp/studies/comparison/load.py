@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.configuration.composition import leaves
+from tractexp.configuration.composition import list_leaves
 from tractexp.errors import TASK, UserError
 from tractexp.identification.result import by_event, parse_history
 from tractexp.storage import files
@@ -188,7 +188,7 @@ def _yaml(path: Path) -> Any:
 
 def flat(node: Mapping[str, Any]) -> dict[str, Any]:
     """A nested configuration as {"optimizer.population": 50}, without mappings that are empty."""
-    return {key: value for key, value in leaves(node) if not isinstance(value, dict)}
+    return {key: value for key, value in list_leaves(node) if not isinstance(value, dict)}
 
 
 def nest_keys(flattened: Mapping[str, Any]) -> dict[str, Any]:

@@ -205,7 +205,7 @@ def claim_generalization(
             ]
             good[how] = CONFIRMED if max(errors) < ACCEPTED else REFUTED
             worst.append(f"{how} {percent(max(errors))}")
-            verdicts[how] = _has_lowest_residuals(study, {n: residuals[names[n]] for n in names})
+            verdicts[how] = _judge_residuals(study, {n: residuals[names[n]] for n in names})
             middle = {n: np.median(residuals[names[n]], axis=0) for n in names}
             pairs = (f"{LABELS[n]} {number(r[0])}, {number(r[1])}" for n, r in middle.items())
             phrases.append(f"{how} {', '.join(pairs)}")
@@ -229,8 +229,8 @@ def claim_generalization(
     return claims
 
 
-def _has_lowest_residuals(study: Study, residuals: Mapping[str, np.ndarray]) -> str:
-    """Whether ISSA's residuals (seeds, 2), of P and of Q, are lower than those of both others."""
+def _judge_residuals(study: Study, residuals: Mapping[str, np.ndarray]) -> str:
+    """The word on whether ISSA's residuals (seeds, 2), of P and Q, are lower than both others'."""
     rivals = [
         (residuals["issa"][:, c], residuals[name][:, c]) for name in ("ssa", "pso") for c in (0, 1)
     ]
