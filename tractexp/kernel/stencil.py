@@ -53,7 +53,7 @@ class Stencil:
 
     @functools.cached_property
     def _generated_code(self) -> tuple[str, int, int]:
-        """The LLVM text, and the first and last sample that it reads, counted from each one's own."""
+        """The LLVM text, and the first and last sample that it reads, counted from each one."""
         arrays = self.rows, self.shared, self.numbers, self.sums, self.shifts, self.onward
         settings = repr((self.expression.__qualname__, *arrays))
         description = text_in(
