@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import contextlib
 import os
 import shutil
 from pathlib import Path
@@ -126,15 +127,24 @@ def planted():
     return investigate(base(), dips[:2], dips[2:], {}, {}, only=FEW)
 
 
-@pytest.fixture
-def no_proposal(monkeypatch):
-    """What nothing explains is left without a term, for tests that look at none: a search takes
-    seconds.
+@contextlib.contextmanager
+def no_term_is_searched():
+    """Within it what nothing explains is left without a term, for tests that look at none: a search
+    takes seconds.
     """
     from tractexp.discrepancy.proposal.propose import ProposalResult
 
     result = ProposalResult(why="none is searched in this test")
-    monkeypatch.setattr("tractexp.discrepancy.investigate.propose", lambda *_: result)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tractexp.discrepancy.investigate.propose", lambda *_: result)
+        yield
+
+
+@pytest.fixture
+def no_proposal():
+    """A test of `no_term_is_searched`."""
+    with no_term_is_searched():
+        yield
 
 
 collect_ignore = ["process/acme"]  # a package of its own, whose tests run where it is installed

@@ -12,6 +12,7 @@ import pytest
 from tractexp.discrepancy.decide import decide
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
 from tractexp.discrepancy.gap import GapTest
+from tractexp.discrepancy.ranking import beats, find_nearest, rank_sets
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit
 
@@ -147,3 +148,22 @@ def test_the_page_s_own_numbers_give_the_verdict_that_it_tells():
             )
         )
     assert word(*rows) == ("named", (("undervoltage_trip",),))
+
+
+def test_however_much_a_set_that_survives_leaves_it_is_ahead_of_one_that_stalls():
+    """A set that stalls leaves all: no fit brings it before one that does not."""
+    blocks = np.ones(10)
+
+    def predicted(*names, squares, deviance, stalls=()):
+        error = PredictedError(squares, 0.01 * blocks, blocks, np.zeros(1), stalls)
+        return row(*names, deviance=deviance, prediction=error)
+
+    stalling = predicted("a", squares=np.inf * blocks, deviance=1.0, stalls=("dip3",))
+    surviving = predicted("b", squares=1e6 * blocks, deviance=1e6)
+    base = predicted(squares=np.inf * blocks, deviance=1e9, stalls=("dip3",))
+    table, criteria = Evidence(base, (stalling, surviving)), Criteria()
+    assert rank_sets(table, criteria) == [surviving, stalling]
+    assert find_nearest(table, criteria) is surviving
+    assert beats(surviving, stalling, criteria)
+    assert beats(surviving, base, criteria)
+    assert not beats(stalling, base, criteria)

@@ -7,15 +7,10 @@ import warnings
 
 import numpy as np
 import pytest
+from conftest import no_term_is_searched
 
 import tractexp
-from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
-from tractexp.discrepancy.proposal.propose import ProposalResult
-from tractexp.discrepancy.ranking import beats, find_nearest, rank_sets
 from tractexp.domain import domain_of
-from tractexp.inference.criteria import Criteria
-from tractexp.inference.fitting import Refit
-from tractexp.inference.model_error import ModelError, model_error
 from tractexp.model.drive import Drive
 from tractexp.model.model import LARGEST_OUTPUT
 from tractexp.report.discrepancy import gap
@@ -53,10 +48,8 @@ def dips():
 @pytest.fixture(scope="module")
 def stalled(dips):
     """The base model's motor stalls on the third dip; with a second group of motors it need not."""
-    no_term = ProposalResult(why="none is searched in this test")
-    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
+    with warnings.catch_warnings(), no_term_is_searched():
         warnings.simplefilter("error")
-        patch.setattr("tractexp.discrepancy.investigate.propose", lambda *_: no_term)
         return tractexp.investigate(
             dips[:2],
             validate=dips[2:],
@@ -141,9 +134,7 @@ def test_what_diverges_is_no_number(dips):
     assert np.isfinite(outputs[:, : event.start]).all()
     assert np.isnan(outputs[:, -1]).all()
     assert np.nanmax(np.abs(outputs)) <= LARGEST_OUTPUT
-    played = domain.comparison(event, outputs)
-    assert played.stalls
-    assert model_error([played]) == ModelError.of_stall(["dip3"])
+    assert domain.comparison(event, outputs).stalls
 
 
 def test_a_load_that_has_stopped_itself_does_not_stall_in_a_model_that_does_as_it_did(dips):
@@ -156,23 +147,3 @@ def test_a_load_that_has_stopped_itself_does_not_stall_in_a_model_that_does_as_i
     told = tractexp.read(t=record.t, U=record.U, P=stopped, Q=0.1 * stopped, name="stopped")[0]
     assert not domain.comparison(told, np.stack([stopped, 0.1 * stopped])).stalls
     assert not domain.comparison(event, np.stack([record.P, record.Q])).stalls
-
-
-def test_however_much_a_set_that_survives_leaves_it_is_ahead_of_one_that_stalls():
-    """A set that stalls leaves all: no fit brings it before one that does not."""
-    blocks = np.ones(10)
-
-    def row(names, squares, deviance, stalls=()):
-        prediction = PredictedError(squares, 0.01 * blocks, blocks, np.zeros(1), stalls)
-        fit = Refit(names, np.zeros(1), deviance, len(names))
-        return SetEvidence(fit, names, names, prediction=prediction)
-
-    stalling = row(("a",), np.inf * blocks, 1.0, ("dip3",))
-    surviving = row(("b",), 1e6 * blocks, 1e6)
-    base = row((), np.inf * blocks, 1e9, ("dip3",))
-    table, criteria = Evidence(base, (stalling, surviving)), Criteria()
-    assert rank_sets(table, criteria) == [surviving, stalling]
-    assert find_nearest(table, criteria) is surviving
-    assert beats(surviving, stalling, criteria)
-    assert beats(surviving, base, criteria)
-    assert not beats(stalling, base, criteria)
