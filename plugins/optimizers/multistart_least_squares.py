@@ -18,8 +18,8 @@ def latin_hypercube(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
     return (cells + rng.random((n, d))) / n
 
 
-def toward_walls(unit: np.ndarray) -> np.ndarray:
-    """Uniform coordinates made dense near the walls of the unit cube (arcsine distribution).
+def toward_bounds(unit: np.ndarray) -> np.ndarray:
+    """Uniform coordinates made dense near the bounds of the unit cube (arcsine distribution).
 
     Bounds of times and inertias span decades, and on a linear scale most of what they allow lies
     near the lower one.
@@ -29,7 +29,7 @@ def toward_walls(unit: np.ndarray) -> np.ndarray:
 
 @plugin
 class MultistartLeastSquares(Optimizer):
-    """A Latin hypercube, denser near the walls, then bounded least squares from its best points
+    """A Latin hypercube, denser near the bounds, then bounded least squares from its best points
     that lie apart.
 
     Descents are brief, best start first; the lowest so far goes on to the end, the others only
@@ -60,7 +60,7 @@ class MultistartLeastSquares(Optimizer):
         x, f = np.empty((0, box.dimension)), np.empty(0)
         for _ in range(CLOSER):
             unit = latin_hypercube(self.scatter, box.dimension, rng)
-            x, f = evaluate(box.from_unit(center + width * (toward_walls(unit) - 0.5)))
+            x, f = evaluate(box.from_unit(center + width * (toward_bounds(unit) - 0.5)))
             yield
             if f.min() < REFUSED:
                 break
