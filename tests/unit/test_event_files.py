@@ -222,11 +222,15 @@ def test_a_record_of_each_phase_is_one_of_three(tmp_path, names):
 
 
 def test_events_of_one_load_are_not_joined(tmp_path):
-    """Two events, each with its own voltages and currents, are two records."""
+    """Two events, each with its own voltages and currents, are two records: with a command of each
+    there is one that fits them together.
+    """
     names = ["UA", "UB", "UC", "IA", "IB", "IC"]
     paths = [write_comtrade(tmp_path / f"{k}.cfg", slice(0, 6), names) for k in ("rec_a", "rec_x")]
     seen = tractexp.look(*map(str, paths), progress=False)
-    assert len(seen.files.rows) == len(seen.commands) == 2
+    *single, joint = seen.commands
+    assert len(seen.files.rows) == len(single) == 2
+    assert "'data.train=[rec_a.cfg#1.1]' 'data.validate=[rec_x.cfg#1.1]'" in joint
 
 
 def test_names_tell_what_tells_files_apart():
