@@ -3,6 +3,9 @@ record's first sample is fitted beside the parameters. A steady load, and one th
 straight line, have no such start.
 """
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from made_starts import TRUTH, make_start
 
@@ -15,6 +18,16 @@ def identify(record):
     return tractexp.identify(
         [record], fixed={"q_v": TRUTH["q_v"]}, check_intervals=False, progress=False
     ).result
+
+
+@pytest.mark.parametrize("motor", ["none", "voltage"])
+def test_a_load_without_a_motor_whose_speed_moves_has_no_such_start(motor):
+    model = tractexp.compose(motor=motor)
+    found = tractexp.identify(
+        [make_start(0.12)], model, check_intervals=False, progress=False
+    ).result
+    assert any("the load drifts" in note for note in found.uncertainty["notes"])
+    assert found.unsteady_start == {}
 
 
 def on_given_base(result, values):
@@ -39,6 +52,14 @@ def test_its_speed_is_that_at_the_first_sample_and_a_steady_start_misses_the_res
     told = identify(make_start(0.15)).unsteady_start
     assert told["speeds"]["start"] == pytest.approx(-0.15, abs=0.005)
     assert told["error_without"] > 50
+
+
+def test_a_load_that_fades_away_at_the_end_tells_it_too():
+    record = make_start(0.12)
+    fading = np.clip((2.4 - record.t) / 0.6, 0.0, 1.0)
+    result = identify(replace(record, P=fading * record.P, Q=fading * record.Q))
+    found = on_given_base(result, result.unsteady_start["parameters"])
+    assert found["T_m"] == pytest.approx(TRUTH["T_m"], rel=0.02)
 
 
 @pytest.mark.parametrize("drift", [0.0, 0.02, 0.06])

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import sympy
 
-from tractexp.errors import UserError
 from tractexp.identification.fit import Fit, play
 from tractexp.identification.load_drift import find_load_drifts
 from tractexp.identification.uncertainty import Uncertainty
@@ -112,19 +111,21 @@ def find_unsteady_start(uncertainty: Uncertainty) -> StartFit | None:
 
 
 def _free_starts(problem: Problem) -> Problem | None:
-    """The problem with the starts of its events free; None for a motor without speed or flux."""
+    """The problem with the starts of its events free; None for a load without a motor whose speed
+    and flux move.
+    """
     model = problem.model
-    try:
-        started = Model(
-            model.motor,
-            model.static,
-            [*model.effects, UnsteadyStart()],
-            model.integration,
-            model.domain,
-            model.window,
-        )
-    except UserError:
+    own_states = [s for s in model.equations.states.values() if s.writer == OWN]
+    if not {"speed", "flux"} <= {s.role for s in own_states if s.derivative != 0}:
         return None
+    started = Model(
+        model.motor,
+        model.static,
+        [*model.effects, UnsteadyStart()],
+        model.integration,
+        model.domain,
+        model.window,
+    )
     own = [parameter.name for parameter in UnsteadyStart.parameters]
     return Problem(
         started,
