@@ -74,39 +74,44 @@ def _add_loads(page: Report, entry: Entry, loads: Table) -> None:
 
 
 def summary(content: Entry) -> Report:
-    """Which load and which dip to fit by which command, then a line for each file, bus and load."""
+    """Which load and dip to fit by which command, then a line for each file, bus and load."""
     page = _begin_with_answer(content).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
-        held = f"; {count_noun(len(entry['channels']), 'channel')}" if entry["channels"] else ""
-        page.text(
-            f"{_about(entry)}{held}",
-            *(f"  note: {note}" for note in entry["notes"][:NOTES]),
-        )
-        if len(entry["notes"]) > NOTES:
-            page.text(f"  note: {len(entry['notes']) - NOTES} more")
+        _add_file(page, entry)
         buses = _buses(entry["feeders"])
         page.text(
             *(f"  {_describe_bus(entry, number, bus)}" for number, bus in enumerate(buses, 1))
         )
         if buses:
             page.add(_loads(entry, buses))
-        unloaded = [feeder["name"] for feeder in entry["feeders"] if not feeder["loaded"]]
-        if unloaded and len(unloaded) < len(entry["feeders"]):
-            page.text(f"  {NO_LOAD}: {', '.join(unloaded)}")
-        page.items(
-            [
-                f"{feeder['name']}: {said}"
-                for feeder in entry["feeders"]
-                for said in feeder["why"]
-                if said.startswith(SAME_CURRENT) or (_worth(feeder) and said.startswith(MAYBE_SAME))
-            ]
-        )
-        page.items(
-            list(dict.fromkeys(said for feeder in entry["feeders"] for said in feeder["said"]))
-        )
-        if not buses and len(content["files"]) > 1:
+        elif len(content["files"]) > 1:
             page.text(f"  {explain_unnamed(entry)}")
+        _add_remarks(page, entry["feeders"])
     return page
+
+
+def _add_file(page: Report, entry: Entry) -> None:
+    """A line on a file, and its first notes."""
+    held = f"; {count_noun(len(entry['channels']), 'channel')}" if entry["channels"] else ""
+    notes = entry["notes"]
+    page.text(f"{_about(entry)}{held}", *(f"  note: {note}" for note in notes[:NOTES]))
+    if len(notes) > NOTES:
+        page.text(f"  note: {len(notes) - NOTES} more")
+
+
+def _add_remarks(page: Report, feeders: Sequence[Entry]) -> None:
+    """Which feeders have no load, which may be one load seen twice, and what is said of them."""
+    unloaded = [feeder["name"] for feeder in feeders if not feeder["loaded"]]
+    if unloaded and len(unloaded) < len(feeders):
+        page.text(f"  {NO_LOAD}: {', '.join(unloaded)}")
+    alike = [
+        f"{feeder['name']}: {said}"
+        for feeder in feeders
+        for said in feeder["why"]
+        if said.startswith(SAME_CURRENT) or (_worth(feeder) and said.startswith(MAYBE_SAME))
+    ]
+    page.items(alike)
+    page.items(list(dict.fromkeys(said for feeder in feeders for said in feeder["said"])))
 
 
 def build_full_report(content: Entry) -> Report:
@@ -143,26 +148,43 @@ def _begin_with_answer(content: Entry) -> Report:
 
 def _answer(files: Sequence[Entry]) -> str:
     """Which load and which dip are worth fitting, and the command; or why nothing is."""
+    best = _find_best(files)
+    if best is not None:
+        return _propose(best, files)
     feeders = [feeder for entry in files for feeder in entry["feeders"]]
-    promising = [feeder for feeder in feeders if _worth(feeder)]
-    if promising:
-        sure = [each for each in promising if not _may_be_another(each)] or promising
-        best = max(sure, key=lambda feeder: _measure_answer(_worth(feeder)[0]))
-        # the one fitted by it
-        best = next(feeder for feeder in promising if feeder["command"] == best["command"])
-        first = _worth(best)[0]
-        command = f"; to fit it: {best['command']}" if best["command"] else ""
-        secondary = SECONDARY if best.get("secondary") else ""
-        told = [f"is worth fitting{_reservation(first['why'])}", secondary, best.get("clipped")]
-        worth = "; ".join(filter(None, told))
-        own = (entry for entry in files if best in entry["feeders"])
-        beside = "".join(f"; {entry['proposed']}" for entry in own if entry.get("proposed"))
-        return f"{_event(first)} of {best['name']} {worth}{beside}{command}"
     tested = next((f for f in feeders if f.get("type_test")), None)
     told = f"{tested['name']} is {tested['type_test']['sentence']}" if tested else ""
-    refused = _refuse(files)
-    proposed = [entry["proposed"] for entry in files if entry.get("proposed")]
-    return "; ".join(filter(None, [told, refused, *proposed]))
+    return "; ".join(filter(None, [told, _refuse(files), *_list_proposed(files)]))
+
+
+def _find_best(files: Sequence[Entry]) -> Entry | None:
+    """The load whose first dip tells most, of those that are none seen twice; None where none is
+    worth fitting.
+    """
+    feeders = [feeder for entry in files for feeder in entry["feeders"]]
+    promising = [feeder for feeder in feeders if _worth(feeder)]
+    if not promising:
+        return None
+    sure = [each for each in promising if not _may_be_another(each)] or promising
+    best = max(sure, key=lambda feeder: _measure_answer(_worth(feeder)[0]))
+    # of loads that one command fits, the one whose dip is fitted
+    return next(feeder for feeder in promising if feeder["command"] == best["command"])
+
+
+def _propose(best: Entry, files: Sequence[Entry]) -> str:
+    """That the first dip of a load is worth fitting, with reservations and the command."""
+    first = _worth(best)[0]
+    secondary = SECONDARY if best.get("secondary") else ""
+    worth = f"is worth fitting{_reservation(first['why'])}"
+    own = [entry for entry in files if best in entry["feeders"]]
+    command = f"to fit it: {best['command']}" if best["command"] else ""
+    told = [worth, secondary, best.get("clipped"), *_list_proposed(own), command]
+    return f"{_event(first)} of {best['name']} {'; '.join(filter(None, told))}"
+
+
+def _list_proposed(files: Sequence[Entry]) -> list[str]:
+    """That files beside these are of the same event, with the commands."""
+    return [entry["proposed"] for entry in files if entry.get("proposed")]
 
 
 def _may_be_another(feeder: Entry) -> bool:
