@@ -43,9 +43,11 @@ def build_joint_command(views: Sequence[View]) -> dict[str, Any] | None:
     Loads are one where number, name, channels and reader are the same: of tables without names of
     loads the reader of the screen judges.
     """
+    if not all(map(_is_plain_file, views)):
+        return None
     folders = {Path(view.source).parent for view in views}
     dips = _dips_of_commonest_load(views)
-    if len(folders) > 1 or len(dips) < 2 or not all(map(_is_plain_file, views)):
+    if len(folders) > 1 or len(dips) < 2:
         return None
     telling = heapq.nlargest(MOST_TOGETHER, dips, key=lambda dip: dip.weight)
     *fitted, held_out = [dip.name for dip in dips if dip in telling]
