@@ -75,6 +75,7 @@ def write_page(rows: Rows, path: Path) -> str:
     page = Report("The benchmark: dips that no method saw", describe_seeds(rows))
     page.table(COLUMNS, table, CAPTION)
     page.table(["method", *GROUPS], compare_groups(rows), "Median error of unused dips.")
+    page.table(["method", *GROUPS], compare_bands(rows), "Worst samples that the band held.")
     chart = Chart("error of an unused dip [%]", ["share of dips"], pixels=420)
     for k, own in enumerate(split_by_method(rows)):
         errors = np.sort(collect_errors(own))
@@ -98,9 +99,9 @@ def make_tables(rows: Rows) -> str:
     """The tables of stored rows, Markdown."""
     table = [summarize(own) for own in split_by_method(rows)]
     groups = marked.table(["median error of unused dips", *GROUPS], compare_groups(rows))
-    return "\n\n".join(
-        filter(None, [describe_seeds(rows), marked.table(COLUMNS, table), groups, CAPTION])
-    )
+    bands = marked.table(["worst samples that the band held", *GROUPS], compare_bands(rows))
+    parts = [describe_seeds(rows), marked.table(COLUMNS, table), groups, bands, CAPTION]
+    return "\n\n".join(filter(None, parts))
 
 
 def split_by_method(rows: Rows) -> list[Rows]:
@@ -118,10 +119,31 @@ def compare_groups(rows: Rows) -> list[list[str]]:
     return table
 
 
+def compare_bands(rows: Rows) -> list[list[str]]:
+    """A row a method that gives bands: how many worst samples these held in each group of cases."""
+    table = []
+    for own in split_by_method(rows):
+        cells = [describe_held(filter(is_there, own)) for is_there in GROUPS.values()]
+        if any(cells):
+            table.append([own[0]["method"], *cells])
+    return table
+
+
+def describe_held(rows: Iterable[dict[str, Any]]) -> str:
+    """The share of worst samples that bands held, and of how many; "" without bands."""
+    held = collect_held(rows)
+    return f"{np.mean(held):.0%} of {len(held)}" if held else ""
+
+
+def collect_held(rows: Iterable[dict[str, Any]]) -> list[bool]:
+    """Whether the band held the worst sample of P and of Q of each unused dip."""
+    return [one for row in rows for dip in row.get("dips", ()) for one in dip["held"] or ()]
+
+
 def measure(rows: Rows) -> dict[str, float]:
     """What a method reached, as numbers; a share of nothing is nan."""
     errors = collect_errors(rows)
-    held = [one for row in rows for dip in row.get("dips", ()) for one in dip["held"] or ()]
+    held = collect_held(rows)
     known = [row for row in rows if row["truth"] is not None and row.get("named") is not None]
     said = [row for row in known if row["named"]]
     right = [row for row in said if sorted(row["truth"]) in row["named"] and row["truth"]]
@@ -157,7 +179,7 @@ def summarize(rows: Rows) -> list[str]:
         in_percent(told["error_median"]),
         in_percent(told["error_90"]),
         f"{told['unpredicted']} of {told['dips']}",
-        f"{told['band_held']:.0%} of {told['in_bands']}" if told["in_bands"] else "",
+        describe_held(rows),
         *(names if told["could_name"] else [""] * len(names)),
         *(f"{one:.1f}" if np.isfinite(one) else "" for one in seconds),
     ]

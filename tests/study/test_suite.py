@@ -82,6 +82,15 @@ def test_a_name_is_right_alone_or_among_several_or_wrong(named, truth, counted):
     assert {key: told[key] for key in counts} == {key: int(key == counted) for key in counts}
 
 
+def test_what_bands_held_is_told_by_what_is_hidden():
+    def row(truth, held):
+        return {"method": "m", "truth": truth, "inexact": False, "dips": [{"held": held}]}
+
+    rows = [row([], [True, True]), row(["a"], [True, False]), row(["b"], [False, False])]
+    assert page.compare_bands(rows) == [["m", "100% of 2", "", "25% of 4", ""]]
+    assert page.compare_bands([row([], None)]) == []
+
+
 def test_what_a_method_raises_is_a_row_and_no_end(tmp_path, case):
     wrong = write(
         tmp_path, "wrong", "def fit(events):\n    return 1 / 0\n\ndef predict(m, e): ...\n"
