@@ -36,15 +36,15 @@ COLUMNS = [
     "among several",
     "wrong",
     "silent",
-    "seconds",
-    "seconds, 90 %",
+    "s",
+    "s, 90 %",
 ]
 CAPTION = (
     "Error: rms of calculated less measured S over the rms of the response, of unused dips from the"
     " dip on, the median and what nine of ten are below; none: dips without a prediction. Band"
     " held: the worst sample of P and of Q lies within it. Right: exactly what is hidden is named,"
     " alone or among several sets that are said to be alike; wrong: all else that is named; silent:"
-    " something is hidden. Seconds: of processor, of a fit."
+    " something is hidden. s: seconds of processor, of a fit."
 )
 NO_USE = 1.0  # an error as large as the response, which a load that never changes has, too
 # what is hidden in the cases of each column
