@@ -47,7 +47,7 @@ SCATTER_POINTS, SCATTER_REACH, SCATTER_ROUNDS = 24, 0.5, 3
 
 # Points of the base model's box at each of which a single effect is simulated as it was fitted, and
 # the best of them, so far apart in ranges, that it is descended from: where it is missing, the base
-# model's best fit may lie in a wrong valley.
+# model's best fit may lie in a wrong local minimum.
 BOX_POINTS, BOX_STARTS, BOX_APART = 1024, 8, 0.5
 
 # Noise and fit in turn at one set, as long as the fit leaves less than this share of its noise,

@@ -16,9 +16,9 @@ SCREENED = 4096  # points of the box that are simulated
 STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
 FEW, SAME, PROMISING = 8, 0.05, 10  # iterations after which only so many, so far apart, are refined
 MORE, TOLERANCE = 12, 0.1  # iterations of those, and of the deviance
-# of their ends, and how far apart in the unit cube: several end in the same valley
+# of their ends, and how far apart in the unit cube: several end in one local minimum
 MOST, DISTINCT = 4, 0.2
-ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looked for
+ALONG = (0.3, 0.6, 0.9)  # of the way to the bound: where other minima are sought
 
 
 def screen_points(problem: Problem) -> tuple[np.ndarray, float]:
