@@ -218,6 +218,7 @@ def test_a_load_is_an_identified_model_that_predicts(fitted, tmp_path):
     assert paths[2].name == "load_1.json"
 
 
+@pytest.mark.usefixtures("fitted")  # which keeps what the run goes on from
 def test_the_command_goes_on_where_it_was(made, tmp_path):
     folder, *_ = made
     run = tmp_path / "outputs" / "stations" / "records"
