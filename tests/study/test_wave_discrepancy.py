@@ -215,7 +215,6 @@ def test_a_record_without_samples_is_refused_in_a_sentence(given, role):
 def test_an_effect_that_makes_no_sense_of_waveforms_says_why(given):
     motor, static = get("model/motor", "stator_flux")(), get("model/static", "branch")()
     made = tuple(map(in_waves, given))
-    refused = catalogue(
-        compose(motor, static, domain="waves"), made, ("stator_resistance",)
-    ).untestable
+    named = "stator_resistance", "speed_dependent_torque"
+    refused = catalogue(compose(motor, static, domain="waves"), made, named).untestable
     assert "R_s" in refused["stator_resistance"]
