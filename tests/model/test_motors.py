@@ -29,6 +29,7 @@ STATICS = (
     "constant_power",
     "exponential_frequency",
     "branch",
+    "compensated_branch",
     "none",
 )
 VALUES = {
@@ -49,6 +50,7 @@ VALUES = {
     "p_f": 1.3,
     "q_f": -1.1,
     "branch_resistance": 0.3,
+    "branch_share": 0.3,
 }
 
 

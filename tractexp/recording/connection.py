@@ -84,7 +84,7 @@ def choose_usual_connection(voltages: int, currents: int, lines: bool = False) -
 
     Examples
     --------
-    >>> usual(3, 3)
+    >>> choose_usual_connection(3, 3)
     'three_phase'
     """
     for name, cls in sorted(discover()[Connection.group].items()):
