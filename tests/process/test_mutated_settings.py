@@ -111,7 +111,7 @@ REFUSED = [
     (["model=null"], "model=null: what is chosen there has a name"),
     (
         ["model.static=" + "x" * 5000],
-        "xxx: there is no such choice. Available: branch, constant_impedance",
+        "xxx: there is no such choice. Available: branch, compensated_branch",
     ),
     (["task=[profile]"], "task=[profile]: what is chosen there has a name"),
     (["target=???"], "target=???: ??? stands for a value that is missing"),
