@@ -2,8 +2,11 @@
 the script.
 """
 
+import argparse
+import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from tractexp.storage import files
 
@@ -36,3 +39,22 @@ def replace(path: Path, name: str, text: str) -> Path:
     """Put `text` between the marks of `name` in a page."""
     before, _, after = parted(path.read_text(encoding="utf-8"), name)
     return files.write(path, f"{before}\n{text.strip()}\n\n{after}")
+
+
+def read_command(about: str, asked: Sequence[str]) -> argparse.Namespace:
+    """What a script of stored rows is told: `only`, the records of `asked` to take, and `docs`,
+    whether to write the table of what is stored, and stop.
+    """
+    parser = argparse.ArgumentParser(
+        description=about, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--only", nargs="*", choices=asked, default=asked)
+    parser.add_argument(
+        "--docs", action="store_true", help="write the table of what is stored, and stop"
+    )
+    return parser.parse_args()
+
+
+def read_rows(path: Path) -> list[dict[str, Any]]:
+    """The rows that a file of results holds; none where it is not there."""
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []

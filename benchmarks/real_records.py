@@ -7,8 +7,6 @@ load. Stored are the verdict, its names and the model's error before and after, 
 `--docs` writes them into docs/judgement.md.
 """
 
-import argparse
-import json
 import os
 import time
 from collections.abc import Mapping
@@ -88,15 +86,8 @@ def joined(names: list[str]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--only", nargs="*", choices=ASKED, default=ASKED)
-    parser.add_argument(
-        "--docs", action="store_true", help="write the table of what is stored, and stop"
-    )
-    chosen = parser.parse_args()
-    rows = json.loads(STORED.read_text(encoding="utf-8")) if STORED.exists() else []
+    chosen = marked.read_command(__doc__ or "", ASKED)
+    rows = marked.read_rows(STORED)
     for name in () if chosen.docs else chosen.only:
         for fitted in (FIRST, LAST):
             rows = [r for r in rows if (r["record"], r["fitted"]) != (name, fitted)] + [

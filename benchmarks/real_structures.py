@@ -9,8 +9,6 @@ are stored the structure, the motor's share of P, the model's error and epsilon_
 out, and the processor's time; `--docs` writes them into docs/waves.md.
 """
 
-import argparse
-import json
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -141,13 +139,8 @@ def tabulate_phasors(rows: list[dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--only", nargs="*", choices=ASKED, default=ASKED)
-    parser.add_argument(
-        "--docs", action="store_true", help="write the table of what is stored, and stop"
-    )
-    chosen = parser.parse_args()
-    rows = json.loads(STORED.read_text(encoding="utf-8")) if STORED.exists() else []
+    chosen = marked.read_command(__doc__ or "", ASKED)
+    rows = marked.read_rows(STORED)
     for name in () if chosen.docs else chosen.only:
         for fitted in DIPS:
             won = ""
