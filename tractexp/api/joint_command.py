@@ -46,7 +46,7 @@ def build_joint_command(views: Sequence[View]) -> dict[str, Any] | None:
     if not all(map(_is_plain_file, views)):
         return None
     folders = {Path(view.source).parent for view in views}
-    dips = _dips_of_commonest_load(views)
+    dips = _find_dips_of_commonest_load(views)
     if len(folders) > 1 or len(dips) < 2:
         return None
     telling = heapq.nlargest(MOST_TOGETHER, dips, key=lambda dip: dip.weight)
@@ -56,7 +56,7 @@ def build_joint_command(views: Sequence[View]) -> dict[str, Any] | None:
     return {"dips": len(fitted) + 1, "held_out": held_out, "command": command}
 
 
-def _dips_of_commonest_load(views: Sequence[View]) -> list[NamedDip]:
+def _find_dips_of_commonest_load(views: Sequence[View]) -> list[NamedDip]:
     """The dips of the load that has them in most files, in the files' order."""
     loads: dict[Hashable, list[NamedDip]] = defaultdict(list)
     for view in views:
