@@ -70,7 +70,7 @@ def test_lines_a_band_and_bars_are_drawn(tmp_path):
     dom, complaints = drawn(Report("charts").charts([chart, bars], "two"), tmp_path)
     shown = re.sub(r"(?s)<script>.*?</script>", "", dom)
     assert complaints == []
-    assert len(re.findall(r'class="trace scatter', shown)) == 3  # the line, and the two sides of the band
+    assert len(re.findall(r'class="trace scatter', shown)) == 3  # one line, two sides
     assert len(re.findall(r'class="js-fill"', shown)) == 2  # the band and its mark in the legend
     assert len(re.findall(r'<g class="point">', shown)) == 2
 
