@@ -30,7 +30,7 @@ from tractexp.identification.search import search
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
-from tractexp.record import in_waves
+from tractexp.record import convert_to_waves
 
 STORED = Path(__file__).with_suffix(".json")
 CANDIDATES, STARTS, RATE = 200, 20, 1600.0  # Hz: some 1,300 samples
@@ -50,7 +50,7 @@ def recorded(seed: int = 5):
     """A drawn event of some 1,300 samples."""
     case, _ = waves.drawn_events([1, seed])
     case = replace(case, sampler=replace(case.sampler, rate=RATE))
-    return in_waves(waves.events(case, [1, seed])[0])
+    return convert_to_waves(waves.events(case, [1, seed])[0])
 
 
 def kernels(rounds: int) -> list[dict]:

@@ -30,7 +30,7 @@ from tractexp.process import interpreter  # noqa: E402
 from tractexp.storage import credentials  # noqa: E402
 from tractexp.text.output import outlet  # noqa: E402
 from tractexp.text.progress import ask_for  # noqa: E402
-from tractexp.text.wording import one_line  # noqa: E402
+from tractexp.text.wording import write_on_one_line  # noqa: E402
 
 # what no single job that is logged has: maybe
 UNLOGGED = ("-", "tracking.enabled=", "task=export", "experiment=", "hydra.mode=")
@@ -108,7 +108,7 @@ def _describe_refusal(error: UserError | OSError | MemoryError) -> str:
 
 def _print_refusal(sentence: str, code: int = 2) -> int:
     """Print why a command was refused; its exit code."""
-    print(f"tractexp: {one_line(sentence)}", file=sys.stderr)
+    print(f"tractexp: {write_on_one_line(sentence)}", file=sys.stderr)
     return code
 
 

@@ -129,7 +129,7 @@ def _sort_words(name: str) -> str:
     return "_".join(sorted(name.split("_")))
 
 
-def among(name: object, allowed: Iterable[str], label: str = "Available") -> str:
+def list_allowed(name: object, allowed: Iterable[str], label: str = "Available") -> str:
     """The end of a sentence about an unknown name: the nearest one, and all there are.
 
     Examples

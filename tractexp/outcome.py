@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, get_origin
 
 from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
-from tractexp.process.blas import in_one_thread
+from tractexp.process.blas import limit_to_one_thread
 from tractexp.storage import files
 from tractexp.text.progress import say
 
@@ -84,10 +84,10 @@ def _form(of: Field[Any]) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
     kind: Any = of.type
     if isinstance(kind, type) and issubclass(kind, Plain):
         return kind.to_dict, kind.from_dict
-    return _as_it_is, tuple if get_origin(kind) is tuple else _as_it_is
+    return _copy_mappings, tuple if get_origin(kind) is tuple else _copy_mappings
 
 
-def _as_it_is(value: Any) -> Any:
+def _copy_mappings(value: Any) -> Any:
     """The value, a mapping of any kind as a dictionary."""
     return dict(value) if isinstance(value, Mapping) else value
 
@@ -110,9 +110,9 @@ class Outcome(Plain, Tabulated):
             Outcome.kinds[cls.kind] = cls
         for name, value in [*vars(cls).items()]:
             if isinstance(value, functools.cached_property):
-                value.func = in_one_thread(value.func)
+                value.func = limit_to_one_thread(value.func)
             elif name in COMPUTING:
-                setattr(cls, name, in_one_thread(value))
+                setattr(cls, name, limit_to_one_thread(value))
 
     @classmethod
     def from_saved(cls, content: Mapping[str, Any]) -> Self:
@@ -208,11 +208,11 @@ class Written(Outcome):
             try:
                 paths.append(draw(Path(folder) / name))
             except Exception as error:  # whatever it is, the results stand
-                say(f"note: {not_drawn(Path(folder) / name, error)}")
+                say(f"note: {describe_missing_drawing(Path(folder) / name, error)}")
         return paths
 
 
-def not_drawn(path: Path, error: Exception) -> str:
+def describe_missing_drawing(path: Path, error: Exception) -> str:
     """Why a page or a figure is missing, as a sentence."""
     reason = (
         str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}".strip()

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,8 @@ class Box:
         """
         if name not in self.names:
             raise UserError(
-                f"this model has no parameter '{name}'{among(name, self.names, 'Parameters')}"
+                f"this model has no parameter '{name}'"
+                f"{list_allowed(name, self.names, 'Parameters')}"
             )
         return self.names.index(name)
 

@@ -8,7 +8,7 @@ from made_recordings import RATE, constant, recording, waves
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.record import in_waves
+from tractexp.record import convert_to_waves
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.measure import FeederWaves
 
@@ -75,7 +75,9 @@ def test_a_missing_current_is_reckoned_from_the_others_where_the_connection_says
     )
     (dip,) = tractexp.read(two, voltages=["ua", "ub", "uc"], currents=["ia", "ic"])
     assert any("minus the sum of the others" in note for note in dip.record.notes)
-    np.testing.assert_allclose(in_waves(dip).currents[:2], in_waves(whole).currents[:2], atol=1e-6)
+    np.testing.assert_allclose(
+        convert_to_waves(dip).currents[:2], convert_to_waves(whole).currents[:2], atol=1e-6
+    )
 
 
 def test_one_current_of_three_is_refused(tmp_path):
@@ -119,7 +121,7 @@ def test_every_dip_of_a_file_is_an_event_of_its_own(tmp_path):
     t = np.arange(round(3 * RATE)) / RATE
     U = np.where(((t >= 0.5) & (t < 0.6)) | ((t >= 2.0) & (t < 2.2)), 0.6, 1.0)
     path = table(tmp_path / "two.csv", columns(waves(t, U, 0.8 * U**2, 0.3 * U**2)))
-    first, second = map(in_waves, tractexp.read(path))
+    first, second = map(convert_to_waves, tractexp.read(path))
     assert (first.t_start, second.t_start) == pytest.approx((0.5, 2.0), abs=2e-3)
     assert second.record.t[second.lead] > first.t_end
 
@@ -129,7 +131,7 @@ def test_a_single_phase_feeder_is_read_and_fitted(tmp_path):
     u, i = constant()[[0, 3]]
     path = table(tmp_path / "feeder.csv", {"u": u * 27.5 / 89.8, "i": i})
     (dip,) = tractexp.read(path, connection="single_phase")
-    event = in_waves(dip)
+    event = convert_to_waves(dip)
     assert event.phases == 1
     assert event.compared_channels == (True, False, False)
     np.testing.assert_allclose(np.abs(event.v[event.steady]), event.U0, rtol=2e-3)
@@ -147,7 +149,7 @@ def test_files_of_comtrade_keep_their_samples(tmp_path, ending):
     source = table(tmp_path / "made.csv", columns(constant()))
     tractexp.convert(source, to="cff" if ending == ".cff" else "comtrade", folder=tmp_path / "out")
     (dip,) = tractexp.read(tmp_path / "out" / f"made{ending}")
-    event, direct = in_waves(dip), in_waves(tractexp.read(source)[0])
+    event, direct = convert_to_waves(dip), convert_to_waves(tractexp.read(source)[0])
     np.testing.assert_allclose(
         event.currents[:2, event.lead :], direct.currents[:2, direct.lead :], atol=2e-3
     )

@@ -88,7 +88,7 @@ def test_runs_come_back_from_mlflow_as_they_went_in(filled):
     _, uri, parent, runs = filled
     found = find(uri, "tags.data = 'tibet_50pct'")
     assert [run.tags["mlflow.parentRunId"] for run in found] == [parent] * len(runs)
-    back = load.from_logged(found, "the filter")
+    back = load.read_logged(found, "the filter")
     for one, other in zip(runs, back, strict=True):
         assert (one.optimizer, one.seed, one.data) == (other.optimizer, other.seed, other.data)
         assert one.objective == other.objective
@@ -132,7 +132,7 @@ def test_the_command_compares_what_a_filter_finds_and_logs_the_page(filled):
         "comparison.json",
     }
     # the comparison is none of them
-    assert len(load.from_logged(find(uri, "tags.data = 'tibet_50pct'"), "x")) == 16
+    assert len(load.read_logged(find(uri, "tags.data = 'tibet_50pct'"), "x")) == 16
 
 
 def test_the_page_of_a_sweep_is_added_to_the_run_of_the_sweep(filled):
@@ -176,13 +176,13 @@ def test_a_filter_that_finds_nothing_is_one_sentence(filled, arguments, sentence
 def test_a_run_that_failed_in_mlflow_is_a_failure(filled):
     _, uri, _, _ = filled
     (one,) = find(uri, "tags.seed = '3' and tags.optimizer = 'ssa'")
-    (run,) = load.from_logged([replace(one, status="FAILED")], "x")
+    (run,) = load.read_logged([replace(one, status="FAILED")], "x")
     assert (run.failure, run.interruption) == ("its status in MLflow is FAILED", "")
     for status in ("KILLED", "RUNNING", "SCHEDULED"):
-        (run,) = load.from_logged([replace(one, status=status)], "x")
+        (run,) = load.read_logged([replace(one, status=status)], "x")
         assert (run.failure, run.interruption) == ("", f"its status in MLflow is {status}")
     with pytest.raises(UserError, match="matches no run of task=identify"):
-        load.from_logged([], "the filter")
+        load.read_logged([], "the filter")
 
 
 def viewed(uri, mode="CHART"):
@@ -290,7 +290,9 @@ def test_files_of_a_run_tell_what_its_metrics_do_not(tmp_path, uri):
         "epsilon_q": 0.1,
         "seconds": 9.0,
     }
-    curves = {"fitness_by_simulations": tracking.at_common_steps(run.simulations, run.history)}
+    curves = {
+        "fitness_by_simulations": tracking.resample_to_common_steps(run.simulations, run.history)
+    }
     made = tracking.TrackedRun(
         EXPERIMENT,
         "r",
@@ -302,12 +304,12 @@ def test_files_of_a_run_tell_what_its_metrics_do_not(tmp_path, uri):
     )
     tracking.log(made, uri)
     (logged,) = find(uri, "tags.seed = '0'")
-    (back,) = load.from_logged([logged], "x")
+    (back,) = load.read_logged([logged], "x")
     assert back.parameters == {"C": 0.7, "T_m[1]": 0.3, "T_m[2]": 0.4}
     assert back.objective == 2.0
     np.testing.assert_array_equal(back.history, run.history)
     np.testing.assert_allclose(back.seconds, 0.02 * np.arange(len(run.history)))
-    (bare,) = load.from_logged([replace(logged, files={})], "x")
+    (bare,) = load.read_logged([replace(logged, files={})], "x")
     assert bare.parameters == {}
     assert bare.history[-1] == run.history[-1]
 

@@ -152,9 +152,9 @@ def run_of(folder: Path) -> Path:
 
 
 def compared(folder: Path) -> object:
-    from tractexp.studies.comparison.load import from_sweep
+    from tractexp.studies.comparison.load import read_sweep
 
-    return from_sweep(folder.parent)
+    return read_sweep(folder.parent)
 
 
 def its_state(folder: Path) -> object:

@@ -6,7 +6,7 @@ from made_recordings import RATE, constant, recording
 
 import tractexp
 from tractexp.filetypes.comtrade_writer import write
-from tractexp.record.wave_event import in_waves
+from tractexp.record.wave_event import convert_to_waves
 
 
 def saved(path, values, **more):
@@ -54,7 +54,7 @@ def test_the_samples_that_are_fitted_begin_after_the_step_too(tmp_path):
         tmp_path / "shed.cfg",
         course(constant(start=1.2, end=1.4, length=3.0), (0.0, 3.0), (0.8, 1.0)),
     )
-    event = in_waves(tractexp.read(path)[0])
+    event = convert_to_waves(tractexp.read(path)[0])
     assert 0.8 < event.record.t[event.first] < 0.83
     assert event.P0 * event.record.base.power == POWER
 

@@ -12,7 +12,7 @@ import pytest
 from command_line import run_command
 
 import tractexp
-from tractexp.text.wording import epsilon, escape_text, one_line
+from tractexp.text.wording import epsilon, escape_text, write_on_one_line
 
 if os.name == "nt":
     pytest.skip("pipes and locales of a Unix", allow_module_level=True)
@@ -93,7 +93,7 @@ def test_escapes_of_others_are_shown_as_text(tmp_path):
 def test_what_is_no_escape_stays():
     text = "Ständer 电压 é\u0301 \u00a0\u3000 👩\u200d🚒 ملف\u200c 'a\tb'\nnext"
     assert escape_text(text) == text
-    assert one_line(text) == text.replace("\n", r"\n")
+    assert write_on_one_line(text) == text.replace("\n", r"\n")
     assert escape_text("a\r\u202eb\udcff") == r"a\r\u202eb\udcff"
 
 

@@ -287,7 +287,7 @@ def test_curves_of_runs_meet_at_common_steps():
     for first, every, total in ((50, 103, 30_000), (50, 98, 30_500), (9, 9, 40)):
         steps = np.arange(first, total, every, dtype=float)
         values = 1 / steps
-        x, y = tracking.at_common_steps(steps, values)
+        x, y = tracking.resample_to_common_steps(steps, values)
         assert x[0] >= first
         assert x[-1] >= steps[-1]
         assert y[-1] == values[-1]

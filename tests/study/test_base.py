@@ -17,7 +17,7 @@ import tractexp
 from tractexp.cache.provenance import digest
 from tractexp.errors import UserError
 from tractexp.exchange.format import Identified
-from tractexp.record import Base, OwnBase, WaveEvent, detect, in_waves, on_own_base
+from tractexp.record import Base, OwnBase, WaveEvent, convert_to_waves, detect, rebase_events
 from tractexp.record.own_base import convert_base
 from tractexp.tracking.model import Predictor
 
@@ -79,21 +79,21 @@ def fits(records):
 
 def test_what_is_on_the_base_of_its_load_stays_as_it_is(records):
     shipped = tractexp.read("tibet_50pct", "tibet_30pct")
-    assert all(one is other for one, other in zip(on_own_base(shipped), shipped, strict=True))
+    assert all(one is other for one, other in zip(rebase_events(shipped), shipped, strict=True))
     for k in (1.04, 1 / np.hypot(1, 0.6), 0.6, 0.45):  # of its P, its S, its rating
         event = detect(scaled(records[0], k))
-        assert on_own_base([event])[0] is event
+        assert rebase_events([event])[0] is event
     for k in (0.4, 1.1, -1.1):
-        moved = on_own_base([detect(scaled(records[0], k))])[0]
+        moved = rebase_events([detect(scaled(records[0], k))])[0]
         assert np.hypot(moved.P0, moved.Q0) == pytest.approx(1, rel=1e-12)
 
 
 def test_a_base_that_was_the_steady_state_of_the_load_is_its_own(records, tmp_path):
     """The second dip of a file is fitted on the base of the first, as a reader took it."""
     loud = detect(scaled(records[0], 0.4, power=20.0, origin="load"))
-    assert on_own_base([loud])[0] is loud
+    assert rebase_events([loud])[0] is loud
     given = detect(scaled(records[0], 0.4, power=20.0))
-    assert on_own_base([given])[0].record.base.power == pytest.approx(
+    assert rebase_events([given])[0].record.base.power == pytest.approx(
         20 * np.hypot(given.P0, given.Q0), rel=1e-12
     )
     path = tmp_path / "megawatts.csv"
@@ -103,14 +103,14 @@ def test_a_base_that_was_the_steady_state_of_the_load_is_its_own(records, tmp_pa
     np.savetxt(path, rows, delimiter=",", header="t [s],U [kV],P [MW],Q [Mvar]", comments="")
     read = tractexp.read(path)[0]
     assert read.record.base.origin == "load"
-    assert on_own_base([read])[0] is read
+    assert rebase_events([read])[0] is read
     tractexp.convert(read, to="csv", folder=tmp_path / "tidy")
     assert tractexp.read(next((tmp_path / "tidy").glob("*.csv")))[0].record.base.origin == "load"
 
 
 def test_all_events_of_a_call_are_put_on_one_base(records):
     first, second = (detect(scaled(record, 4.0)) for record in records)
-    one, other = on_own_base([first, second])
+    one, other = rebase_events([first, second])
     S = np.hypot(first.P0, first.Q0)
     assert np.array_equal(one.record.P, first.record.P / S)
     assert np.array_equal(other.record.Q, second.record.Q / S)
@@ -123,7 +123,7 @@ def test_all_events_of_a_call_are_put_on_one_base(records):
         " the values on this"
         " base"
     )
-    again = on_own_base([other, one])  # an event that was put on a base stays on it
+    again = rebase_events([other, one])  # an event that was put on a base stays on it
     assert again[0] is other
     assert again[1] is one
 
@@ -131,7 +131,7 @@ def test_all_events_of_a_call_are_put_on_one_base(records):
 def test_records_of_other_megavolt_amperes_are_put_on_that_of_the_first(records):
     first = detect(scaled(records[0], 5.0, power=SYSTEM))
     second = detect(scaled(records[1], 1.0, power=500.0))
-    one, other = on_own_base([first, second])
+    one, other = rebase_events([first, second])
     assert one.record.base.power == other.record.base.power
     assert pytest.approx(0.8, rel=1e-2) == other.P0 / one.P0
     assert "on the file's base (100 MVA)" in one.record.notes[-1]
@@ -141,7 +141,7 @@ def test_records_of_other_megavolt_amperes_are_put_on_that_of_the_first(records)
             UserError,
             match=r"b\.csv does not say how many MVA .* per unit of 100 MVA.*say it of both",
         ):
-            on_own_base(pair)
+            rebase_events(pair)
 
 
 def test_harmonics_go_with_power_and_distortion_stays(records):
@@ -293,7 +293,7 @@ def test_a_plan_takes_the_values_of_an_identification_in_its_base(records, fits,
 
 
 def test_waveforms_are_rebased_with_their_record(tmp_path):
-    event = in_waves(tractexp.read(table(tmp_path / "waves.csv", columns(constant())))[0])
+    event = convert_to_waves(tractexp.read(table(tmp_path / "waves.csv", columns(constant())))[0])
     made = convert_base(event, 2.0, OwnBase(2.0))
     assert isinstance(made, WaveEvent)
     assert np.allclose(made.currents, event.currents / 2, rtol=1e-9, equal_nan=True)

@@ -151,7 +151,7 @@ def test_runs_that_all_reach_the_floor_are_equal_whatever_is_left_of_rounding():
     assert (pair.p, pair.effect, pair.significant) == (1.0, 0.5, False)
     assert result.floor.value == FLOOR
     assert result.floor.source == "the best of all runs compared, by a"
-    assert "is not significant" in claims.of_pair(result, pair)
+    assert "is not significant" in claims.quote_pair(result, pair)
     assert claims.headline(result).startswith(
         "a and b reach the lowest median objective (equal within 0.10% of the"
     )
@@ -173,7 +173,7 @@ def test_a_quotable_sentence_says_what_the_test_said():
     medians = [
         f"{np.median([r.objective for r in result.gathered[n].runs]):.3g}" for n in ("issa", "ssa")
     ]
-    assert claims.of_pair(result, pair) == (
+    assert claims.quote_pair(result, pair) == (
         f"On 30 seeds and 5,050 simulations, issa reaches a median objective of {medians[0]} pu²"
         f" against {medians[1]} "
         "pu² for ssa; the difference is significant (Wilcoxon signed-rank, Holm-corrected over 1"
@@ -187,7 +187,7 @@ def test_a_sentence_does_not_hide_that_one_variant_had_more_simulations():
         a_run("ssa", s, 2 * FLOOR) for s in SEEDS
     ]
     result = compared(runs)
-    told = claims.of_pair(result, result.pairs[0])
+    told = claims.quote_pair(result, result.pairs[0])
     assert "with 10,050 simulations (median)" in told
     assert "with 5,050 for ssa" in told
     assert claims.answer(result).endswith(
@@ -335,7 +335,7 @@ def test_one_by_one_from_both_ends_gives_effects_and_says_what_it_cannot_give():
     assert {frozenset(u) for u in found.unknown} == {
         frozenset(p) for p in itertools.combinations(SWITCHES, 2)
     }
-    assert "four that differ in those alone" in claims.of_unknown(found)
+    assert "four that differ in those alone" in claims.describe_untold_effects(found)
 
 
 def test_variants_with_other_settings_stay_out_of_the_ablation():
@@ -376,7 +376,9 @@ def test_failures_count_as_the_worst_and_never_as_missing():
     result = compared(runs)
     (pair,) = result.pairs
     assert (pair.first, pair.seeds, pair.significant) == ("a", 30, True)
-    assert "against no result for b; the difference is significant" in claims.of_pair(result, pair)
+    assert "against no result for b; the difference is significant" in claims.quote_pair(
+        result, pair
+    )
 
 
 def test_a_reference_tests_its_own_pairs_only():
@@ -613,7 +615,9 @@ def test_runs_are_told_apart_by_the_valley_they_ended_in(polished):
     assert found.reached[runs[-1]] > 1.2 * LOWEST
     made = compare(gather(runs, "x"), targets=TARGETS, ties=1e-3, polished=found)
     assert {s.name: s.in_valley for s in made.summaries} == {"a": 1.0, "b": 0.0}
-    assert claims.of_valley(made).endswith("from where least squares reach it: a 6 of 6, b 0 of 1.")
+    assert claims.describe_valley(made).endswith(
+        "from where least squares reach it: a 6 of 6, b 0 of 1."
+    )
     assert {
         s.in_valley for s in compare(gather(runs, "x"), targets=TARGETS, ties=1e-3).summaries
     } == {None}
@@ -780,7 +784,7 @@ def test_a_sweep_is_read_back_as_it_was_run(tmp_path):
         *samples({"a": 1.0}, seeds=range(12)),
         a_failure("b", 3, "no steady state: widen model.bounds"),
     ]
-    back = load.from_sweep(write_sweep(tmp_path / "sweep", runs))
+    back = load.read_sweep(write_sweep(tmp_path / "sweep", runs))
     for run, found in zip(runs, back, strict=True):
         assert (found.optimizer, found.data, found.seed, found.failure) == (
             run.optimizer,
@@ -797,7 +801,7 @@ def test_a_job_without_a_result_did_not_finish(tmp_path):
     folder = write_sweep(tmp_path, samples({"a": 1.0}, seeds=range(2)))
     (folder / "0" / "result.json").unlink()
     assert (
-        load.from_sweep(folder)[0].interruption == "it left no result: it was ended, or still runs"
+        load.read_sweep(folder)[0].interruption == "it left no result: it was ended, or still runs"
     )
     for told in (
         {"status": "running"},
@@ -805,17 +809,17 @@ def test_a_job_without_a_result_did_not_finish(tmp_path):
         {"status": "failed", "message": "interrupted"},
     ):
         (folder / "0" / "status.json").write_text(json.dumps(told))
-        run = load.from_sweep(folder)[0]
+        run = load.read_sweep(folder)[0]
         assert run.interruption, told
         assert not run.failure
     (folder / "0" / "status.json").write_text(
         json.dumps({"status": "failed", "message": "it burst"})
     )
-    assert load.from_sweep(folder)[0].failure == "it burst"
+    assert load.read_sweep(folder)[0].failure == "it burst"
     for name, content in (("history.csv", "nonsense"), ("result.json", "{}"), ("result.json", "[")):
         (folder / "1" / name).write_text(content)
         with pytest.raises(UserError, match=rf"{name} cannot be read"):
-            load.from_sweep(folder)
+            load.read_sweep(folder)
 
 
 @pytest.fixture(scope="module")
@@ -940,14 +944,14 @@ def test_a_job_ended_while_its_folder_was_made_is_interrupted(tmp_path):
     folder = write_sweep(tmp_path, [*samples({"a": 1.0}, seeds=range(2)), interrupted("a", 2)])
     (folder / "2" / ".hydra" / "hydra.yaml").unlink()
     with pytest.raises(UserError, match=r"hydra\.yaml cannot be read"):
-        load.from_sweep(folder)
+        load.read_sweep(folder)
     told = {
         "status": "interrupted",
         "message": "",
         "choices": {"optimizer": "a", "data": "tibet_50pct"},
     }
     (folder / "2" / "status.json").write_text(json.dumps(told))
-    run = load.from_sweep(folder)[2]
+    run = load.read_sweep(folder)[2]
     assert (run.optimizer, run.seed, run.interruption) == ("a", 2, "its sweep was interrupted")
 
 

@@ -24,8 +24,8 @@ from tractexp.report.candidate_rows import (
     CHOSEN,
     chance_level,
     describe_untestable_beside,
+    explain_other_than_steepest,
     list_candidates,
-    why_not_the_most_helpful,
 )
 from tractexp.report.events import BAND_DEVIATIONS
 from tractexp.text.wording import join_words
@@ -196,16 +196,16 @@ def promising(named, score):
 
 
 def test_where_a_linear_step_favours_another_effect_one_sentence_says_why(named):
-    assert why_not_the_most_helpful(named) == ""
+    assert explain_other_than_steepest(named) == ""
     other = next(s for s in named.first.scores if s.name == "speed_dependent_torque")
     favoured = replace(other, drop=1e6, p=0.0)
-    told = why_not_the_most_helpful(promising(named, favoured))
+    told = explain_other_than_steepest(promising(named, favoured))
     assert told.startswith(
         "speed_dependent_torque promises most in one linear step from the base model"
     )
     assert "yet the verdict is stator_resistance, which lowers the deviance by" in told
     assert "speed_dependent_torque" in told
-    assert why_not_the_most_helpful(promising(named, replace(favoured, drop=1.0))) == ""
+    assert explain_other_than_steepest(promising(named, replace(favoured, drop=1.0))) == ""
 
 
 def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdict(named, tmp_path):

@@ -26,7 +26,7 @@ from tractexp.studies.comparison import judging, overall_claims
 from tractexp.studies.comparison.ablation import VariantFamily
 from tractexp.studies.comparison.comparison import _median
 from tractexp.studies.comparison.load import _readable
-from tractexp.studies.comparison.overall import on_functions
+from tractexp.studies.comparison.overall import rank_on_functions
 from tractexp.studies.comparison.runs import part_runs
 from tractexp.sweep import sweeper
 
@@ -97,14 +97,14 @@ def test_budgets_are_terms_of_their_own_and_never_pooled():
         for o in made.overall
     ]
     assert harms == pytest.approx([10**0.1, 100 * 10**0.1], rel=0.01)
-    told = overall_claims.of_agreement(made)
+    told = overall_claims.describe_agreement(made)
     assert told.startswith("Over all terms together, levy helps everywhere")
     assert "gaussian" in told.partition("everywhere")[2]
 
 
 def test_the_best_mean_rank_and_what_is_not_told_from_it():
     (overall,) = several([*samples({"good": 1.0, "bad": 3.0, "alike": 1.0}, spread=0.1)]).overall
-    told = overall_claims.of_ranks(overall)
+    told = overall_claims.describe_mean_ranks(overall)
     assert {overall.ranks.names[k] for k in np.argsort(overall.ranks.mean)[:2]} == {"good", "alike"}
     assert "not told from it: " in told
     assert "bad" not in told
@@ -120,7 +120,7 @@ def test_what_a_switch_costs_is_counted():
         )
     (overall,) = several(runs).overall
     assert overall.cost == pytest.approx({s: 50.0 * (s == "gaussian") for s in SWITCHES})
-    assert "gaussian +50.0" in overall_claims.of_cost(overall)
+    assert "gaussian +50.0" in overall_claims.describe_costs(overall)
 
 
 def test_a_search_that_ended_with_its_first_population_tells_no_cost_of_an_iteration():
@@ -168,7 +168,7 @@ def test_on_bbob_a_function_is_a_block():
             for name, distance in (("ssa", near), ("flying", near / 10)):
                 runs.append(BbobRun(name, f, 5, i, 15000, 1, distance, (3.0, np.inf)))
     benchmark = BbobRuns(plan, ("ssa", "flying"), {f: str(f) for f in plan.functions}, runs)
-    made = on_functions(benchmark, family)
+    made = rank_on_functions(benchmark, family)
     (levy,) = made.ablation.effects
     assert levy.seeds == 24
     assert levy.factor == pytest.approx(10 ** (-23 / 24))
@@ -200,7 +200,7 @@ def test_the_variants_run_on_bbob_once_and_without_its_package_the_records_are_t
     from tractexp.studies.bbob import runs as bbob
     from tractexp.studies.comparison import load
 
-    runs = [replace(r, config=r.config | {"budget": 60}) for r in load.from_sweep(folder)]
+    runs = [replace(r, config=r.config | {"budget": 60}) for r in load.read_sweep(folder)]
     made = several(runs, folder=folder, bbob=1)
     assert "BBOB: 24 functions in dimension 5, 1 instances each" in made.overall[-1].where
     assert set(made.overall[-1].figures) == {"ssa", "pso"}

@@ -133,9 +133,9 @@ def test_eq_4_as_printed_is_of_first_order():
     h, one = 0.5, np.ones(1)
     wrong = 1 + h + 5 / 18 * h**2 + h**3 / 27 + h**4 / 216
     right = 1 + h + h**2 / 2 + h**3 / 6 + h**4 / 24
-    assert equations.as_printed(lambda y: y, one, h)[0] == pytest.approx(wrong, rel=1e-14)
+    assert equations.step_as_printed(lambda y: y, one, h)[0] == pytest.approx(wrong, rel=1e-14)
     assert equations.classical(lambda y: y, one, h)[0] == pytest.approx(right, rel=1e-14)
-    assert equations.order(equations.as_printed) == pytest.approx(1, abs=0.05)
+    assert equations.order(equations.step_as_printed) == pytest.approx(1, abs=0.05)
     assert equations.order(equations.classical) == pytest.approx(4, abs=0.05)
 
 
@@ -649,9 +649,9 @@ def test_running_times_are_those_of_the_planted_histories():
 
 def test_the_faster_reaches_every_target_with_less_beyond_chance():
     study = planted(10, {"issa": 1.0, "ssa": 1.7, "pso": 1.0})
-    assert figure_claims.faster(study, "issa", "ssa", "iterations")[0] == verdict.CONFIRMED
-    assert figure_claims.faster(study, "ssa", "issa", "iterations")[0] == verdict.REFUTED
-    assert figure_claims.faster(study, "issa", "pso", "simulations") == (
+    assert figure_claims.compare_speed(study, "issa", "ssa", "iterations")[0] == verdict.CONFIRMED
+    assert figure_claims.compare_speed(study, "ssa", "issa", "iterations")[0] == verdict.REFUTED
+    assert figure_claims.compare_speed(study, "issa", "pso", "simulations") == (
         verdict.REFUTED,
         ["300, 450", "300, 450"],
     )
@@ -696,7 +696,7 @@ def test_what_the_sparrows_lack_is_found_where_it_is_planted(sparrow, told):
     """
     half = HALF * NOISE, HALF
     study = explored(20, {"issa": sparrow, "ssa": sparrow, "pso": half, "random_search": half})
-    assert why.answer(why.lacks(study)) == told
+    assert why.answer(why.compare_with_ssa(study)) == told
 
 
 def test_shares_count_valleys_floors_and_bottoms():
@@ -722,9 +722,9 @@ def test_the_second_valley_is_at_the_bound_of_C_and_attracts_whatever_the_bound(
 
     assert static(right) > 0.2
     assert static(left) < -1.5
-    wide = valleys.with_bounds(problem, "C", 0.1, 0.99)
+    wide = valleys.rebound_problem(problem, "C", 0.1, 0.99)
     grid = np.linspace(0.1, 0.9, 17)
-    path = valleys.along(wide, np.array([right, left]), "C", grid, floor)
+    path = valleys.follow_valley(wide, np.array([right, left]), "C", grid, floor)
     assert path.values[:, C] == pytest.approx(grid)
     low = grid < 0.56
     assert (np.diff(path.objective[low]) > 0).all()  # the higher C, the worse, up to the ridge

@@ -24,7 +24,7 @@ from tractexp.inference.catalogue import catalogue
 from tractexp.inference.injection import Injection
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
-from tractexp.record import in_waves
+from tractexp.record import convert_to_waves
 from tractexp.report import overlay
 
 # Nothing but noise is left. Its level is estimated from quiet stretches; the later ones are louder
@@ -180,7 +180,7 @@ def test_a_push_of_waveforms_is_the_terminal_current(given):
     ]
     values = np.array([[push.get(name, 0.0) for name in problem.space.names] for push in pushes])
     drawn = model.simulate(problem.drive, values, 1).outputs
-    moved = (drawn[0] + 1j * drawn[1] - drawn[0, 0] - 1j * drawn[1, 0]) * in_waves(
+    moved = (drawn[0] + 1j * drawn[1] - drawn[0, 0] - 1j * drawn[1, 0]) * convert_to_waves(
         given[0]
     ).turn.conj()
     assert np.abs(moved[1] - 0.1).max() < 1e-9
@@ -214,7 +214,7 @@ def test_a_record_without_samples_is_refused_in_a_sentence(given, role):
 
 def test_an_effect_that_makes_no_sense_of_waveforms_says_why(given):
     motor, static = get("model/motor", "stator_flux")(), get("model/static", "branch")()
-    made = tuple(map(in_waves, given))
+    made = tuple(map(convert_to_waves, given))
     named = "stator_resistance", "speed_dependent_torque"
     refused = catalogue(compose(motor, static, domain="waves"), made, named).untestable
     assert "R_s" in refused["stator_resistance"]

@@ -14,13 +14,13 @@ import pytest
 import tractexp
 from tractexp.configuration.plugin import get
 from tractexp.domain import WAVES, domain_of
-from tractexp.domain.playback import as_phasors, measure_unsteadiness
+from tractexp.domain.playback import measure_as_phasors, measure_unsteadiness
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.advice import advise, better_domain
 from tractexp.identification.plan import DipShape, forecast
 from tractexp.inference.problem import Problem
-from tractexp.record import in_waves
+from tractexp.record import convert_to_waves
 from tractexp.report.waves import Drawn, spectra, wave_chart
 
 LOAD = {"motor": "stator_flux", "static": "exponential", "domain": "waves"}
@@ -112,8 +112,8 @@ def test_currents_are_drawn_whole_and_the_dip_is_in_view(fit):
 
 
 def test_the_estimator_sees_in_recorded_currents_the_power_before_the_dip(dip):
-    event = in_waves(dip)
-    seen, P, Q = as_phasors(event, 2 * np.nan_to_num(event.currents))
+    event = convert_to_waves(dip)
+    seen, P, Q = measure_as_phasors(event, 2 * np.nan_to_num(event.currents))
     before = seen.steady
     assert seen.record.P[before].mean() == pytest.approx(event.P0, rel=2e-3)
     assert seen.record.Q[before].mean() == pytest.approx(event.Q0, rel=5e-3)
@@ -122,7 +122,7 @@ def test_the_estimator_sees_in_recorded_currents_the_power_before_the_dip(dip):
 
 
 def test_a_spectrum_tells_frequency_and_size_of_what_is_left(dip):
-    event = in_waves(dip)
+    event = convert_to_waves(dip)
     size = abs(event.P0 + 1j * event.Q0) / event.U0
     t = event.record.t
     planted = np.nan_to_num(event.currents).copy()

@@ -33,7 +33,7 @@ from independent.fault import Fault, vector
 from independent.sampler import CurrentTransformer, Sampler
 from independent.source import OMEGA
 from tractexp.noise.waves import covariances, of_waves, solve_levinson
-from tractexp.record import in_waves
+from tractexp.record import convert_to_waves
 
 MACHINE = Machine(Rs=0.03, Xs=0.10, Xm=3.2, Rr=0.018, Xr=0.18, H=0.7)
 FAULT = Fault((0.2, 1.0, 0.9j), start=0.1, duration=0.06, frequency=50.1)
@@ -234,7 +234,7 @@ def test_what_is_recorded_reaches_the_event_through_the_product():
     generator's.
     """
     case, events = waves.drawn_events([1, 2])
-    event = in_waves(events[0])
+    event = convert_to_waves(events[0])
     fault = case.faults[0]
     assert event.f0 == pytest.approx(fault.frequency, abs=2e-3)
     assert pytest.approx(fault.voltage, rel=2e-4) == event.U0

@@ -4,7 +4,7 @@ import pytest
 from threadpoolctl import ThreadpoolController
 
 from tractexp.api.arguments import public
-from tractexp.process.blas import OF_PROCESS, in_one_thread, limit_threads
+from tractexp.process.blas import OF_PROCESS, limit_threads, limit_to_one_thread
 
 
 @pytest.fixture
@@ -26,11 +26,11 @@ def test_a_call_has_one_thread_and_leaves_the_host_its_own(host):
 
     assert host() == {2}
     assert call() == {1}
-    assert in_one_thread(host)() == {1}
+    assert limit_to_one_thread(host)() == {1}
     assert host() == {2}
 
 
 def test_a_call_that_fails_leaves_the_host_its_own(host):
     with pytest.raises(ZeroDivisionError):
-        in_one_thread(lambda: 1 / 0)()
+        limit_to_one_thread(lambda: 1 / 0)()
     assert host() == {2}

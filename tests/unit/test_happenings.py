@@ -13,7 +13,7 @@ from tractexp.record import Base, Record
 from tractexp.recording import Feeder
 from tractexp.recording.happening import happenings_in, happenings_of
 from tractexp.recording.measure import FeederWaves, phasors_of
-from tractexp.recording.trace import of_waves
+from tractexp.recording.trace import trace_waves
 
 SEEDS = range(4)
 THREE = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
@@ -31,7 +31,7 @@ def of(record, feeder):
     [segment] = record.segments
     waves = FeederWaves.from_recording(record, feeder, segment)[:, :]
     phasors = phasors_of(record, feeder, segment)
-    return happenings_in(of_waves(waves, segment.rate, 0.0, record.frequency, phasors))
+    return happenings_in(trace_waves(waves, segment.rate, 0.0, record.frequency, phasors))
 
 
 def grid(seconds, rate=3200.0):
@@ -345,7 +345,7 @@ def test_the_two_dips_of_the_220_kv_station(shared_data):
     for segment in record.waveforms():
         phasors = phasors_of(record, feeder, segment)
         waves = FeederWaves.from_recording(record, feeder, segment)[:, :]
-        events += happenings_in(of_waves(waves, segment.rate, segment.start, 50.0, phasors))
+        events += happenings_in(trace_waves(waves, segment.rate, segment.start, 50.0, phasors))
     assert [(event.kind, event.worth) for event in events] == [("dip", True)] * 2
     assert [event.depth for event in events] == pytest.approx([0.131, 0.127], abs=0.003)
 

@@ -17,7 +17,7 @@ from tractexp.errors import UserError
 from tractexp.sweep import launcher, progress, recorder
 from tractexp.sweep.elsewhere import Delivery, unpack_job
 from tractexp.sweep.job import SweepJob, find_shared_overrides, read_shared_events
-from tractexp.sweep.output import printing_to
+from tractexp.sweep.output import redirect_prints
 from tractexp.sweep.placing import place
 from tractexp.sweep.status import (
     FAILED,
@@ -147,7 +147,7 @@ def test_jobs_in_threads_print_into_their_own_files_and_what_is_beside_them_does
     begun = threading.Barrier(3)
 
     def talk(output):
-        with printing_to(output):
+        with redirect_prints(output):
             begun.wait()
             print("in", output.name, file=sys.stdout)
             print("err", output.name, file=sys.stderr)

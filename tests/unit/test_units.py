@@ -11,7 +11,7 @@ from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.recording import Channel
 from tractexp.recording.recording import quantity_of, unit_of
-from tractexp.recording.unit import amount, in_units
+from tractexp.recording.unit import amount, convert_to_units
 
 KV, MW, MVAR = 110.0, 40.0, 15.0  # of `constant`
 
@@ -155,5 +155,7 @@ def test_a_setting_that_fits_nothing_is_refused(tmp_path, units):
 
 def test_what_is_certain_is_left_alone():
     whole = recording(constant())
-    assert in_units(whole, {}, {}).notes == ()
-    assert [c.unit for c in in_units(whole, {}, {}).channels] == [c.unit for c in whole.channels]
+    assert convert_to_units(whole, {}, {}).notes == ()
+    assert [c.unit for c in convert_to_units(whole, {}, {}).channels] == [
+        c.unit for c in whole.channels
+    ]

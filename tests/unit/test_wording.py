@@ -4,11 +4,11 @@ import pytest
 
 from tractexp.text.wording import (
     alternatives,
-    in_words,
+    format_probability,
+    format_with_error,
     join_words,
     list_figures,
     percent,
-    with_error,
 )
 
 
@@ -26,7 +26,7 @@ from tractexp.text.wording import (
     ],
 )
 def test_a_probability_that_nobody_can_picture_is_told_in_words(p, told):
-    assert in_words(p) == told
+    assert format_probability(p) == told
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_a_probability_that_nobody_can_picture_is_told_in_words(p, told):
     ],
 )
 def test_a_value_has_the_digits_that_its_error_leaves(value, error, told):
-    assert with_error(value, error) == told
+    assert format_with_error(value, error) == told
 
 
 def test_names_are_listed_as_in_a_sentence():

@@ -13,7 +13,7 @@ from tractexp.configuration import plugin
 from tractexp.configuration.choices import read_default_choices
 from tractexp.configuration.composition import read_choice
 from tractexp.configuration.kinds import check_kind
-from tractexp.errors import UserError, among, check_distinct, settings_as
+from tractexp.errors import UserError, check_distinct, list_allowed, settings_as
 from tractexp.outcome import Plain
 from tractexp.process.blas import limit_threads
 
@@ -38,7 +38,7 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
         for name in keywords:
             if name not in named and not open_ended:
                 raise UserError(
-                    f"{where} has no argument '{name}'{among(name, named, 'Arguments')}"
+                    f"{where} has no argument '{name}'{list_allowed(name, named, 'Arguments')}"
                 )
         try:
             arguments = signature.bind(*args, **keywords).arguments
@@ -79,7 +79,7 @@ class Choice(Plain):
         chosen = read_default_choices()[group] if chosen is None else chosen
         check_kind(group, chosen, str | Mapping[str, Any] | Sequence[Any])
         if isinstance(chosen, Sequence) and not isinstance(chosen, str):
-            chosen = plugin.of_several(group, chosen)
+            chosen = plugin.join_choices(group, chosen)
         asked = {"name": chosen} if isinstance(chosen, str) else dict(chosen)
         if "name" not in asked:
             raise UserError(

@@ -15,7 +15,7 @@ from tractexp.blocks import Table
 from tractexp.configuration.choices import read_choices, read_default_choices, read_replacements
 from tractexp.configuration.composition import read_choice
 from tractexp.configuration.plugin import discover, get
-from tractexp.errors import UserError, among, check_choice, setting
+from tractexp.errors import UserError, check_choice, list_allowed, setting
 from tractexp.outcome import Plain, Tabulated
 from tractexp.text import quoting
 
@@ -299,7 +299,7 @@ def compose(
     _ = composed.parameters
     for key in composed.fixed:
         if key not in composed.parameters:
-            allowed = among(key, composed.parameters, "Parameters")
+            allowed = list_allowed(key, composed.parameters, "Parameters")
             raise UserError(f"fixed.{key}: this model has no parameter '{key}'{allowed}")
     return composed
 
@@ -339,7 +339,7 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
     for key in given:
         if key not in keys:
             raise UserError(
-                f"{setting(f'model.{key}')}: there is no such key{among(key, keys, 'Keys')}"
+                f"{setting(f'model.{key}')}: there is no such key{list_allowed(key, keys, 'Keys')}"
             )
     if missing := [part for part in PARTS if not given.get(part)]:
         raise UserError(

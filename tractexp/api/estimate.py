@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp.errors import among
+from tractexp.errors import list_allowed
 
 if TYPE_CHECKING:
     import pandas
@@ -60,7 +60,7 @@ class Estimates(dict[str, Estimate]):
 
     def __missing__(self, name: str) -> Estimate:
         """Raise KeyError with the nearest name."""
-        raise KeyError(f"no parameter is called {name}{among(name, self, 'Parameters')}")
+        raise KeyError(f"no parameter is called {name}{list_allowed(name, self, 'Parameters')}")
 
     @property
     def outside_interval(self) -> list[str]:

@@ -18,7 +18,7 @@ from tractexp.errors import UserError
 from tractexp.identification.result import Result
 from tractexp.outcome import Written
 from tractexp.storage import files
-from tractexp.text.wording import with_error
+from tractexp.text.wording import format_with_error
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -303,4 +303,4 @@ class Investigation(Written):
 def _size(name: str, at: Mapping[str, Any], unit: str) -> str:
     """ "k_f = 0.12 ± 0.01"."""
     error = float("nan") if at["standard_error"] is None else at["standard_error"]
-    return f"{name} = {with_error(at['value'], error)}{'' if unit == '1' else f' {unit}'}"
+    return f"{name} = {format_with_error(at['value'], error)}{'' if unit == '1' else f' {unit}'}"

@@ -280,7 +280,7 @@ class Job:
         """The command that shows what was logged."""
         from tractexp import tracking
 
-        uri = tracking.chosen_uri(self.config["tracking"]["uri"])
+        uri = tracking.choose_uri(self.config["tracking"]["uri"])
         return quoting.shell("tractexp", "ui", *(["--uri", uri] if uri else []))
 
     def send(self, run: "TrackedRun") -> None:

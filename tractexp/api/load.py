@@ -4,7 +4,7 @@ import importlib.util
 from pathlib import Path
 
 from tractexp.api.arguments import public
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 from tractexp.outcome import MARK, Outcome, read_saved_result
 from tractexp.storage import files
 
@@ -40,7 +40,7 @@ def load(path: str | Path) -> Outcome:
     content = read_saved_result(path)
     kinds = result_kinds()
     if content["kind"] not in kinds:
-        why = among(content["kind"], kinds, "Kinds")
+        why = list_allowed(content["kind"], kinds, "Kinds")
         raise UserError(
             f"{path} holds a result of kind '{content['kind']}', which is not known{why}"
         )

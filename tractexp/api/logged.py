@@ -39,7 +39,7 @@ def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> di
     return {
         "name": searched,
         # MLflow compares by the first
-        "metrics": _of_search(fit)
+        "metrics": _describe_search_end(fit)
         | {key: getattr(result, key) for key in ("simulations", "seconds")}
         | of_model,
         "curves": _curves(fit),
@@ -98,7 +98,7 @@ def _epsilons(result: "Result") -> dict[str, float]:
     }
 
 
-def _of_search(fit: "Identification") -> dict[str, float]:
+def _describe_search_end(fit: "Identification") -> dict[str, float]:
     """Where the optimizer itself ended, and after how many simulations it was within 1 % of the
     estimate.
     """
@@ -114,14 +114,14 @@ def _of_search(fit: "Identification") -> dict[str, float]:
 
 def _curves(fit: "Identification") -> dict[str, Any]:
     """The best objective by iteration, and by simulations at steps that all runs share."""
-    from tractexp.tracking import at_common_steps
+    from tractexp.tracking import resample_to_common_steps
 
     history = fit.search_result.history
     valid = history.objective < REFUSED
     best = history.objective[valid]
     return {
         "fitness": (np.flatnonzero(valid), best),
-        "fitness_by_simulations": at_common_steps(history.simulations[valid], best),
+        "fitness_by_simulations": resample_to_common_steps(history.simulations[valid], best),
     }
 
 

@@ -243,7 +243,7 @@ def _forecast_plan(
     return Planned(problem, at, origin, _describe_shape(shape), needed, scans, best, least, events)
 
 
-def chosen_events(setup: Setup, values: Any, most: int) -> list[ChosenEvent]:
+def select_events(setup: Setup, values: Any, most: int) -> list[ChosenEvent]:
     """The events of a setup that tell most about its model together, at most `most`; `values` are
     those of `plan`.
 

@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Report, Table
 from tractexp.configuration.composition import list_choices
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 from tractexp.outcome import Plain, Tabulated
 from tractexp.record import (
     Base,
@@ -20,8 +20,8 @@ from tractexp.record import (
     Window,
     describe,
     detect,
-    on_own_base,
     read_records,
+    rebase_events,
 )
 from tractexp.record.angle import unwrap_angle
 from tractexp.record.dips import view_dip
@@ -195,7 +195,7 @@ def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
 def dips_together(records: Any, validate: Any) -> tuple[Dips, Dips]:
     """Events fitted and held out, as `dips_of`, all on the base of the load in the first one."""
     train, held = dips_of("records", records, least=1), dips_of("validate", validate)
-    events = on_own_base([view_dip(event) for event in (*train, *held)])
+    events = rebase_events([view_dip(event) for event in (*train, *held)])
     return Dips(events[: len(train)]), Dips(events[len(train) :])
 
 
@@ -205,13 +205,13 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
     for key, value in settings.items():
         if key not in bases:
             raise UserError(
-                f"{key} is no setting of arrays and frames{among(key, bases, 'Settings')}"
+                f"{key} is no setting of arrays and frames{list_allowed(key, bases, 'Settings')}"
             )
         check_kind(key, value, float | None)
         bases[key] = value
     if missing := [key for key in REQUIRED if key not in columns]:
         lack = f"{name}: {', '.join(missing)} missing; {', '.join(REQUIRED)} are needed"
-        raise UserError(f"{lack}{among(missing[0], columns, 'Columns')}")
+        raise UserError(f"{lack}{list_allowed(missing[0], columns, 'Columns')}")
     spare = [str(key) for key in columns if key not in (*REQUIRED, *OPTIONAL)]
     notes = (f"columns not used: {', '.join(spare)}",) if spare else ()
     values = {
@@ -292,7 +292,7 @@ def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
         if not Path(path).suffix:
             raise UserError(
                 f"{path} is neither a file with an ending nor a shipped"
-                f" record{among(path, shipped)}"
+                f" record{list_allowed(path, shipped)}"
             )
     if not settings.get("join"):
         return {**settings_of(path), **settings}

@@ -17,7 +17,7 @@ from tractexp.api.task import LOAD, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
 from tractexp.domain import domain_of
-from tractexp.errors import TASK, UserError, among, check_range, setting
+from tractexp.errors import TASK, UserError, check_range, list_allowed, setting
 from tractexp.identification.result import load
 from tractexp.outcome import Drawing, Written
 
@@ -265,7 +265,7 @@ def order_values(
         if name not in names:
             raise UserError(
                 f"{TASK.values}.{name}: this model has no parameter"
-                f" '{name}'{among(name, names, 'Parameters')}"
+                f" '{name}'{list_allowed(name, names, 'Parameters')}"
             )
     values = {**fitted, **given}
     if missing := [name for name in names if name not in values]:

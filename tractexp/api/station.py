@@ -24,7 +24,7 @@ from tractexp.configuration.overrides import format_assignment, survey_of
 from tractexp.configuration.plugin import get, plugin
 from tractexp.configuration.run_command import find_folder
 from tractexp.domain.averaging import RECORDED, check_window
-from tractexp.errors import DATA, UserError, among, check_choice, check_range
+from tractexp.errors import DATA, UserError, check_choice, check_range, list_allowed
 from tractexp.exchange.format import choose_format
 from tractexp.identification.result import Result
 from tractexp.outcome import Written
@@ -85,7 +85,7 @@ class Station(Written):
         """
         by_name = {load["load"]: load for load in self.content["loads"]}
         if name not in by_name:
-            raise UserError(f"there is no load '{name}'{among(name, by_name, 'Loads')}")
+            raise UserError(f"there is no load '{name}'{list_allowed(name, by_name, 'Loads')}")
         return by_name[name]
 
     def constants(self, name: str) -> Listed:

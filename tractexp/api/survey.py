@@ -270,13 +270,13 @@ def _choose_most_telling(
     settings: Mapping[str, Any],
 ) -> "list[ChosenEvent]":
     """The events that tell most together. Raises `UserError` where none is worth fitting."""
-    from tractexp.api.plan import chosen_events
+    from tractexp.api.plan import select_events
     from tractexp.api.setup import Setup
 
     if not names:
         raise UserError(f"no event in {folder} is worth fitting; the table says why")
     events = [detect(record) for record in archive.records(folder, list(names), DATA.train)]
-    return chosen_events(Setup.from_arguments(events, model, **settings), values, most)
+    return select_events(Setup.from_arguments(events, model, **settings), values, most)
 
 
 @plugin

@@ -76,7 +76,7 @@ def rows_of(folder: str, file: str) -> Rows:
         return [_blank(file) | {"kind": UNREAD, "why": str(error)}]
 
 
-def _with_proposal(rows: Rows, path: Path) -> Rows:
+def _add_proposal(rows: Rows, path: Path) -> Rows:
     """The rows of a file without a load, with what says that files beside it are of its event."""
     proposed = propose_joining(str(path))
     why = (filter(None, (row["why"], proposed)) for row in rows)
@@ -109,17 +109,17 @@ def _rows_of_view(row: dict[str, Any], path: Path) -> Rows:
     try:
         view = archive.look_at_file(path)
     except UserError as error:
-        return _with_proposal([row | {"kind": UNREAD, "why": str(error)}], path)
+        return _add_proposal([row | {"kind": UNREAD, "why": str(error)}], path)
     rows = [
         row | _event(view, row["file"], number, shown, event)
         for number, shown in enumerate(view.sights, 1)
         for event in shown.events
     ]
-    rows = rows or [row | _common(view) | _without_events(view)]
-    return files.plain(rows if shows_load(view) else _with_proposal(rows, path))
+    rows = rows or [row | _common(view) | _describe_file_without_events(view)]
+    return files.plain(rows if shows_load(view) else _add_proposal(rows, path))
 
 
-def _without_events(view: View) -> dict[str, str]:
+def _describe_file_without_events(view: View) -> dict[str, str]:
     """The row of a file without events: that nothing happened, or why nobody can say."""
     unexamined = list(dict.fromkeys(shown.unexamined for shown in view.sights if shown.unexamined))
     if not view.sights or (

@@ -318,7 +318,7 @@ class Chart:
             panel,
             y=pack_numbers(upper, "f4"),
             fill="tonexty",
-            fillcolor=_faint(color),
+            fillcolor=_lighten_color(color),
             **quiet,
         )
 
@@ -471,7 +471,7 @@ class Chart:
                 "y": 1.0,
                 "yanchor": "bottom",
                 "yref": "paper",
-                **_above(names),
+                **_leave_room_above(names),
             },
             "shapes": self._shapes,
             "annotations": self._notes,
@@ -537,7 +537,7 @@ def _shorten_name(name: str) -> str:
     return name if len(name) <= TICK else f"{name[: TICK - 1]}…"
 
 
-def _above(names: Sequence[str]) -> dict[str, Any]:
+def _leave_room_above(names: Sequence[str]) -> dict[str, Any]:
     """An empty line over a legend that takes several on a phone: the buttons stand there."""
     several = sum(ENTRY + LETTER * len(name) for name in names) > PHONE
     return {"title": {"text": "\u00a0", "side": "top"}} if several else {}
@@ -553,7 +553,7 @@ def _height(panel: int | None) -> dict[str, Any]:
     return {"yref": "paper" if panel is None else f"{_axis('y', panel)} domain", "y0": 0, "y1": 1}
 
 
-def _faint(color: str) -> str:
+def _lighten_color(color: str) -> str:
     """A color that bands are filled with."""
     red, green, blue = (int(color[k : k + 2], 16) for k in (1, 3, 5))
     return f"rgba({red},{green},{blue},0.18)"

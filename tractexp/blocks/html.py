@@ -36,7 +36,7 @@ def page(report: Report) -> str:
         head += f'<meta http-equiv="refresh" content="{report.reload}">'
     style = files.read_packaged_text("blocks/page.css")
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
-    draws = f"<script>{script()}</script>" if any(map(_draws, report.blocks)) else ""
+    draws = f"<script>{script()}</script>" if any(map(_holds_chart, report.blocks)) else ""
     elements = "\n".join(_element(block, figures) for block in report.blocks)
     body = "\n".join([top, _share_outlines(elements), draws])
     return (
@@ -98,10 +98,10 @@ def _untypeset(element: str) -> str:
     )
 
 
-def _draws(block: blocks.Block) -> bool:
+def _holds_chart(block: blocks.Block) -> bool:
     """Whether a block holds a chart."""
     return isinstance(block, blocks.ChartBlock | blocks.Charts) or (
-        isinstance(block, blocks.Fold) and any(map(_draws, block.blocks))
+        isinstance(block, blocks.Fold) and any(map(_holds_chart, block.blocks))
     )
 
 
@@ -134,14 +134,15 @@ def _element(block: blocks.Block, figures: "itertools.count[int]") -> str:
         case Table():
             return _table(block)
         case blocks.ChartBlock(chart, caption):
-            return f"<figure>{chart.element(caption)}{_below(caption)}</figure>"
+            return f"<figure>{chart.element(caption)}{_render_caption(caption)}</figure>"
         case blocks.Charts(charts):
             return "\n".join(
                 ['<div class="charts">', *(_element(chart, figures) for chart in charts), "</div>"]
             )
         case blocks.Figure(svg, caption):
             return (
-                f"<figure>{_inline(svg, f'f{next(figures)}-', caption)}{_below(caption)}</figure>"
+                f"<figure>{_inline(svg, f'f{next(figures)}-', caption)}"
+                f"{_render_caption(caption)}</figure>"
             )
         case blocks.Markup(markup):
             return markup
@@ -152,7 +153,7 @@ def _element(block: blocks.Block, figures: "itertools.count[int]") -> str:
             )
 
 
-def _below(caption: str) -> str:
+def _render_caption(caption: str) -> str:
     """A caption below its figure; "" without one."""
     return f"<figcaption>{quoting.html(caption)}</figcaption>" if caption else ""
 
@@ -178,7 +179,7 @@ def _table(table: Table) -> str:
     above = f"<caption>{quoting.html(table.title)}</caption>" if table.title else ""
     grid = f'<div class="wide"><table>{above}{head}<tbody>\n{body}\n</tbody></table></div>'
     # the caption stays where a table scrolls
-    return f'<figure class="table">{grid}{_below(table.caption)}</figure>'
+    return f'<figure class="table">{grid}{_render_caption(table.caption)}</figure>'
 
 
 def _describe_words(cells: Iterable[str]) -> str:

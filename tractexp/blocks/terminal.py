@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from tractexp.blocks.block import CodeBlock, Heading, Items, Paragraphs, Report, Table, VerdictBlock
-from tractexp.text.wording import one_line
+from tractexp.text.wording import write_on_one_line
 
 PLAIN_LINE_WIDTH = 200  # characters of a line of text that is no terminal's
 MISSING_CELL = "-"  # in a row that is a line
@@ -29,7 +29,7 @@ def show(report: Report, console: Any, width: int | None = None) -> None:
 
 
 def _print_text(text: str, console: Any, width: int | None) -> None:
-    for line in fold(one_line(text), width):
+    for line in fold(write_on_one_line(text), width):
         console.print(line, markup=False)
 
 
@@ -99,11 +99,11 @@ def _table(table: Table, console: Any) -> None:
 
     if not table.columns:
         return
-    if _least_width(table) > console.width:
+    if _measure_least_width(table) > console.width:
         _print_rows(table, console)
         return
     grid = Grid(
-        title=one_line(table.title) or None,
+        title=write_on_one_line(table.title) or None,
         title_justify="left",
         box=SIMPLE_HEAD,
         show_edge=False,
@@ -112,9 +112,9 @@ def _table(table: Table, console: Any) -> None:
     )
     for i, column in enumerate(table.columns):
         justify = "left" if i == 0 or i in table.words else "right"
-        grid.add_column(one_line(column), justify=justify, no_wrap=not _folds(table, i))
+        grid.add_column(write_on_one_line(column), justify=justify, no_wrap=not _folds(table, i))
     for row in table.cells:
-        grid.add_row(*map(one_line, row))
+        grid.add_row(*map(write_on_one_line, row))
     console.print(grid, markup=False)
 
 
@@ -123,7 +123,7 @@ def _folds(table: Table, column: int) -> bool:
     return column in table.words or column == len(table.columns) - 1
 
 
-def _least_width(table: Table) -> int:
+def _measure_least_width(table: Table) -> int:
     """How many characters a table needs, its columns of words folded."""
     from rich.cells import cell_len
 

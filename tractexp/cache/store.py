@@ -274,12 +274,12 @@ def cache_folder() -> Path:
                 " such as a new one"
             )
         return Path(chosen)
-    usual = _usual()
+    usual = _find_usual_folder()
     reason = _unfit(usual, private=True) if usual else "no home folder is known"
     return usual if usual and not reason else _temporary(f"{usual or CHOICE}: {reason}")
 
 
-def _usual() -> Path | None:
+def _find_usual_folder() -> Path | None:
     """`tractexp` in the user's cache folder; None where no home is known."""
     for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
         if (base := Path(os.environ.get(name, ""))).is_absolute():
@@ -331,7 +331,7 @@ def _reachable_by_others(folder: Path) -> str:
         state, entry = here.stat(), (here / part).lstat()
         if state.st_uid not in (0, os.geteuid()):
             return f"another user can put another in its place, since {here} is theirs"
-        if _others_write(state) and (why := _find_stranger(here, part, state, entry)):
+        if _may_others_write(state) and (why := _find_stranger(here, part, state, entry)):
             return why
         if stat.S_ISLNK(entry.st_mode):
             links += 1
@@ -363,7 +363,7 @@ def _writable_by_others(folder: Path) -> str:
     return ""
 
 
-def _others_write(state: os.stat_result) -> bool:
+def _may_others_write(state: os.stat_result) -> bool:
     """Whether others may write there: all of them, or those of a group that is not the user's
     alone.
     """

@@ -16,7 +16,7 @@ def collect_chosen_settings(overrides: Iterable[str], choices: Mapping[str, Any]
     by default.
     """
     experiment = choices.get("experiment")
-    chosen = dict(_by_experiment(str(experiment))) if experiment else {}
+    chosen = dict(_read_experiment_choices(str(experiment))) if experiment else {}
     for text in overrides:
         key, _, value = text.lstrip("+~").partition("=")
         chosen[key.partition("@")[0].replace("/", ".")] = value or "null"
@@ -56,7 +56,7 @@ def _overlap(a: str, b: str) -> bool:
 
 
 @functools.cache
-def _by_experiment(experiment: str) -> Mapping[str, str]:
+def _read_experiment_choices(experiment: str) -> Mapping[str, str]:
     """The choices {group: name} of an experiment's file, wherever Hydra looks for it."""
     from hydra.core.hydra_config import HydraConfig
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import tracking
-from tractexp.cli.sync import FOLDER, brought
+from tractexp.cli.sync import FOLDER, send_folder
 from tractexp.errors import UserError
 from tractexp.storage import files
 from tractexp.storage.run_folder import WHOLE, settle
@@ -54,7 +54,7 @@ def doctor(arguments: list[str]) -> int:
         return 2
     wrong += print_findings(runs(uri))
     if chosen.folder.is_dir():
-        wrong += brought(chosen.folder, chosen.uri)["not logged"]
+        wrong += send_folder(chosen.folder, chosen.uri)["not logged"]
     return 2 if wrong else 0
 
 

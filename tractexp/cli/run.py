@@ -47,19 +47,19 @@ def run(config: Any) -> None:
             )
             place.conclude()
         except KeyboardInterrupt as stop:
-            saved = so_far(stop, place)
+            saved = keep_best_so_far(stop, place)
             raise Stopped(
-                f"{_how(stop)}; {saved or describe_stopped_task(config)}",
+                f"{_describe_stop(stop)}; {saved or describe_stopped_task(config)}",
                 getattr(stop, "code", 130),
             ) from None
 
 
-def _how(stop: KeyboardInterrupt) -> str:
+def _describe_stop(stop: KeyboardInterrupt) -> str:
     """How a run was ended."""
     return "ended by SIGTERM" if getattr(stop, "code", 130) == TERMINATED else "interrupted"
 
 
-def so_far(stop: KeyboardInterrupt, place: RunFolder) -> str:
+def keep_best_so_far(stop: KeyboardInterrupt, place: RunFolder) -> str:
     """Keep what a search had found when it was stopped; a sentence on it, "" where there is
     nothing.
     """

@@ -30,11 +30,11 @@ def sync(arguments: list[str]) -> int:
         raise UserError(
             f"tractexp sync: there is no folder {chosen.folder}; name the folder of the runs"
         )
-    counts = brought(chosen.folder, chosen.uri)
+    counts = send_folder(chosen.folder, chosen.uri)
     return 2 if counts["not logged"] else 0
 
 
-def brought(folder: Path, uri: str | None) -> Counter[str]:
+def send_folder(folder: Path, uri: str | None) -> Counter[str]:
     """Send what is kept below a folder and say what became of it."""
     from tractexp.tracking.sync import sync
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.configuration.schema import ModelConfig
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 from tractexp.storage import files
 
 ENDINGS = (".yaml", ".yml")
@@ -47,7 +47,9 @@ def read_model_file(path: Path | str) -> dict[str, Any]:
     keys = [DEFAULTS, *(field.name for field in fields(ModelConfig))]
     for key in content:
         if key not in keys:
-            raise UserError(f"{path}: '{key}' is no key of a model{among(key, keys, 'Keys')}")
+            raise UserError(
+                f"{path}: '{key}' is no key of a model{list_allowed(key, keys, 'Keys')}"
+            )
     if DEFAULTS in content:
         content[DEFAULTS] = _check_defaults(path, content[DEFAULTS])
     _check_values(path, "model", {key: value for key, value in content.items() if key != DEFAULTS})

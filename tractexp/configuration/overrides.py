@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from tractexp.configuration.model_file import is_model_path
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 from tractexp.storage import files
 from tractexp.text import quoting
 
@@ -64,7 +64,7 @@ def quote_overrides(arguments: Iterable[str]) -> list[str]:
         if "=" not in argument and argument[:1] not in OPTIONS and before[:1] != "-":
             _refuse_word(argument)
     result = []
-    for argument in map(_without_plus, _name_model_file(arguments)):
+    for argument in map(_strip_plus, _name_model_file(arguments)):
         group, _, value = argument.partition("=")
         if group == "model/motor" and "[" in value:
             result += _expand_choices(group, value)
@@ -95,7 +95,8 @@ def _put_options_first(arguments: Iterable[str]) -> list[str]:
             awaited = argument in (*TAKING, *INFO)
         else:
             raise UserError(
-                f"{option:.80}: there is no such option{among(option, (*TAKING, *INFO, *FLAGS))};"
+                f"{option:.80}: there is no such option"
+                f"{list_allowed(option, (*TAKING, *INFO, *FLAGS))};"
                 " settings are KEY=VALUE"
             )
     return [*options, *settings]
@@ -113,7 +114,7 @@ def _refuse_word(word: str) -> None:
     )
 
 
-def _without_plus(argument: str) -> str:
+def _strip_plus(argument: str) -> str:
     """`+experiment=x` as `experiment=x`: the group is there already, and Hydra would refuse to add
     it twice.
     """
@@ -200,10 +201,10 @@ def list_groups() -> tuple[str, ...]:
 
 def _expand_choices(group: str, value: str) -> list[str]:
     """The overrides that a list chosen in a group stands for."""
-    from tractexp.configuration.plugin import of_several
+    from tractexp.configuration.plugin import join_choices
 
     listed = _split_at_commas(value.strip()[1:-1])
-    node = of_several(group, [part.strip() for part in listed])
+    node = join_choices(group, [part.strip() for part in listed])
     name, ((setting, names),) = node.pop("name"), node.items()
     key = f"{group.replace('/', '.')}.{setting}"
     if not (value.strip().startswith("[") and value.strip().endswith("]")) or any(

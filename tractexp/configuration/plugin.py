@@ -34,7 +34,7 @@ from tractexp.configuration.choices import (
     list_modules,
     plugin_folders,
 )
-from tractexp.errors import Unknown, UserError, among, setting
+from tractexp.errors import Unknown, UserError, list_allowed, setting
 from tractexp.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -331,7 +331,7 @@ def _check_decorated(module: ModuleType) -> None:
     """Raise `UserError` for a class of a module that would be a plugin if it were decorated."""
     classes = tuple(cls for classes in _registry.values() for cls in classes.values())
     for cls in vars(module).values():
-        if _lacks_decorator(cls, module.__name__, classes):
+        if _is_unmarked_plugin(cls, module.__name__, classes):
             base = next(b for b in cls.__mro__ if "group" in vars(b))
             raise UserError(
                 f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class"
@@ -340,7 +340,7 @@ def _check_decorated(module: ModuleType) -> None:
             )
 
 
-def _lacks_decorator(cls: Any, module: str, classes: tuple[type, ...]) -> bool:
+def _is_unmarked_plugin(cls: Any, module: str, classes: tuple[type, ...]) -> bool:
     """Whether a class of a module is meant as a plugin and not marked as one: it is neither private
     nor a base of plugins.
     """
@@ -390,7 +390,9 @@ def get(group: str, name: str) -> type[Any]:
     """
     cls = find(group, name)
     if cls is None:
-        raise UserError(f"there is no {group} '{name}'{among(name, discover().get(group, {}))}")
+        raise UserError(
+            f"there is no {group} '{name}'{list_allowed(name, discover().get(group, {}))}"
+        )
     return cls
 
 
@@ -440,14 +442,15 @@ def build(group: str, settings: Mapping[str, Any]) -> Any:
     for key in chosen:
         if key not in allowed:
             raise UserError(
-                f"{group} '{cls.name}' has no setting '{key}'{among(key, allowed, 'Settings')}"
+                f"{group} '{cls.name}' has no setting '{key}'"
+                f"{list_allowed(key, allowed, 'Settings')}"
             )
     instance = cls(**chosen)
     instance.check()
     return instance
 
 
-def of_several(group: str, given: Sequence[Any]) -> dict[str, Any]:
+def join_choices(group: str, given: Sequence[Any]) -> dict[str, Any]:
     """The node that a list of choices in one group stands for. Raises `UserError` in a group of
     which one is chosen.
     """

@@ -14,7 +14,7 @@ from tractexp.configuration.choices import (
     describe_nameless,
     read_choices,
 )
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 
 HYDRA = ("hydra", "omegaconf", "antlr4")  # whose code composes configurations
 KINDS = {
@@ -52,19 +52,19 @@ def explain_errors() -> Iterator[None]:
     except (HydraException, OmegaConfBaseException) as error:
         raise UserError(_describe_error(error)) from error
     except OSError as error:
-        if not _of_hydra(error):
+        if not _comes_from_hydra(error):
             raise
         raise UserError(
             f"{error.filename} cannot be created ({error.strerror}); choose another folder for"
             " hydra.run.dir"
         ) from error
     except Exception as error:
-        if not _of_hydra(error):
+        if not _comes_from_hydra(error):
             raise
         raise UserError(_describe_unforeseen(error)) from error
 
 
-def _of_hydra(error: BaseException) -> bool:
+def _comes_from_hydra(error: BaseException) -> bool:
     """Whether an exception comes from what composes configurations: Python's own library apart, it
     is the last one.
     """
@@ -149,7 +149,7 @@ def _describe_error(error: BaseException) -> str:
     group = re.search(r"Could not override '([^']*)'", first_line(error))
     if group and "No match in the defaults list" in str(error):
         groups = _list_groups()
-        return f"there is no group '{group[1]}'{among(group[1], groups, 'Groups')}"
+        return f"there is no group '{group[1]}'{list_allowed(group[1], groups, 'Groups')}"
     return _read_first_line(error)
 
 
@@ -246,7 +246,7 @@ def _unknown_key(key: str, error: Any) -> str:
         keys = []
     section, _, last = key.rpartition(".")
     where = f"'{section}' has" if section else "the configuration has"
-    return f"{key}: {where} no key '{last}'{among(last, keys, 'Keys')}"
+    return f"{key}: {where} no key '{last}'{list_allowed(last, keys, 'Keys')}"
 
 
 def _list_groups() -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tractexp.errors import UserError, among, check_range
+from tractexp.errors import UserError, check_range, list_allowed
 
 LEAST = {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}  # of numbers
 
@@ -84,7 +84,9 @@ def check(config: Mapping[str, Any]) -> None:
             raise UserError(f"{where.rstrip('.')} holds no settings; leave it as it is")
         for key in part:
             if key not in keys:
-                raise UserError(f"{where}{key}: there is no such key{among(key, keys, 'Keys')}")
+                raise UserError(
+                    f"{where}{key}: there is no such key{list_allowed(key, keys, 'Keys')}"
+                )
         for key in keys:
             if key not in part:
                 raise UserError(

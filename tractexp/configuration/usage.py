@@ -16,7 +16,7 @@ from tractexp.configuration.choices import (
     read_default_choices,
     take_first_sentence,
 )
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 
 WIDEST_HELP = 100  # columns
 MOST_HELP_NAMES = 9  # names of a group that fit into two lines of the help, or three
@@ -176,7 +176,7 @@ def _describe_holders(name: str, options: Mapping[str, Mapping[str, Option]]) ->
     ]
     if holders:
         return f", but there is such a name in {' and '.join(holders)}"
-    return among(name, options, "Groups")
+    return list_allowed(name, options, "Groups")
 
 
 def _import_choices(

@@ -10,7 +10,7 @@ from scipy.special import ndtr, ndtri
 from tractexp.discrepancy.findings import Findings
 from tractexp.inference.catalogue import Candidate
 from tractexp.inference.score_test import Score
-from tractexp.text.wording import in_words
+from tractexp.text.wording import format_probability
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %
 # power at the smallest relevant size, as of a planned test (Saris, Satorra and van der Veld 2009)
@@ -70,7 +70,8 @@ def assessment(candidate: Candidate, score: Score, critical: float) -> tuple[str
     if score.p < critical:
         return (
             "relevant",
-            f"its score stands out: chance gives as much with a probability of {in_words(score.p)}",
+            f"its score stands out: chance gives as much with a probability of "
+            f"{format_probability(score.p)}",
         )
     if not np.isfinite(deviation):
         return "not testable", "these events cannot show it"

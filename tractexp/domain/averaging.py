@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tractexp.configuration.plugin import discover, find
-from tractexp.errors import MODEL, UserError, among
+from tractexp.errors import MODEL, UserError, list_allowed
 from tractexp.model.model import WAVES, Model
 from tractexp.record import Event
 from tractexp.record.window import LONGEST_WINDOW, mean_weights
@@ -41,7 +41,8 @@ def check_window(window: object, domain: str) -> None:
     names = (RECORDED, *sorted(discover()[Estimator.group]))
     if isinstance(window, str):
         raise UserError(
-            f"{MODEL.window}={window}: there is no such window{among(window, names)}; or give"
+            f"{MODEL.window}={window}: there is no such window"
+            f"{list_allowed(window, names)}; or give"
             " seconds"
         )
     if (

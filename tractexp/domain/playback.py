@@ -88,7 +88,7 @@ class Playback:
         estimator.
         """
         return replace(
-            cls.of_power(*as_phasors(event, currents)),
+            cls.of_power(*measure_as_phasors(event, currents)),
             epsilon_i=current_error(event, currents),
             waves=event,
             currents=currents,
@@ -179,7 +179,9 @@ def measure_unsteadiness(event: WaveEvent, currents: np.ndarray) -> float:
     )
 
 
-def as_phasors(event: WaveEvent, currents: np.ndarray) -> tuple[Event, np.ndarray, np.ndarray]:
+def measure_as_phasors(
+    event: WaveEvent, currents: np.ndarray
+) -> tuple[Event, np.ndarray, np.ndarray]:
     """The event in phasors of its recorded waveforms, and the power of calculated currents.
 
     Both are measured by one estimator from the same samples, so that its window cancels when they

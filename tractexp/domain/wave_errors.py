@@ -58,12 +58,12 @@ def input_errors(problem: "Problem", values: np.ndarray) -> np.ndarray:
     """
     shapes = [
         offsets(problem.drive),
-        *(_of_voltage(problem, values, e) for e in range(problem.drive.events)),
+        *(_measure_voltage_effects(problem, values, e) for e in range(problem.drive.events)),
     ]
     return np.concatenate(shapes)
 
 
-def _of_voltage(problem: "Problem", values: np.ndarray, event: int) -> np.ndarray:
+def _measure_voltage_effects(problem: "Problem", values: np.ndarray, event: int) -> np.ndarray:
     """The change of one event's currents (k, 3, N) [pu] by offsets of the voltage and by what it
     may be between samples at its edges.
     """
@@ -114,7 +114,7 @@ def _vary_between_samples(event: WaveEvent) -> list[WaveEvent]:
     How far each sample lies off a cubic through its neighbors tells how far the cubic may be off
     between samples.
     """
-    off = np.abs(off_neighbors(event.v * event.turn))
+    off = np.abs(measure_offset_from_neighbors(event.v * event.turn))
     off[: event.lead + 3] = 0.0
     seen = np.argsort(-off)[:MOST_BETWEEN]
     seen = np.sort(seen[off[seen] > max(ROUGH * event.noise_U, SMALLEST_DEVIATION)])
@@ -126,7 +126,7 @@ def _vary_between_samples(event: WaveEvent) -> list[WaveEvent]:
     return variants
 
 
-def off_neighbors(v: np.ndarray) -> np.ndarray:
+def measure_offset_from_neighbors(v: np.ndarray) -> np.ndarray:
     """How far each sample of v (N,) lies off the cubic through two on either side; 0
     at the ends.
     """

@@ -18,7 +18,7 @@ from tractexp.noise import Noise
 from tractexp.noise.random_walk import RandomWalk
 from tractexp.noise.voltage import SmoothedEvent
 from tractexp.noise.waves import of_waves
-from tractexp.record import Event, WaveEvent, in_waves
+from tractexp.record import Event, WaveEvent, convert_to_waves
 from tractexp.record.synthetic import synthetic_event
 from tractexp.record.wave_event import COARSEST
 from tractexp.text.wording import join_words
@@ -49,7 +49,7 @@ class WaveDomain(Domain):
 
     def event(self, event: Event) -> WaveEvent:
         """The event with its sampled waveforms. Raises `UserError` for a record of phasors."""
-        return in_waves(event)
+        return convert_to_waves(event)
 
     def excitation(
         self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)

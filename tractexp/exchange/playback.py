@@ -81,7 +81,7 @@ def play_back_export(
     why not elsewhere.
     """
     notes = []
-    for play in (_elsewhere, _here):
+    for play in (_play_in_other_simulator, _play_in_this_simulator):
         try:
             if (agreement := play(form, text, load)) is not None:
                 return agreement, notes
@@ -90,7 +90,7 @@ def play_back_export(
     return None, notes
 
 
-def _elsewhere(form: Format, text: str, load: Identified) -> Agreement | None:
+def _play_in_other_simulator(form: Format, text: str, load: Identified) -> Agreement | None:
     """In the simulator of the format; None where that is not at hand."""
     there = form.play_back_dip(text, load)
     return there and _measure_agreement(
@@ -98,7 +98,7 @@ def _elsewhere(form: Format, text: str, load: Identified) -> Agreement | None:
     )
 
 
-def _here(form: Format, text: str, load: Identified) -> Agreement:
+def _play_in_this_simulator(form: Format, text: str, load: Identified) -> Agreement:
     """In ours, by the numbers of the file."""
     restored = form.read_back(text, load)
     if restored is None:

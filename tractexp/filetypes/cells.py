@@ -161,12 +161,12 @@ def find_rising_group_mark(rows: Sequence[Sequence[Any]]) -> str:
     for column in zip(*rows, strict=False):
         texts = [cell.strip() if isinstance(cell, str) else "" for cell in column]
         for mark in ".,":
-            if _rises_by_groups(texts, mark):
+            if _is_rising_by_groups(texts, mark):
                 return mark
     return ""
 
 
-def _rises_by_groups(texts: Sequence[str], mark: str) -> bool:
+def _is_rising_by_groups(texts: Sequence[str], mark: str) -> bool:
     """Whether texts are whole numbers that rise where a mark parts groups, and not where it is the
     decimal mark.
     """
@@ -175,10 +175,10 @@ def _rises_by_groups(texts: Sequence[str], mark: str) -> bool:
     parts = [text.split(mark) for text in texts]
     grouped = [float("".join(groups)) for groups in parts]
     plain = [float(f"{first}.{''.join(rest)}") for first, *rest in parts]
-    return _rises(grouped) and not _rises(plain)
+    return _is_rising(grouped) and not _is_rising(plain)
 
 
-def _rises(values: Sequence[float]) -> bool:
+def _is_rising(values: Sequence[float]) -> bool:
     return all(a < b for a, b in itertools.pairwise(values))
 
 

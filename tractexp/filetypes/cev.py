@@ -78,7 +78,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
             f"{opened.per_cycle:g} samples a cycle: a filtered report; get the raw one of the relay"
             " with the command CEV R, or its COMTRADE file; its phasors are read by data=csv"
         )
-    runs = timeline.from_stamps(t, 1e-9, str(path))
+    runs = timeline.build_from_stamps(t, 1e-9, str(path))
     moment = 0.0 if opened.marked is None else float(t[opened.marked])
     return Recording(
         source=str(path),
@@ -93,7 +93,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
             for k in range(opened.values.shape[1])
             if _is_named(report, k)
         ],
-        segments=timeline.laid_out(runs),
+        segments=timeline.arrange_segments(runs),
         frequency=opened.nominal,
         device=report.about.get("FID", "").removeprefix("FID=").strip(),
         start=_start(report, moment, remarks),

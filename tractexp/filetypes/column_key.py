@@ -5,7 +5,7 @@ import operator
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tractexp.errors import DATA, UserError, among, nearest, setting
+from tractexp.errors import DATA, UserError, list_allowed, nearest, setting
 from tractexp.filetypes.column_unit import fits, is_unit
 from tractexp.filetypes.columns import Role, role
 from tractexp.filetypes.table import TableFile
@@ -47,7 +47,7 @@ def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
     for quantity, unit in units.items():
         if quantity not in QUANTITIES:
             raise UserError(
-                f"{DATA.units} names '{quantity}'{among(quantity, QUANTITIES, 'Quantities')}"
+                f"{DATA.units} names '{quantity}'{list_allowed(quantity, QUANTITIES, 'Quantities')}"
             )
         if not is_unit(amount(str(unit))[1]):
             raise UserError(
@@ -68,7 +68,8 @@ def spell_key(name: str) -> str:
     plain = "u" + plain[1:] if plain.startswith("v") else plain
     if plain not in spellings:
         raise UserError(
-            f"{DATA.columns} names '{name}'{among(str(name), CONTRACT, 'Keys')}, or ua, ub, uc, ia,"
+            f"{DATA.columns} names '{name}'"
+            f"{list_allowed(str(name), CONTRACT, 'Keys')}, or ua, ub, uc, ia,"
             " ib, ic"
         )
     return spellings[plain]
@@ -100,14 +101,16 @@ def find_column(table: TableFile, key: str, choice: Any) -> int:
             f"{DATA.columns}: {key}={choice}: {table.source} has that column {len(matches)} times;"
             f" give its number, one of {', '.join(map(str, matches))}"
         )
-    fitting = itertools.compress(names, map(_suits, itertools.repeat(key), names, units))
+    fitting = itertools.compress(
+        names, map(_may_hold_quantity, itertools.repeat(key), names, units)
+    )
     raise UserError(
         f"{DATA.columns}: {key}={choice}: {table.source} has no such"
         f" column{nearest(str(choice), fitting) or '.'} Columns: {', '.join(names)}"
     )
 
 
-def _suits(key: str, name: str, unit: str) -> bool:
+def _may_hold_quantity(key: str, name: str, unit: str) -> bool:
     """Whether a column may hold a key's quantity, for its name says no other."""
     named = role(name, unit)
     return named is None or named.quantity == Role(key).quantity

@@ -40,7 +40,7 @@ def find_options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list
     heading = table.heading
     names = _spell_out_names(heading.names)
     order = order_of(names, heading.units)
-    options = {key: [_chosen_column(table, key, k, order)] for key, k in numbers.items()}
+    options = {key: [_find_chosen_column(table, key, k, order)] for key, k in numbers.items()}
     others = find_other_columns(table, numbers.values())
     read = {k: role(names[k], heading.units[k], order) for k in others}
     roles = {k: one for k, one in read.items() if one}
@@ -108,7 +108,7 @@ def _named_column(number: int, name: str, key: str, by_name: Role) -> MappedColu
     return MappedColumn(number, name, replace(by_name, key=key, line=line))
 
 
-def _chosen_column(table: TableFile, key: str, number: int, order: str) -> MappedColumn:
+def _find_chosen_column(table: TableFile, key: str, number: int, order: str) -> MappedColumn:
     """The column that the user chose for a key.
 
     A phase voltage counts as phase to ground unless its name says line to line.
@@ -150,10 +150,10 @@ def _resolve_numbered_roles(roles: Mapping[int, Role]) -> dict[str, str]:
                 }
             elif letter in "PQ" and numbered[0] in keys:
                 phases[numbered[0]] = letter
-    return phases | _of_one_load(keys)
+    return phases | _are_of_one_load(keys)
 
 
-def _of_one_load(keys: Collection[str]) -> dict[str, str]:
+def _are_of_one_load(keys: Collection[str]) -> dict[str, str]:
     """The keys of U L1, P L1, Q L1 where no L2 and L3 are beside them: the whole of a load called
     L1.
     """

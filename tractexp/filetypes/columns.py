@@ -104,7 +104,7 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     words = split_words(name)
     kind = unit_quantity(unit)
     electrical = kind in (*BY_UNIT, "angle") or not ELECTRICAL.isdisjoint(map(WORDS.get, words))
-    if unmarked := _fraction(words, unit) or _other_role(words, unit, electrical):
+    if unmarked := _fraction(words, unit) or _find_other_role(words, unit, electrical):
         return unmarked
     spelled, ground = spell_marks(name, order)
     if spelled != normalize(name):
@@ -132,7 +132,7 @@ def _fraction(words: Sequence[str], unit: str) -> Role | None:
     return None
 
 
-def _other_role(words: Sequence[str], unit: str, electrical: bool) -> Role | None:
+def _find_other_role(words: Sequence[str], unit: str, electrical: bool) -> Role | None:
     """The role of a column of time, frequency and the like; None for any other."""
     said = None if electrical else find_quantity(words)
     return Role(said[0], unit) if said and said[0] not in ELECTRICAL else None

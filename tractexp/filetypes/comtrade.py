@@ -155,7 +155,7 @@ def _recording(
     return Recording(
         source=str(path),
         channels=[_channel(header, k, samples, stretches) for k in range(len(header.analogs))],
-        segments=timeline.laid_out(stretches),
+        segments=timeline.arrange_segments(stretches),
         frequency=header.frequency,
         station=header.station,
         device=header.device,
@@ -242,7 +242,7 @@ def _stretches(
     if header.rates[0][0] <= 0:
         return _stretches_by_stamps(data, header, samples, unit, remarks)
     t = _read_stamped_times(header, samples.stamps, unit, remarks)
-    result = timeline.from_rates(header.rates, t)
+    result = timeline.build_from_rates(header.rates, t)
     if any(s.t is not None for s in result):
         remarks.add(
             "sampling rates within 2 % of their neighbours are taken as one waveform",
@@ -259,7 +259,7 @@ def _stretches_by_stamps(
     if header.kind != "ASCII":
         # the counter ran over
         stamps += 2.0**32 * np.cumsum(np.diff(stamps, prepend=stamps[0]) < -(2.0**31))
-    result = timeline.from_stamps((stamps - stamps[0]) * unit, unit, str(data.path))
+    result = timeline.build_from_stamps((stamps - stamps[0]) * unit, unit, str(data.path))
     if header.timemult != 1:
         rates = ", ".join(f"{s.segment.rate:g}" for s in result[:3])
         remarks.add(

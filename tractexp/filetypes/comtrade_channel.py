@@ -19,7 +19,7 @@ def read_analog(rows: Lines, k: int, count: int) -> Analog:
     if not any(fields[13:]):
         fields = fields[:13]
     # the first without P or S
-    if len(fields) not in (10, 13) and not _lacks_side(fields):
+    if len(fields) not in (10, 13) and not _is_without_side(fields):
         raise rows.refuse(
             line,
             f"{channel} has {count_noun(len(fields), 'field')}, but an analog channel has 13, or 10"
@@ -40,7 +40,7 @@ def read_analog(rows: Lines, k: int, count: int) -> Analog:
     return _checked_ratio(rows, line, channel, analog)
 
 
-def _lacks_side(fields: list[str]) -> bool:
+def _is_without_side(fields: list[str]) -> bool:
     """Whether the fields of an analog channel are whole but for P or S at their end."""
     return len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None
 

@@ -70,7 +70,7 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
         orders = [(a, b, c), (a, c, b)]
     for k, (year, month, day) in enumerate(orders):
         try:
-            moment = datetime(_full_year(year), month, day, hour, minute, second, micro)
+            moment = datetime(_complete_year(year), month, day, hour, minute, second, micro)
         except ValueError:
             continue
         return moment, f"date {quote_field(text)} read as {moment:%Y-%m-%d}" if k or len(
@@ -79,7 +79,7 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
     return None, f"{quote_field(text)} is not a day of the calendar; not used"
 
 
-def _full_year(year: int) -> int:
+def _complete_year(year: int) -> int:
     """The year of which two digits may be written: 70 to 99 are of the last century."""
     if year >= 100:
         return year

@@ -59,7 +59,7 @@ def times_of(table: TableFile, mapping: Mapped, cells: Mapping[int, TableColumn]
     else:
         result = TableTimes(time.values, None, ())
     if "frac" in mapping.columns:
-        result = _with_fractions(
+        result = _add_fractions(
             table, mapping, result, cells[mapping.columns["frac"].number].values
         )
     if result.start is None and table.start is not None:
@@ -136,11 +136,11 @@ def _read_days(table: TableFile, values: np.ndarray, fastest: float) -> TableTim
         return None
     for since, more in DAYS_SINCE.items():
         if SERIAL_DAYS[0] <= values[0] - more <= SERIAL_DAYS[1]:
-            return _of_days(table, values - more, since)
+            return _count_from_days(table, values - more, since)
     return None
 
 
-def _of_days(table: TableFile, values: np.ndarray, since: str) -> TableTimes:
+def _count_from_days(table: TableFile, values: np.ndarray, since: str) -> TableTimes:
     """Times in days since a year, by now counted as those of spreadsheets are."""
     t = (values - values[0]) * SECONDS_A_DAY
     steps = np.diff(t)
@@ -157,7 +157,7 @@ def _of_days(table: TableFile, values: np.ndarray, since: str) -> TableTimes:
     )
 
 
-def _with_fractions(
+def _add_fractions(
     table: TableFile, mapping: Mapped, whole: TableTimes, fractions: np.ndarray
 ) -> TableTimes:
     """Whole seconds with the fractions of another column."""

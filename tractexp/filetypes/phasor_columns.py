@@ -13,7 +13,7 @@ from tractexp.filetypes.power_columns import Powers, has_absolute_unit, read_col
 from tractexp.filetypes.table import TableFile
 from tractexp.record.angle import unwrap_angle
 from tractexp.record.phasor import sequences
-from tractexp.recording.nominal_voltage import is_between_phases, off_nominal
+from tractexp.recording.nominal_voltage import is_between_phases, measure_offset_from_nominal
 
 # the positive sequence of line voltages over that of phase voltages
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)
@@ -25,7 +25,7 @@ PHASE_ANGLES = ("Ua_angle", "Ub_angle", "Uc_angle")
 def read_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     """U, P and Q of a table of voltages and currents by size and angle."""
     values, start, note = read_columns(table, mapping)
-    values, absolute = _in_units(table, mapping, values)
+    values, absolute = _convert_to_units(table, mapping, values)
     voltages = _list_magnitudes(values, "U")
     currents = _list_magnitudes(values, "I")
     scale, angle_notes = _find_angle_unit(table, mapping, values)
@@ -36,7 +36,7 @@ def read_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     I1, _ = _compute_sequences(_join_phasors(values, currents, scale), currents)
     wiring: list[str] = []
     if absolute:
-        V1, wiring = _to_ground(mapping.columns[voltages[0]], V1)
+        V1, wiring = _refer_to_ground(mapping.columns[voltages[0]], V1)
     elif voltages[0][1:] in LINES:  # per unit of a line voltage
         V1 = np.sqrt(3) * V1
         V2 = None if V2 is None else np.sqrt(3) * V2
@@ -85,7 +85,7 @@ def _turn_forward(V: np.ndarray, sources: Sequence[MappedColumn]) -> tuple[np.nd
     return np.where(backward, -1, 1)[:, None] * V, []
 
 
-def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]:
+def _refer_to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]:
     """The phasors (N,) of one voltage, to ground, and what they were taken for where its name does
     not say it.
     """
@@ -97,7 +97,7 @@ def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]
         return V, []
     if one.role.line:
         return V / np.sqrt(3), []
-    line = off_nominal(level) <= off_nominal(np.sqrt(3) * level)
+    line = measure_offset_from_nominal(level) <= measure_offset_from_nominal(np.sqrt(3) * level)
     if line:
         why = (
             f"taken as line to line: {level:.4g} kV is nearer to a nominal voltage than"
@@ -113,7 +113,7 @@ def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]
     return V, [f"{one.label} {why} (a name with LL says line to line)"]
 
 
-def _in_units(
+def _convert_to_units(
     table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]
 ) -> tuple[dict[str, np.ndarray], bool]:
     """(magnitudes in kV and kA or per unit, whether they are in kV and kA).

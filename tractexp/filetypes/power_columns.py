@@ -155,7 +155,7 @@ def _guess_line(
     """(whether a voltage [kV] whose name does not say it is line to line, why): by the powers,
     else by its size.
     """
-    product = None if current is None else _by_power(columns, current)
+    product = None if current is None else _is_line_voltage_by_power(columns, current)
     if product is not None:
         return product, ", for P and Q are the product of it and the current then"
     level = float(np.nanmedian(columns["U"]))
@@ -180,7 +180,9 @@ def _describe_secondary_size(columns: Mapping[str, np.ndarray]) -> list[str]:
     ]
 
 
-def _by_power(columns: Mapping[str, np.ndarray], current: np.ndarray) -> bool | None:
+def _is_line_voltage_by_power(
+    columns: Mapping[str, np.ndarray], current: np.ndarray
+) -> bool | None:
     """Whether a voltage is line to line by S = sqrt(3) U I, where that or S = 3 U I holds; else
     None.
     """

@@ -231,10 +231,10 @@ def _segments(
     for each in stretches:
         t = each.t - stretches[0].t[0]
         resolution = float(np.spacing(np.float32(np.abs(t - t[0]).max())))
-        runs = timeline.from_stamps(t, resolution, where)
+        runs = timeline.build_from_stamps(t, resolution, where)
         segments += [
             timeline.Segment(first + s.first, first + s.stop, s.rate, s.start)
-            for s in timeline.laid_out(runs)
+            for s in timeline.arrange_segments(runs)
         ]
         for k, values in each.columns.items():
             parts[k].append(timeline.resample_evenly(values, runs, None))

@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from tractexp.errors import DATA, UserError, among, check_choice, nearest
+from tractexp.errors import DATA, UserError, check_choice, list_allowed, nearest
 from tractexp.filetypes.cells import BadCell, find_group_mark, is_number, numbers
 from tractexp.filetypes.clock import is_time, times
 from tractexp.filetypes.column_unit import split_unit
@@ -320,7 +320,7 @@ def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
     if str(sheet).isdigit() and 1 <= int(sheet) <= len(names):
         return names[int(sheet) - 1]
     raise UserError(
-        f"{DATA.sheet}={sheet}: {path} has no such sheet{among(sheet, names, 'Sheets')}"
+        f"{DATA.sheet}={sheet}: {path} has no such sheet{list_allowed(sheet, names, 'Sheets')}"
     )
 
 

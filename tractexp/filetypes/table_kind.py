@@ -111,7 +111,8 @@ def _waveform(options: Mapping[str, Any]) -> list[str]:
     beside them.
     """
     U, I = (
-        list_quantity_keys(options, letter, ()) or _one_phase(options, letter) for letter in "UI"
+        list_quantity_keys(options, letter, ()) or _find_single_phase(options, letter)
+        for letter in "UI"
     )
     one_kind = (
         len(U or I) == 3 and not has_quantity(options, "P") and not has_quantity(options, "Q")
@@ -119,7 +120,7 @@ def _waveform(options: Mapping[str, Any]) -> list[str]:
     return [*U, *I] if (U and I) or one_kind else []
 
 
-def _one_phase(options: Mapping[str, Any], letter: str) -> list[str]:
+def _find_single_phase(options: Mapping[str, Any], letter: str) -> list[str]:
     """The key of the one column there is of a quantity; [] where there is none."""
     return [key for key in (letter, f"{letter}a", f"{letter}1") if key in options][:1]
 

@@ -23,7 +23,7 @@ from tractexp.record.gap import (
 )
 from tractexp.record.record import LARGEST_JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
-from tractexp.recording.unit import in_units
+from tractexp.recording.unit import convert_to_units
 
 SEGMENT_GAP_STEPS = 1.5  # usual steps: a longer one parts two segments
 
@@ -57,7 +57,7 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
         for k in numbers
     ]
     notes = [*table.notes, *read.notes, *odd]
-    return in_units(
+    return convert_to_units(
         Recording(table.source, channels, segments, nominal, start=read.start, notes=notes), {}, {}
     )
 

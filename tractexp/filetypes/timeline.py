@@ -32,7 +32,9 @@ class Stretch:
     t: np.ndarray | None = None
 
 
-def from_rates(rates: Sequence[tuple[float, int]], t: np.ndarray | None = None) -> list[Stretch]:
+def build_from_rates(
+    rates: Sequence[tuple[float, int]], t: np.ndarray | None = None
+) -> list[Stretch]:
     """From (Hz, last sample counted from 1); neighbours of nearly one rate become one segment.
 
     `t` (N,) [s], are good time stamps, which say when a segment begins and whether two are joined.
@@ -76,7 +78,7 @@ def _build_declared_stretch(group: list[tuple[float, int, int]], start: float) -
     )
 
 
-def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
+def build_from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
     """From times (N,) [s] of every sample, exact to `unit` [s]; raises `UserError` where they do
     not increase.
     """
@@ -148,7 +150,7 @@ def _measure_unevenness(t: np.ndarray, rate: float) -> float:
     return float(np.abs((t - t[0]) * rate - np.arange(len(t))).max())
 
 
-def laid_out(stretches: Sequence[Stretch]) -> list[Segment]:
+def arrange_segments(stretches: Sequence[Stretch]) -> list[Segment]:
     """The segments after `evened`: numbered from 0 without what lies between them where anything is
     interpolated.
     """

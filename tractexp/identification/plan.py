@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import PHASORS, Domain, domain_of
-from tractexp.errors import TASK, UserError, among, check_range
+from tractexp.errors import TASK, UserError, check_range, list_allowed
 from tractexp.inference.information import Information
 from tractexp.inference.interval import interval_factor
 from tractexp.inference.likelihood import Likelihood, before_the_event
@@ -263,7 +263,7 @@ def column(names: Sequence[str], parameter: str) -> int:
     if name not in names:
         raise UserError(
             f"{TASK.parameter}={parameter} is not a free"
-            f" parameter{among(parameter, [*names, INERTIA])}"
+            f" parameter{list_allowed(parameter, [*names, INERTIA])}"
         )
     return list(names).index(name)
 

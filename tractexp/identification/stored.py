@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from tractexp.configuration.kinds import check_kind
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 from tractexp.text.wording import count_noun
 
 
@@ -24,7 +24,9 @@ def check_fields(cls: type[Any], content: Any, where: str) -> None:
     own = {f.name: f for f in dataclasses.fields(cls)}
     for name in content:
         if name not in own:
-            raise UserError(f"{unlike}: it has an unknown key '{name}'{among(name, own, 'Keys')}")
+            raise UserError(
+                f"{unlike}: it has an unknown key '{name}'{list_allowed(name, own, 'Keys')}"
+            )
     for name, f in own.items():
         if name not in content and f.default is f.default_factory is dataclasses.MISSING:
             raise UserError(f"{unlike}: it lacks '{name}'")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.configuration.plugin import discover, find, get
-from tractexp.errors import TASK, UserError, among
+from tractexp.errors import TASK, UserError, list_allowed
 from tractexp.model.model import Model
 from tractexp.model.parts import COMPARED, Effect, Measurement
 from tractexp.parameter import Parameter
@@ -184,7 +184,7 @@ def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -
     for name in only:
         if find("effect", name) is None:
             raise UserError(
-                f"{TASK.effects} names '{name}', which is no effect{among(name, registered)}"
+                f"{TASK.effects} names '{name}', which is no effect{list_allowed(name, registered)}"
             )
     here = {effect.name for effect in model.effects}
     testable, untestable, members = [], {}, []

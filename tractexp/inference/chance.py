@@ -25,7 +25,7 @@ from tractexp.inference.linearization import Linearization, rich_residuals
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.score_test import ScoreTest
 from tractexp.noise import Noise
-from tractexp.text.wording import in_words
+from tractexp.text.wording import format_probability
 
 NULL_DRAWS = 199
 # Independent quiet samples below which every draw estimates its noise anew: the error of the
@@ -50,7 +50,7 @@ def by_draws(p: float) -> str:
     """
     least = 1 / (NULL_DRAWS + 1)
     if p >= least:
-        return in_words(p)
+        return format_probability(p)
     return f"less than {ADEQUATE_P if p < ADEQUATE_P else least:g}"
 
 

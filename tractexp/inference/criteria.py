@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tractexp.errors import TASK, UserError, among, check_range
+from tractexp.errors import TASK, UserError, check_range, list_allowed
 from tractexp.inference.goodness_of_fit import ADEQUATE_P
 
 DERIVED, CHOSEN = "derived", "chosen"
@@ -122,7 +122,7 @@ class Criteria:
             if name not in names:
                 raise UserError(
                     f"{TASK.criteria}.{name}: there is no such"
-                    f" criterion{among(name, names, 'Criteria')}"
+                    f" criterion{list_allowed(name, names, 'Criteria')}"
                 )
         return cls(**{name: float(value) for name, value in chosen.items()})
 

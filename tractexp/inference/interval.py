@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.parameter import Parameter
 from tractexp.storage import files
-from tractexp.text.wording import with_error
+from tractexp.text.wording import format_with_error
 
 INTERVAL_LEVEL = 0.95
 
@@ -65,7 +65,7 @@ class ParameterEstimate:
     def __str__(self) -> str:
         """ "T_prime 0.1234 ± 0.0012 s", with the digits that the error leaves."""
         unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
-        return f"{self.parameter.name} {with_error(self.value, self.error)}{unit}"
+        return f"{self.parameter.name} {format_with_error(self.value, self.error)}{unit}"
 
     @property
     def half(self) -> float:

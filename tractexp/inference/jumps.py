@@ -11,7 +11,7 @@ import functools
 
 import numpy as np
 
-from tractexp.domain.wave_errors import off_neighbors
+from tractexp.domain.wave_errors import measure_offset_from_neighbors
 from tractexp.inference.context import Context
 
 MOST_JUMPS = 4  # samples of one channel and event that are the least smooth
@@ -69,7 +69,7 @@ def _at_jumps(added: np.ndarray) -> list[tuple[int, float]]:
     """The samples around the jumps of one channel (N,), each with the standard deviation [pu] of
     its error.
     """
-    off = np.abs(off_neighbors(added))
+    off = np.abs(measure_offset_from_neighbors(added))
     least = LEAST_JUMP * np.abs(added).max(initial=0.0)
     doubt: dict[int, float] = {}
     for k in np.argsort(-off)[:MOST_JUMPS].tolist():

@@ -33,7 +33,7 @@ def _rebuilt(part: Basic, args: Sequence[Basic]) -> Any:
     return part.func(*args)
 
 
-def as_real_imag(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+def split_real_imag(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
     """Real and imaginary part of an expression in real symbols, products multiplied out, as SymPy
     takes them.
 

@@ -200,7 +200,7 @@ def _phase(
         used = set().union(*map(symbols_of, expressions))
         signals = tuple((s, e) for e, s in hoist.signals.items() if s in used)
     computed = [*zip(targets, expressions, strict=False)]
-    return Phase(signals, _in_order(computed), tuple(expressions[len(targets) :]))
+    return Phase(signals, _sort_assignments(computed), tuple(expressions[len(targets) :]))
 
 
 def _select_needed_steps(
@@ -215,7 +215,7 @@ def _select_needed_steps(
     return {symbol: e for symbol, e in steps.items() if symbol in needed}
 
 
-def _in_order(
+def _sort_assignments(
     assignments: list[tuple[Symbol, sympy.Expr]],
 ) -> tuple[tuple[Symbol, sympy.Expr], ...]:
     """Assignments rearranged so that each comes after those it reads."""

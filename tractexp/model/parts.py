@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tractexp.configuration.plugin import Plugin
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 from tractexp.model import sites
 from tractexp.model.names import check_name
 from tractexp.model.signature import check_signature, select_arguments
@@ -57,7 +57,7 @@ class Part(Plugin):
             if channel not in CHANNELS:
                 raise UserError(
                     f"{where}: reads names the channel"
-                    f" '{channel}'{among(channel, CHANNELS, 'Channels')}"
+                    f" '{channel}'{list_allowed(channel, CHANNELS, 'Channels')}"
                 )
 
 
@@ -359,10 +359,12 @@ class Effect(Part):
         for place in cls.places:
             if place not in sites.PLACES:
                 raise UserError(
-                    f"{where}: places names '{place}'{among(place, sites.PLACES, 'Places')}"
+                    f"{where}: places names '{place}'{list_allowed(place, sites.PLACES, 'Places')}"
                 )
         if cls.kind and cls.kind not in sites.KINDS:
-            raise UserError(f"{where}: kind is '{cls.kind}'{among(cls.kind, sites.KINDS, 'Kinds')}")
+            raise UserError(
+                f"{where}: kind is '{cls.kind}'{list_allowed(cls.kind, sites.KINDS, 'Kinds')}"
+            )
 
 
 class Measurement(Effect):
@@ -401,7 +403,7 @@ def _check_names(
     for name in names:
         if name not in own:
             raise UserError(
-                f"{where} names '{name}', no parameter of it{among(name, own, 'It has')}"
+                f"{where} names '{name}', no parameter of it{list_allowed(name, own, 'It has')}"
             )
         if name not in allowed:
             raise UserError(f"{where} names '{name}', which {why_not}; take it out")

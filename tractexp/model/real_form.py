@@ -8,7 +8,7 @@ import sympy
 from sympy import I
 
 from tractexp.kernel.graph import Symbol, nodes, operations, symbols_of
-from tractexp.model.graph import as_real_imag, halves, replace_symbols
+from tractexp.model.graph import halves, replace_symbols, split_real_imag
 from tractexp.model.symbols import is_real, phasor_parts, real_symbol, start_symbol
 
 MOST_EXPANDED_NODES = 300  # nodes of an expression
@@ -77,7 +77,7 @@ class RealForm:
         if is_real(lowered):
             both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
         else:
-            both = map(_shorter, as_real_imag(lowered))
+            both = map(_shorter, split_real_imag(lowered))
         real, imaginary = (replace_symbols(e, self._map_real_names(e)) for e in both)
         return real, imaginary
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from tractexp.configuration.plugin import Plugin
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 
 NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
@@ -53,7 +53,7 @@ def _check_argument(argument: inspect.Parameter, known: Sequence[str], call: str
     if is_named and is_needed and argument.name not in known:
         raise UserError(
             f"{call} asks for '{argument.name}', which is neither a parameter of it nor"
-            f" offered{among(argument.name, known, 'It may ask for')}"
+            f" offered{list_allowed(argument.name, known, 'It may ask for')}"
         )
     # but for the bases' own, which gets nothing
     if argument.kind is argument.VAR_POSITIONAL and argument.name != "_":

@@ -9,7 +9,7 @@ of the bus. An effect edits them (`eq.edit(sites.P_static, change)`) or reads th
 from dataclasses import dataclass
 from typing import Literal, NoReturn
 
-from tractexp.errors import Unknown, UserError, among
+from tractexp.errors import Unknown, UserError, list_allowed
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def __getattr__(name: str) -> NoReturn:
     """Raise `Unknown` for a site that there is not, with the nearest one."""
     if name.startswith("_"):  # what Python itself looks for in a module
         raise AttributeError(name)
-    raise Unknown(f"there is no 'sites.{name}'{among(name, SITES, 'Sites')}")
+    raise Unknown(f"there is no 'sites.{name}'{list_allowed(name, SITES, 'Sites')}")
 
 
 def find_site(what: "Site | str") -> Site:
@@ -140,5 +140,5 @@ def find_site(what: "Site | str") -> Site:
     if isinstance(what, Site):
         return what
     if what not in SITES:
-        raise UserError(f"there is no site '{what}'{among(what, SITES, 'Sites')}")
+        raise UserError(f"there is no site '{what}'{list_allowed(what, SITES, 'Sites')}")
     return SITES[what]

@@ -40,7 +40,7 @@ def limit_threads() -> Iterator[None]:
         yield
 
 
-def in_one_thread(function: Callable[P, R]) -> Callable[P, R]:
+def limit_to_one_thread(function: Callable[P, R]) -> Callable[P, R]:
     """The function, whose linear algebra runs in one thread.
 
     Examples

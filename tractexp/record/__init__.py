@@ -6,7 +6,7 @@ from tractexp.record.event import detect as detect
 from tractexp.record.event import measure_promise as measure_promise
 from tractexp.record.fall import find_dips as find_dips
 from tractexp.record.own_base import OwnBase as OwnBase
-from tractexp.record.own_base import on_own_base as on_own_base
+from tractexp.record.own_base import rebase_events as rebase_events
 from tractexp.record.reader import Events as Events
 from tractexp.record.reader import Reader as Reader
 from tractexp.record.reader import endings as endings
@@ -15,6 +15,6 @@ from tractexp.record.reader import reader_of as reader_of
 from tractexp.record.record import Base as Base
 from tractexp.record.record import Record as Record
 from tractexp.record.wave_event import WaveEvent as WaveEvent
-from tractexp.record.wave_event import in_waves as in_waves
+from tractexp.record.wave_event import convert_to_waves as convert_to_waves
 from tractexp.record.waves import Waves as Waves
 from tractexp.record.window import Window as Window

@@ -9,9 +9,9 @@ from tractexp.record.change import (
     CHANGED,
     clause,
     describe_power_change,
+    fill_gaps,
     load_changes,
     smear,
-    without_gaps,
 )
 from tractexp.record.record import Record
 
@@ -21,7 +21,7 @@ BACK = 0.9  # of the voltage before a dip: at less a load may go with it
 SETTLED = 0.1, 0.5  # s after a dip between which a loss is judged
 
 
-def until_change(record: Record, start: int, end: int, S: complex) -> Record:
+def cut_at_change(record: Record, start: int, end: int, S: complex) -> Record:
     """The record up to where its load changes after a dip for another reason, with a note; else the
     record itself.
 
@@ -43,14 +43,14 @@ def until_change(record: Record, start: int, end: int, S: complex) -> Record:
             " of the answer"
         )
         return _add_note(record, said)
-    return _until_gone(record, end + least, S, BACK * float(np.median(record.U[:start])))
+    return _cut_where_load_goes(record, end + least, S, BACK * float(np.median(record.U[:start])))
 
 
-def _until_gone(record: Record, first: int, S: complex, U: float) -> Record:
+def _cut_where_load_goes(record: Record, first: int, S: complex, U: float) -> Record:
     """The record up to where its load begins to go though it was there at sample `first` and the
     voltage exceeds U.
     """
-    size = np.abs(without_gaps(record.P) + 1j * without_gaps(record.Q))[first:]
+    size = np.abs(fill_gaps(record.P) + 1j * fill_gaps(record.Q))[first:]
     gone = (size < LOST * abs(S)) & (record.U[first:] > U)
     n = max(1, round(smear(record)))
     if len(size) < 2 * n or gone[:n].any() or not gone[-n:].all():

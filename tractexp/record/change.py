@@ -66,7 +66,7 @@ def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> l
     list of Change
         Of more than 5 % of the apparent power.
     """
-    S, n = without_gaps(P) + 1j * without_gaps(Q), max(1, round(cycle))
+    S, n = fill_gaps(P) + 1j * fill_gaps(Q), max(1, round(cycle))
     (before, after), (low, high) = _levels(S, n), _levels(U.astype(complex), n)
     if not len(before):
         return []
@@ -155,7 +155,7 @@ def runs(mask: np.ndarray, least: int = 1) -> list[slice]:
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
 
 
-def without_gaps(x: np.ndarray) -> np.ndarray:
+def fill_gaps(x: np.ndarray) -> np.ndarray:
     """Values (N,) with gaps (nan) filled in linearly; all zero where there is no value.
 
     Examples

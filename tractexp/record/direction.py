@@ -19,7 +19,7 @@ TURNS = 0.1
 REMEDY = "set data.reverse_current=true"
 
 
-def at_level(x: np.ndarray, share: float) -> np.ndarray:
+def find_values_at_level(x: np.ndarray, share: float) -> np.ndarray:
     """Which of the values (N,), positive, lie within `share` of the level that most of them have;
     the higher of two.
     """
@@ -60,12 +60,12 @@ def explain_negative_power(
         return ""
     U, P, Q = U[valid], P[valid], Q[valid]
     calm_deviation = max(
-        LARGEST_CALM_DEVIATION, 3 * _usual_step(U) / max(float(np.median(U)), 1e-12)
+        LARGEST_CALM_DEVIATION, 3 * _measure_usual_step(U) / max(float(np.median(U)), 1e-12)
     )
-    calm = at_level(U, calm_deviation) if calm is None else calm[valid]
+    calm = find_values_at_level(U, calm_deviation) if calm is None else calm[valid]
     level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
     normal = np.abs(U - level) <= calm_deviation * level
-    least_power = LEAST_SIGN_RATIO * _usual_step(P)
+    least_power = LEAST_SIGN_RATIO * _measure_usual_step(P)
     if -least_power <= P0:
         return ""
     if np.count_nonzero(P[normal] > -TURNS * P0) > max(FEWEST_STATE_SAMPLES, 0.02 * len(P)):
@@ -101,7 +101,7 @@ def _tell_cause(polarity: int, a: float, fell: bool, P0: float, Q0: float) -> st
     return f"{answer}, {ambiguous}"
 
 
-def _usual_step(x: np.ndarray) -> float:
+def _measure_usual_step(x: np.ndarray) -> float:
     """The median size of the steps of values (N,); 0 of a single one."""
     return float(np.median(np.abs(np.diff(x)))) if len(x) > 1 else 0.0
 

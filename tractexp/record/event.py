@@ -9,10 +9,10 @@ import numpy as np
 
 from tractexp.cache.provenance import digest
 from tractexp.errors import UserError
-from tractexp.record.aftermath import loss, until_change
+from tractexp.record.aftermath import cut_at_change, loss
 from tractexp.record.direction import explain_negative_power
 from tractexp.record.fall import FEWEST_BEFORE, STEADY, falls
-from tractexp.record.no_dip import no_dip, no_such_dip
+from tractexp.record.no_dip import explain_no_dip, explain_no_such_dip
 from tractexp.record.record import Record
 from tractexp.record.steadiness import is_at_rest, steady_part
 from tractexp.record.swing import Swing, find_swing
@@ -159,7 +159,7 @@ def detect(record: Record) -> Event:
     """
     dips, swells = falls(record.t, record.U)
     if not dips:
-        raise UserError(no_dip(record))
+        raise UserError(explain_no_dip(record))
     start, end = dips[0]
     if start < FEWEST_BEFORE:
         raise UserError(
@@ -167,7 +167,7 @@ def detect(record: Record) -> Event:
             f" steady state before it needs at least {FEWEST_BEFORE} samples; give a record that"
             " starts earlier"
         )
-    if reason := no_such_dip(record, start, end):
+    if reason := explain_no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {reason}")
     unfinished = end == record.samples
     end = min(end, record.samples - 1)
@@ -191,7 +191,7 @@ def detect(record: Record) -> Event:
     notes += [_tell_unfinished(record, start)] if unfinished else []
     if notes := [*notes, *loss(record, end, complex(P0, Q0))]:
         record = replace(record, notes=tuple(dict.fromkeys([*record.notes, *notes])))
-    record = until_change(record, start, end, complex(P0, Q0))
+    record = cut_at_change(record, start, end, complex(P0, Q0))
     return Event(
         record=record,
         start=start,

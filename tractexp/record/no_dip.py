@@ -19,7 +19,7 @@ UNFINISHED = 0.1  # s: a record that ends sooner in a dip shows no answer of the
 COARSE, FEWEST_INSIDE = 20.0, 5
 
 
-def no_such_dip(record: Record, start: int, end: int) -> str:
+def explain_no_such_dip(record: Record, start: int, end: int) -> str:
     """Why a fall of the voltage is not a dip that can be fitted, a clause; "" where it is one."""
     t, U = record.t, record.U
     before = float(U[:start].mean())
@@ -112,7 +112,7 @@ def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
     )
 
 
-def no_dip(record: Record) -> str:
+def explain_no_dip(record: Record) -> str:
     """Why a record holds no dip, in a sentence with what its voltage does instead."""
     U, t = record.U, record.t
     reference, margin = float(np.median(U[:FEWEST_BEFORE])), margin_of(U)

@@ -17,7 +17,7 @@ from tractexp.cache.provenance import digest
 from tractexp.errors import DATA, UserError
 from tractexp.record.event import Event, detect
 from tractexp.record.record import DECLARATION, LOAD, Base, Record
-from tractexp.record.wave_event import WaveEvent, in_waves
+from tractexp.record.wave_event import WaveEvent, convert_to_waves
 
 # pu before the dip, on a base of the load: bounds reach to a torque of one
 LEAST_S, MOST_P = 0.5, 1.05
@@ -93,7 +93,7 @@ class OwnBase:
         return f"{self.power:.4g} MVA" if self.in_mva else f"{self.power:.4g} pu of the file"
 
 
-def on_own_base(events: Sequence[Event]) -> list[Event]:
+def rebase_events(events: Sequence[Event]) -> list[Event]:
     """Events of one call, the first one fitted, all on the base of the load in that.
 
     Raises `UserError` where they must be rebased and some of them do not say how many MVA one per
@@ -133,7 +133,7 @@ def convert_base(event: Event, ratio: float, own: OwnBase) -> Event:
         Its voltages, times and frequencies are as before.
     """
     if isinstance(event, WaveEvent):  # its currents are per unit of the record's base
-        return in_waves(convert_base(event.phasors, ratio, own))
+        return convert_to_waves(convert_base(event.phasors, ratio, own))
     record = event.record
     by, base = Base(1.0, ratio), replace(record.base, power=ratio * record.base.power, origin=LOAD)
     arrays = by.per_unit({"P": record.P, "Q": record.Q})

@@ -13,10 +13,10 @@ from tractexp.record.change import (
     LARGEST_USUAL_CHANGE,
     Change,
     clause,
+    fill_gaps,
     load_changes,
     smear,
     voltage_changes,
-    without_gaps,
 )
 from tractexp.record.record import Record
 
@@ -42,7 +42,7 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
     steps = [
         c
         for c in load_changes(U, P, Q, cycle)
-        if begin + c.stop > first and not _early(c, len(U), cycle)
+        if begin + c.stop > first and not _may_step_be_dip(c, len(U), cycle)
     ]
     if last := steps[-1:]:
         first, what = begin + last[0].stop, clause(record, begin, last[0])
@@ -64,7 +64,7 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
                 f" {record.t[middle]:g} s, before the dip: the steady state is that of the"
                 f" {(part.stop - first) * record.step:.2g} s after it"
             )
-    return _at_rest(record, slice(first, part.stop), least, notes)
+    return _find_part_at_rest(record, slice(first, part.stop), least, notes)
 
 
 def is_at_rest(record: Record, part: slice) -> bool:
@@ -72,18 +72,22 @@ def is_at_rest(record: Record, part: slice) -> bool:
     return _course(record, part) is None
 
 
-def _early(change: Change, dip: int, cycle: float) -> bool:
+def _may_step_be_dip(change: Change, dip: int, cycle: float) -> bool:
     """Whether a small step right before a dip may be the dip itself, where P and Q are stamped
     earlier than U.
     """
     return dip - change.stop < EARLY[0] * cycle and abs(change.ratio - 1) < EARLY[1]
 
 
-def _at_rest(record: Record, part: slice, least: int, notes: list[str]) -> tuple[slice, list[str]]:
+def _find_part_at_rest(
+    record: Record, part: slice, least: int, notes: list[str]
+) -> tuple[slice, list[str]]:
     """The part in which a load that came to rest rests; what is said of one that does not."""
     whole, course = part, _course(record, part)
     while course is not None and not course.swings:
-        rest = next((late for late in _late(part, least) if _rests(record, late, course)), None)
+        rest = next(
+            (late for late in _list_last_parts(part, least) if _rests(record, late, course)), None
+        )
         if rest is None:
             break
         part, course = rest, _course(record, rest)
@@ -109,7 +113,7 @@ def _at_rest(record: Record, part: slice, least: int, notes: list[str]) -> tuple
     return part, [*notes, said]
 
 
-def _late(part: slice, least: int) -> Iterator[slice]:
+def _list_last_parts(part: slice, least: int) -> Iterator[slice]:
     """The last parts of the samples that are long enough."""
     for share in PARTS:
         late = slice(part.stop - (part.stop - part.start) // share, part.stop)
@@ -161,7 +165,7 @@ def course_of(P: np.ndarray, Q: np.ndarray, cycle: float, at_all: bool = False) 
 
     `cycle` is in samples. With `at_all` however little it moves.
     """
-    S, n = without_gaps(P) + 1j * without_gaps(Q), max(1, round(2 * cycle))
+    S, n = fill_gaps(P) + 1j * fill_gaps(Q), max(1, round(2 * cycle))
     if len(S) < 2 * n:
         return None
     smooth = np.convolve(S, np.full(n, 1 / n), "valid")

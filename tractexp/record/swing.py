@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.record.change import ANSWERED, without_gaps
+from tractexp.record.change import ANSWERED, fill_gaps
 from tractexp.record.record import Record
 
 SMALLEST_SWING = 0.01  # of the apparent power: a swing of a smaller amplitude is not told
@@ -64,7 +64,7 @@ def find_swing(record: Record, part: slice) -> Swing | None:
     Swing or None
         None where there is none.
     """
-    U, P, Q = (without_gaps(x[part]) for x in (record.U, record.P, record.Q))
+    U, P, Q = (fill_gaps(x[part]) for x in (record.U, record.P, record.Q))
     rate, fastest = record.rate, FASTEST_SHARE * record.base.frequency
     size = max(float(np.hypot(P.mean(), Q.mean())), 1e-300)
     swings = []

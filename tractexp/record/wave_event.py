@@ -178,7 +178,7 @@ class Periodic:
         return self.coefficients[1] - 1j * self.coefficients[2]
 
 
-def in_waves(event: Event) -> WaveEvent:
+def convert_to_waves(event: Event) -> WaveEvent:
     """The event in waveforms. Raises `UserError` where its record has none, or too few samples per
     cycle or before it.
 

@@ -59,7 +59,7 @@ def divide_by_kind(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     if e.dead or _find_dead_samples(trace, e)[e.start : until].any():
         if e.returned and not e.dead:
             return [("interruption", e)]
-        return [("dead line", _until_alive(trace, e))]
+        return [("dead line", _cut_where_phase_returns(trace, e))]
     opened = _find_open_phase(trace, e)
     if opened is None:
         return [(_name_change(e), e)]
@@ -78,7 +78,7 @@ def _name_change(e: Excursion) -> str:
     return "dip" if e.worst < 0 else "swell"
 
 
-def _until_alive(trace: Trace, e: Excursion) -> Excursion:
+def _cut_where_phase_returns(trace: Trace, e: Excursion) -> Excursion:
     """The excursion up to where a phase is back for good, or to the end."""
     dead = _find_dead_samples(trace, e)[e.end :]
     return (

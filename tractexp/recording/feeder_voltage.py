@@ -15,7 +15,7 @@ from tractexp.recording.feeder import Feeder
 from tractexp.recording.label import Group, words
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots
-from tractexp.recording.unit import in_doubt
+from tractexp.recording.unit import is_unit_in_doubt
 
 LEAST_SEQUENCE_SHARE = 0.75  # of the RMS: what three phases have of one sequence at some time
 PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
@@ -72,7 +72,7 @@ def add_question(recording: Recording, phasors: Snapshots, feeders: list[Feeder]
 
 def _size_of(recording: Recording, phasors: Snapshots, feeder: Feeder) -> str:
     """Voltage and powers of a feeder while it is alive, in words."""
-    if any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
+    if any(is_unit_in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
         return "units in doubt"
     connection = build_chosen("connection", feeder.connection)
     V = connection.voltage() @ phasors.select_channels(feeder.voltages)

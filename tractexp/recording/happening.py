@@ -25,7 +25,7 @@ from tractexp.recording.excursion import (
 )
 from tractexp.recording.pole_slip import find_pole_slips, is_swing_of_slip
 from tractexp.recording.static_exponent import StaticExponent, find_exponents
-from tractexp.recording.trace import Trace, of_record
+from tractexp.recording.trace import Trace, trace_record
 
 OF_STATICS = ("step", "ramp", "pole slip")  # kinds that tell of the static part alone
 LEAST_LISTED_STEP = 0.2  # of the apparent power: a smaller step of a load is no event
@@ -54,7 +54,7 @@ class Happening:
 
 def happenings_of(record: Record) -> list[Happening]:
     """The events in a record of t, U, P, Q and, where they are there, f and U2."""
-    return happenings_in(of_record(record))
+    return happenings_in(trace_record(record))
 
 
 def _is_within(trace: Trace, e: Excursion, slips: Sequence[Excursion]) -> bool:
@@ -83,7 +83,7 @@ def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]
     spans += [("pole slip", slip) for slip in slips]
     spans += find_open_poles(trace, spans)
     spans += [(kind, e) for kind, e in find_inrushes(trace) if not _is_within(trace, e, slips)]
-    changes = _own_changes(trace, [e for _, e in spans])
+    changes = _find_own_changes(trace, [e for _, e in spans])
     spans += [("step", tap) for tap in _find_taps(trace, [e for _, e in spans], changes)]
     listed = [c for c in changes if abs(c.ratio - 1) > LEAST_LISTED_STEP]
     spans += [
@@ -129,7 +129,7 @@ def _merge_ramps(spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursio
     return merged
 
 
-def _own_changes(trace: Trace, outside: list[Excursion]) -> list[Change]:
+def _find_own_changes(trace: Trace, outside: list[Excursion]) -> list[Change]:
     """The steps of the load beside what happens to the voltage."""
     changes, near = (
         load_changes(trace.U, trace.P, trace.Q, trace.cycle / trace.step),

@@ -161,7 +161,7 @@ def kind(channel: Channel) -> str:
     return "" if letter is None else "current" if letter[1] == "i" else "voltage"
 
 
-def other_quantity(channel: Channel) -> bool:
+def is_other_quantity(channel: Channel) -> bool:
     """Whether a channel is surely neither a voltage nor a current."""
     unit = channel.unit.strip().lower()
     return channel.quantity not in ("", "voltage", "current") or unit in OTHER_UNITS
@@ -199,11 +199,12 @@ def groups(channels: Mapping[int, Channel]) -> list[Group]:
     result: list[Group] = []
     readings = [(True, True), (False, True), (True, False), (False, False)]
     searches = [
-        functools.partial(_by_name, full=full, counters=counters) for full, counters in readings
+        functools.partial(_group_by_name, full=full, counters=counters)
+        for full, counters in readings
     ]
-    every = (*searches, _by_column)
+    every = (*searches, _group_by_column)
     threes, twos = (itertools.product(every, (size,)) for size in (3, 2))
-    for search, size in (*threes, (_by_mixed_pairs, 2), *twos):
+    for search, size in (*threes, (_group_by_mixed_pairs, 2), *twos):
         matches = search(free, size)
         result += matches
         free = {i: c for i, c in free.items() if not any(i in g.numbers for g in matches)}
@@ -267,7 +268,9 @@ def _compare_phase(channel: Channel, letters: str, place: int) -> int:
     return -1 if len(own) == 1 else 0
 
 
-def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: bool) -> list[Group]:
+def _group_by_name(
+    channels: Mapping[int, Channel], size: int, full: bool, counters: bool
+) -> list[Group]:
     """Groups of names that are equal but for the mark; with their circuits where `full`."""
     buckets: dict[tuple[str, str, bool], dict[int, list[int]]] = defaultdict(
         lambda: defaultdict(list)
@@ -285,7 +288,7 @@ def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: b
     used = set()
     for label in sorted(buckets, key=lambda each: -worth[each]):
         places = buckets[label]
-        if size == 2 and not _two_may_do(label, places, worth[label] >= SURE):
+        if size == 2 and not _are_two_enough(label, places, worth[label] >= SURE):
             continue
         for have, missing in _sets(places, size):
             if used & set(have):
@@ -297,7 +300,9 @@ def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: b
     return result
 
 
-def _two_may_do(label: tuple[str, str, bool], places: Mapping[int, list[int]], sure: bool) -> bool:
+def _are_two_enough(
+    label: tuple[str, str, bool], places: Mapping[int, list[int]], sure: bool
+) -> bool:
     """Two voltages AB and BC, or two currents a and c, are enough; two numbered things, or ...V and
     ...W, are none.
     """
@@ -352,7 +357,7 @@ def _mask(text: str, places: Collection[int]) -> str:
     return "".join("*" if i in places else letter for i, letter in enumerate(text))
 
 
-def _by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Group]:
+def _group_by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Group]:
     """Two line voltages of which one counts down, as voltage transformers in V are named: AB and
     CB.
     """
@@ -377,7 +382,7 @@ def _by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Group]:
     return result
 
 
-def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
+def _group_by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
     """Groups by the file's phase column: in order, within a circuit; each channel in the first
     order that fits.
     """

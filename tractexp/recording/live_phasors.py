@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.configuration.plugin import build_chosen
-from tractexp.record.direction import at_level
+from tractexp.record.direction import find_values_at_level
 from tractexp.record.phasor import sequences
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.recording import Recording
@@ -59,7 +59,7 @@ def measure_live_phasors(recording: Recording, feeder: Feeder) -> LivePhasors | 
     else:
         even = alive
     calm = np.zeros(len(size), bool)
-    calm[even] = at_level(size[even], LARGEST_CALM_VOLTAGE_SHARE)
+    calm[even] = find_values_at_level(size[even], LARGEST_CALM_VOLTAGE_SHARE)
     # not of all: a fault may last longer than the calm
     alive &= load > LOADED * np.median(load[calm])
     if not (alive & calm).any():

@@ -18,16 +18,16 @@ from tractexp.recording.nominal_voltage import is_to_ground
 from tractexp.recording.railway import (
     conductor_pairs,
     contact_first,
+    find_other_conductor,
     is_between_conductors,
     is_opposite,
     is_return,
     opposite_pairs,
-    other_conductor,
     unnamed_conductor,
 )
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots
-from tractexp.recording.unit import secondary_of
+from tractexp.recording.unit import is_secondary
 
 ONE_PHASE = "one phase of a three-phase load, a part of its power"
 HALF = "half of an autotransformer feeder"
@@ -153,7 +153,7 @@ def _part_of_railway(
     opposite = next((i for i in pure if is_opposite(phasors, voltage, i)), None)
     if opposite is not None:
         return (_half_at(recording, phasors, (voltage, opposite), current, amps),)
-    other = other_conductor(recording, phasors, current, [i for i in amps if phasors.pure(i)])
+    other = find_other_conductor(recording, phasors, current, [i for i in amps if phasors.pure(i)])
     if other is not None:
         name = list_names(recording, [other])
         return (f"{HALF}: no voltage goes with the other current, {name}",)
@@ -207,7 +207,7 @@ def _part_of_phases(
             name = list_names(recording, [other])
             return (f"{ONE_PHASE}: its voltage is 120 degrees from {name}",)
     kilovolts = phasors.size([voltage])
-    if is_to_ground(kilovolts) and not secondary_of(recording, {"U": [voltage]}):
+    if is_to_ground(kilovolts) and not is_secondary(recording, {"U": [voltage]}):
         line = np.sqrt(3) * kilovolts
         return (f"{ONE_PHASE}: {line:.4g} kV, sqrt(3) times its voltage, is a nominal one",)
     return ()

@@ -48,7 +48,7 @@ LARGEST_NOMINAL_DISTANCE = 0.03  # of a nominal voltage: what is nearer has it
 FAR = 0.08  # of every nominal voltage: what is farther has none
 
 
-def off_nominal(voltage: float) -> float:
+def measure_offset_from_nominal(voltage: float) -> float:
     """How far a line voltage [kV] is off the nearest nominal one, as a natural logarithm.
 
     Infinite of a voltage that is not positive.
@@ -68,7 +68,8 @@ def off_nominal(voltage: float) -> float:
 def is_between_phases(voltage: float) -> bool:
     """Whether a voltage [kV] is near a nominal one as it stands, and not so times sqrt 3."""
     return (
-        off_nominal(voltage) < LARGEST_NOMINAL_DISTANCE and off_nominal(np.sqrt(3) * voltage) > FAR
+        measure_offset_from_nominal(voltage) < LARGEST_NOMINAL_DISTANCE
+        and measure_offset_from_nominal(np.sqrt(3) * voltage) > FAR
     )
 
 
@@ -78,5 +79,7 @@ def is_to_ground(voltage: float) -> bool:
     """
     line = float(np.sqrt(3)) * voltage
     nearest = min(NOMINAL_VOLTAGES, key=lambda each: abs(np.log(max(line, 1e-12) / each)))
-    near = [off_nominal(each) < LARGEST_NOMINAL_DISTANCE for each in (voltage, line)]
+    near = [
+        measure_offset_from_nominal(each) < LARGEST_NOMINAL_DISTANCE for each in (voltage, line)
+    ]
     return near == [False, True] and nearest not in SINGLE_PHASE

@@ -26,9 +26,9 @@ from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
 from tractexp.recording.sight import Sight
 from tractexp.recording.snapshot import network_frequency
-from tractexp.recording.trace import Trace, join_traces, of_waves
+from tractexp.recording.trace import Trace, join_traces, trace_waves
 from tractexp.recording.type_test import Course, TypeTest, find_type_test
-from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
+from tractexp.recording.unit import check_doubt, is_secondary, is_unit_in_doubt
 
 TOO_SHORT = "fewer than four half cycles are measured: too few to tell what happened"
 LEAST_MEASURED_VOLTAGE = 0.5  # of the greatest voltage: at less the frequency is not measured
@@ -205,7 +205,7 @@ def _refuse_events(shown: Sight, reason: str) -> Sight:
 def _find_doubt(recording: Recording, feeder: Feeder) -> str:
     """Why the units of a load's voltages and currents are not known; "" where they are."""
     channels = (recording.channels[i] for i in (*feeder.voltages, *feeder.currents))
-    if not (feeder.currents and any(map(in_doubt, channels))):
+    if not (feeder.currents and any(map(is_unit_in_doubt, channels))):
         return ""
     try:
         check_doubt(recording, feeder.channels)
@@ -230,7 +230,7 @@ def _measure_stretch(
         parts.append(measured)
         if events:
             waves = FeederWaves.from_recording(recording, feeder, segment)
-            trace = of_waves(waves, segment.rate, segment.start, recording.frequency, measured)
+            trace = trace_waves(waves, segment.rate, segment.start, recording.frequency, measured)
             traces.append(trace if feeder.currents else trace.without_currents())
     return [join_phasors(parts)] if parts else [], join_traces(traces) if traces else None, said
 
@@ -292,7 +292,7 @@ def describe_load(
     if slow := _describe_slow_segments(recording) if events and phasors else "":
         unexamined = unexamined or ("" if changes else f"{slow}; the rest shows nothing")
         feeder = replace(feeder, why=(*feeder.why, f"{slow}: not examined"))
-    secondary = secondary_of(recording, feeder.channels)
+    secondary = is_secondary(recording, feeder.channels)
     shown = replace(
         blank,
         feeder=feeder,

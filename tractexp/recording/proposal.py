@@ -67,7 +67,7 @@ def propose(recording: Recording) -> list[Feeder]:
     if not volts or not amps or phasors is None or direct_voltage(recording):
         return []
     options = _find_options(recording, phasors, volts, amps)
-    feeders = _with_others(closed_sums(phasors, [each[0] for each in options]), options)
+    feeders = _add_excluding_feeders(closed_sums(phasors, [each[0] for each in options]), options)
     level = max((phasors.size(f.currents) for f in feeders), default=0.0)
     marked = [_mark_unloaded(recording, phasors, feeder, level, strange) for feeder in feeders]
     return sorted(mark_other_sides(recording, phasors, marked), key=lambda f: not f.loaded)
@@ -87,7 +87,7 @@ def buses_alone(recording: Recording) -> list[Feeder]:
     taken = {i for g in grouped for i in g.numbers}
     alone = select_free(recording, phasors, volts, taken)
     feeders = [_bus_alone(recording, phasors, group) for group in grouped]
-    why = (_why_alone(recording),)
+    why = (_explain_lone_voltages(recording),)
     names = [recording.channels[i].name.strip() for i in alone]
     return feeders + [
         Feeder((i,), (), choose_usual_connection(1, 1), name=name, why=why, loaded=False)
@@ -95,7 +95,7 @@ def buses_alone(recording: Recording) -> list[Feeder]:
     ]
 
 
-def _why_alone(recording: Recording) -> str:
+def _explain_lone_voltages(recording: Recording) -> str:
     """Why voltages are shown without currents."""
     amps = [i for i, c in enumerate(recording.channels) if kind(c) == "current"]
     if not amps:
@@ -107,7 +107,7 @@ def _why_alone(recording: Recording) -> str:
 def _bus_alone(recording: Recording, phasors: Snapshots, group: Group) -> Feeder:
     """A bus without currents, its voltages in the order in which they turn."""
     numbers, names = group.numbers, list_names(recording, group.numbers)
-    said = [f"voltages {names}: {group.evidence}", _why_alone(recording)]
+    said = [f"voltages {names}: {group.evidence}", _explain_lone_voltages(recording)]
     if len(numbers) == 3:
         first, second = (
             float(np.nanmedian(np.abs(x))) for x in sequences(phasors.select_channels(numbers))
@@ -126,7 +126,9 @@ def _bus_alone(recording: Recording, phasors: Snapshots, group: Group) -> Feeder
     )
 
 
-def _with_others(feeders: Sequence[Feeder], options: Sequence[Sequence[Feeder]]) -> list[Feeder]:
+def _add_excluding_feeders(
+    feeders: Sequence[Feeder], options: Sequence[Sequence[Feeder]]
+) -> list[Feeder]:
     """The feeders, each followed by those that exclude it, of which the same is said."""
     result = []
     for feeder, (first, *others) in zip(feeders, options, strict=True):

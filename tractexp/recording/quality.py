@@ -176,11 +176,11 @@ def _measure_clipped_share(
             channel.limits, dtype=float
         )  # not cast down to the samples' own type
         at |= (raw <= least) | (raw >= most)
-    flat = runs(at, max(CLIPPED, _blunt(x, segment.rate / f, near + step)))
+    flat = runs(at, max(CLIPPED, _count_crest_samples(x, segment.rate / f, near + step)))
     return sum(run.stop - run.start for run in flat) / len(x)
 
 
-def _blunt(x: np.ndarray, cycle: float, near: float) -> int:
+def _count_crest_samples(x: np.ndarray, cycle: float, near: float) -> int:
     """Samples, of so many in a cycle, that a sine's own crest spends within `near` of its peak, and
     two more.
     """
@@ -218,7 +218,7 @@ def _measure_quiet_part(
     if f is None or rate < 2.5 * f:
         rest = x[valid]
         return (float(rest.mean()) if len(rest) else none), none, none, none, 0, none
-    x = x[_calm(x, round(rate / f), at_work)][: round(LONGEST_CALM * rate)]
+    x = x[_select_calm_cycles(x, round(rate / f), at_work)][: round(LONGEST_CALM * rate)]
     n = min(round(QUIET_CYCLES * rate / f), len(x))
     if n < 2 * round(rate / f):
         return none, none, none, none, 0, none
@@ -254,7 +254,7 @@ def _basis(n: int, rate: float, f: float) -> tuple[int, np.ndarray, np.ndarray]:
     return len(orders), Q, np.linalg.pinv(R)
 
 
-def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
+def _select_calm_cycles(x: np.ndarray, cycle: int, at_work: float) -> slice:
     """The first cycles in a row that repeat, of a wave that is at work; all of it where none do.
 
     What comes after a fault or a trip is another state, however quiet, and a fault is quiet for its

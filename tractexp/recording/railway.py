@@ -16,7 +16,7 @@ from tractexp.recording.label import kind, normalize
 from tractexp.recording.phase_mark import CYRILLIC
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots
-from tractexp.recording.unit import in_doubt
+from tractexp.recording.unit import is_unit_in_doubt
 
 OPPOSITE = 0.15  # of a phasor: two that are nearer to adding up to zero are opposite
 TURNED = 40.0  # degrees off 180 that the currents of the two conductors are at most
@@ -118,7 +118,7 @@ def _opposite_angles(phasors: Snapshots, pair: tuple[int, int], sign: float = 1.
     return bool(both.any() and abs(np.degrees(np.angle(-np.median((x * y.conj())[both])))) < TURNED)
 
 
-def other_conductor(
+def find_other_conductor(
     recording: Recording, phasors: Snapshots, current: int, amps: Sequence[int]
 ) -> int | None:
     """The current of the other conductor of an autotransformer feeder, by name and angle; None
@@ -176,7 +176,7 @@ def direct_voltage(recording: Recording) -> str:
     """The mean, ripple and dip of direct voltages, one clause; "" where none are recorded."""
     said = ""
     for number, channel in enumerate(recording.channels):
-        if channel.form != "waveform" or kind(channel) != "voltage" or in_doubt(channel):
+        if channel.form != "waveform" or kind(channel) != "voltage" or is_unit_in_doubt(channel):
             continue
         seen, start = _measure_direct(recording, number)
         if seen is not None and seen.alternates:

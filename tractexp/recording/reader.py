@@ -34,7 +34,7 @@ from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.proposal import propose
 from tractexp.recording.quality import describe_clipped, measure_clipped_shares
 from tractexp.recording.recording import Recording, Segment
-from tractexp.recording.unit import check_doubt, check_units, in_units
+from tractexp.recording.unit import check_doubt, check_units, convert_to_units
 from tractexp.recording.unrecognized import can_be_named, explain_unrecognized
 from tractexp.text import quoting
 from tractexp.text.wording import count_noun
@@ -84,7 +84,7 @@ class WaveformReader(Reader):
             x: [recording.number(i, f"data.{key}") for i in getattr(self, key)]
             for x, key in keys.items()
         }
-        recording = in_units(recording, self.units, numbers)
+        recording = convert_to_units(recording, self.units, numbers)
         chosen = numbers["U"]
         every = [
             i
@@ -147,7 +147,7 @@ class WaveformReader(Reader):
         identity = _identify_load(recording, feeder)
         groups = (events.train, events.validate)
         return Events(
-            *([_in_memory(replace(r, identity=identity)) for r in group] for group in groups)
+            *([_load_waveforms(replace(r, identity=identity)) for r in group] for group in groups)
         )
 
     def attach_samples(
@@ -159,7 +159,7 @@ class WaveformReader(Reader):
         segments = itertools.chain(*recording.stretches())
         waves = (self._waves(recording, feeder, segment) for segment in segments)
         shown = _show_samples(record, span, waves, recording.frequency)
-        return _in_memory(replace(shown, identity=_identify_load(recording, feeder)))
+        return _load_waveforms(replace(shown, identity=_identify_load(recording, feeder)))
 
     def dips(
         self,
@@ -176,7 +176,7 @@ class WaveformReader(Reader):
         wholes = [self._whole(feeder, stream, frequency) for stream in streams]
         file_dips = cut_dips(wholes, self.path, self.pre, self.post, triggers)
         waves = list(itertools.chain(*(s for _, s in streams if len(s) > 1)))
-        file_dips = [replace(dip, result=_with_waves(dip, waves, frequency)) for dip in file_dips]
+        file_dips = [replace(dip, result=_attach_waves(dip, waves, frequency)) for dip in file_dips]
         if not file_dips:
             # raises, and says what there is instead
             detect(max(wholes, key=lambda whole: whole.samples))
@@ -392,7 +392,7 @@ def _identify_load(recording: Recording, feeder: Feeder) -> dict[str, str]:
     return {key: text for key, text in fields.items() if text}
 
 
-def _with_waves(dip: FileDip, waves: Sequence[Waves], frequency: float) -> Record | UserError:
+def _attach_waves(dip: FileDip, waves: Sequence[Waves], frequency: float) -> Record | UserError:
     """The record of a dip with the waves that show it, of several sampling rates."""
     if isinstance(dip.result, UserError) or dip.result.waves is not None:
         return dip.result
@@ -410,7 +410,7 @@ def _show_samples(
     return replace(record, waves=next(there, None))
 
 
-def _in_memory(record: Record) -> Record:
+def _load_waveforms(record: Record) -> Record:
     """The record with its own waveforms in memory, and a window's length about them."""
     if record.waves is None:
         return record

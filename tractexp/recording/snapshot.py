@@ -131,7 +131,7 @@ def _windows(
     every = [(number, segment, f) for number in numbers]
     for each in every:
         if each not in known:
-            X, rest = _of_channel(
+            X, rest = _measure_channel(
                 recording.channels[each[0]], segment, f, n, firsts, len(firsts) == count
             )
             known[each] = (X * np.exp(-2j * np.pi * f * start), rest)
@@ -139,7 +139,7 @@ def _windows(
     return start + (n - 1) / 2 / segment.rate, X, rest
 
 
-def _of_channel(
+def _measure_channel(
     channel: Channel, segment: Segment, f: float, n: int, firsts: np.ndarray, whole: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Phasors (M,) and rest (M,) of one channel in windows of n samples, whose first are counted

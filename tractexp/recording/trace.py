@@ -53,7 +53,7 @@ class Trace:
         return float(360 * np.trapezoid(np.nan_to_num(extra), self.t[first : stop + 1]))
 
 
-def of_waves(
+def trace_waves(
     waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors
 ) -> Trace:
     """The trace of waveforms (2 K, N), voltages first, read a block at a time; `phasors` are those
@@ -155,7 +155,7 @@ def _interpolate(values: np.ndarray, at: np.ndarray) -> np.ndarray:
     return left + (at - k) * (values.take(k + 1, axis=1) - left)
 
 
-def of_record(record: Record) -> Trace:
+def trace_record(record: Record) -> Trace:
     """The trace of a record: U, P, Q and, where they are there, f and U2, thinned to
     half cycles.
     """

@@ -12,7 +12,7 @@ import numpy as np
 from tractexp.record.phasor import sequences
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.kirchhoff import CLOSED_SUM
-from tractexp.recording.nominal_voltage import off_nominal
+from tractexp.recording.nominal_voltage import measure_offset_from_nominal
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots
 
@@ -189,7 +189,10 @@ def _has_high_voltage(recording: Recording, phasors: Snapshots, high: Feeder, lo
         return abs(np.log(sides[0] / U)) < abs(np.log(sides[1] / U))
     if sides is not None and own in sides:
         return own == sides[0]
-    off_if_high, off_if_low = off_nominal(U / ratio), off_nominal(U * ratio)
+    off_if_high, off_if_low = (
+        measure_offset_from_nominal(U / ratio),
+        measure_offset_from_nominal(U * ratio),
+    )
     if max(off_if_high, off_if_low) > LARGEST_OFF_NOMINAL:
         return off_if_high < off_if_low
     return U > LARGEST_DISTRIBUTION

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import DATA, UserError, among
+from tractexp.errors import DATA, UserError, list_allowed
 from tractexp.recording.label import groups, kind
 from tractexp.recording.recording import Channel, Recording, quantity_of, unit_of
 
@@ -48,7 +48,7 @@ def check_units(units: Mapping[str, Any], quantities: Sequence[str] = tuple(PLAI
     for letter, text in units.items():
         if letter not in quantities:
             raise UserError(
-                f"{DATA.units} names '{letter}'{among(letter, quantities, 'Quantities')}"
+                f"{DATA.units} names '{letter}'{list_allowed(letter, quantities, 'Quantities')}"
             )
         if letter in PLAIN and (
             unit_of(amount(text)[1])[0] != PLAIN[letter][0] or amount(text)[0] <= 0
@@ -77,13 +77,13 @@ def _find_bare(
     """Those of channels of one quantity without a unit, where their size tells it; else none.
     `voltage` is the unit of the file's voltages.
     """
-    stated = {channels[i].unit for i in numbers if not in_doubt(channels[i])}
+    stated = {channels[i].unit for i in numbers if not is_unit_in_doubt(channels[i])}
     bare = [i for i in numbers if not channels[i].unit.strip()]
     size = max((_size(channels[i]) for i in bare), default=0.0)
     return bare if bare and _is_plainly_volts(letter, size, stated, voltage) else []
 
 
-def in_units(
+def convert_to_units(
     recording: Recording, units: Mapping[str, Any], chosen: Mapping[str, Sequence[int]]
 ) -> Recording:
     """The recording with the unit of each voltage and current, as far as it can be known, and a
@@ -98,18 +98,18 @@ def in_units(
         if letter in units:
             number, unit = amount(units[letter])
             for i in ours:
-                channels[i] = _of_unit(channels[i], quantity, unit, number)
+                channels[i] = _convert_channel(channels[i], quantity, unit, number)
             continue
         if bare := _find_bare(channels, ours, letter, voltage):
             for i in bare:
-                channels[i] = _of_unit(channels[i], quantity, small)
+                channels[i] = _convert_channel(channels[i], quantity, small)
             taken |= {letter: bare}
-        voltage = next((c.unit for c in (channels[i] for i in ours) if not in_doubt(c)), "")
+        voltage = next((c.unit for c in (channels[i] for i in ours) if not is_unit_in_doubt(c)), "")
     by_size = not {"U", "I"} & {*units} and _have_secondary_size(channels)
     by_size = by_size and not any(c.side for c in channels)
     channels = [*map(_set_secondary, channels)] if by_size else _mark_secondary(channels)
     told = any(note.startswith(SECONDARY_VALUES) for note in recording.notes)
-    secondary = [] if told else _secondary_note(channels, by_size)
+    secondary = [] if told else _note_secondary_values(channels, by_size)
     notes = (*recording.notes, *_note(channels, taken), *secondary)
     return replace(recording, channels=channels, notes=notes)
 
@@ -121,7 +121,7 @@ def _have_secondary_size(channels: Sequence[Channel]) -> bool:
     volts = {
         i: c
         for i, c in enumerate(channels)
-        if c.form == "waveform" and kind(c) == "voltage" and not in_doubt(c)
+        if c.form == "waveform" and kind(c) == "voltage" and not is_unit_in_doubt(c)
     }
     sizes = {i: c.factor * _size(c) for i, c in volts.items()}
     alive = [i for i, size in sizes.items() if size > ALIVE * max(sizes.values())]
@@ -147,7 +147,7 @@ def _mark_secondary(channels: Sequence[Channel]) -> list[Channel]:
 
 def _is_sided_voltage(channel: Channel) -> bool:
     """Whether a voltage's file says, or leaves open, on which side of the transformer it is."""
-    return bool(channel.side) and channel.quantity == "voltage" and not in_doubt(channel)
+    return bool(channel.side) and channel.quantity == "voltage" and not is_unit_in_doubt(channel)
 
 
 def _set_secondary(channel: Channel) -> Channel:
@@ -156,7 +156,7 @@ def _set_secondary(channel: Channel) -> Channel:
     return replace(channel, side="" if stays else "S")
 
 
-def _secondary_note(channels: Sequence[Channel], by_size: bool) -> list[str]:
+def _note_secondary_values(channels: Sequence[Channel], by_size: bool) -> list[str]:
     """A note on secondary values, which may be told by their size, and the setting that gives their
     ratio; [] where there are none.
     """
@@ -183,7 +183,7 @@ def _secondary_note(channels: Sequence[Channel], by_size: bool) -> list[str]:
     ]
 
 
-def secondary_of(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> bool:
+def is_secondary(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> bool:
     """Whether a channel of {U: ..., I: ...} holds secondary values of which no ratio is known."""
     return any(recording.channels[i].side == "S" for ours in numbers.values() for i in ours)
 
@@ -202,7 +202,7 @@ def _note(channels: Sequence[Channel], taken: Mapping[str, Sequence[int]]) -> li
     )
 
 
-def _of_unit(channel: Channel, quantity: str, unit: str, number: float = 1.0) -> Channel:
+def _convert_channel(channel: Channel, quantity: str, unit: str, number: float = 1.0) -> Channel:
     """A channel of another quantity and unit, of which its own is `number`."""
     gain = number * channel.gain
     offset = number * channel.offset
@@ -224,7 +224,7 @@ def _size(channel: Channel) -> float:
     return abs(channel.ratio) * float(x.std()) if len(x) else 0.0
 
 
-def in_doubt(channel: Channel) -> bool:
+def is_unit_in_doubt(channel: Channel) -> bool:
     """Whether a channel's unit is none of voltage or current that is known."""
     return not unit_of(channel.unit)[0]
 
@@ -234,7 +234,7 @@ def check_doubt(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> N
     setting that answers.
     """
     odd = {
-        x: [recording.channels[i] for i in ours if in_doubt(recording.channels[i])]
+        x: [recording.channels[i] for i in ours if is_unit_in_doubt(recording.channels[i])]
         for x, ours in numbers.items()
     }
     odd = {letter: channels[0] for letter, channels in odd.items() if channels}

@@ -2,7 +2,7 @@
 
 from tractexp.errors import UserError
 from tractexp.recording.channel_group import list_waves
-from tractexp.recording.label import kind, other_quantity
+from tractexp.recording.label import is_other_quantity, kind
 from tractexp.recording.railway import direct_voltage
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
@@ -21,7 +21,7 @@ def can_be_named(recording: Recording) -> bool:
     numbers = [
         i
         for i, c in enumerate(recording.channels)
-        if c.form == "waveform" and not other_quantity(c)
+        if c.form == "waveform" and not is_other_quantity(c)
     ]
     f = frequency(recording, numbers)
     phasors = snapshots(recording, numbers, f) if f and nearest_nominal(f) else None

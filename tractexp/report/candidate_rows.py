@@ -61,7 +61,7 @@ def chance_level(findings: Findings) -> float:
     )
 
 
-def why_not_the_most_helpful(findings: Findings) -> str:
+def explain_other_than_steepest(findings: Findings) -> str:
     """Where the verdict is not the effect that a single linear step favours: one sentence why; ""
     otherwise.
     """

@@ -19,8 +19,8 @@ from tractexp.report.candidate_rows import (
     CandidateRow,
     chance_level,
     describe_untestable_beside,
+    explain_other_than_steepest,
     list_candidates,
-    why_not_the_most_helpful,
 )
 from tractexp.report.predicted import BAR, add_prediction_section
 from tractexp.text.wording import join_words
@@ -41,7 +41,7 @@ def candidates(page: Report, findings: Findings) -> None:
     finite = [row for row in rows if np.isfinite(row.drop)]
     if finite:
         page.chart(_bars(findings, finite, labels), _bars_caption(findings, finite))
-    for sentence in (why_not_the_most_helpful(findings), describe_untestable_beside(findings)):
+    for sentence in (explain_other_than_steepest(findings), describe_untestable_beside(findings)):
         if sentence:
             page.text(sentence)
     entries = [
@@ -68,7 +68,7 @@ def candidates(page: Report, findings: Findings) -> None:
     )
     _sets(page, findings)
     if chosen:
-        _further(page, findings)
+        _add_further_gains(page, findings)
 
 
 def _labels(rows: Sequence[CandidateRow]) -> dict[CandidateRow, str]:
@@ -141,7 +141,7 @@ def _sets(page: Report, findings: Findings) -> None:
         )
 
 
-def _further(page: Report, findings: Findings) -> None:
+def _add_further_gains(page: Report, findings: Findings) -> None:
     """Add what the other effects would gain once the chosen ones are in the model."""
     rows = []
     for j in judgements(findings):

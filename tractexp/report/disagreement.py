@@ -3,7 +3,7 @@
 from tractexp.blocks import Report
 from tractexp.discrepancy.findings import Findings
 from tractexp.inference.chance import BLURRED, by_draws
-from tractexp.text.wording import in_words
+from tractexp.text.wording import format_probability
 
 
 def places(page: Report, findings: Findings) -> None:
@@ -21,8 +21,10 @@ def places(page: Report, findings: Findings) -> None:
         best, alpha = first.scores[0], findings.context.criteria.naming_false_alarms
         text += (
             f" The effect that promises most in one linear step, {best.name}, would lower the"
-            f" deviance by {best.drop:.1f}, with a probability of {in_words(best.p)} by chance;"
-            f" chance gives less than {in_words(first.chance.critical_p(alpha))} to the best of all"
+            f" deviance by {best.drop:.1f}, with a probability of "
+            f"{format_probability(best.p)} by chance;"
+            f" chance gives less than "
+            f"{format_probability(first.chance.critical_p(alpha))} to the best of all"
             f" candidates in {alpha:.0%} of cases."
         )
     page.text(text)

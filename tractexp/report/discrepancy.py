@@ -25,7 +25,7 @@ from tractexp.report.extended import equations, interval, laws, parameters, valu
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
 from tractexp.report.proposal import add_proposal_section, headlines
-from tractexp.text.wording import alternatives, as_sentence, count_noun, epsilon, join_words
+from tractexp.text.wording import alternatives, count_noun, epsilon, finish_sentence, join_words
 
 if TYPE_CHECKING:
     from tractexp.api.investigation import Investigation as Outcome
@@ -105,7 +105,7 @@ def gap(content: Mapping[str, Any]) -> Table:
                         label,
                         model,
                         error,
-                        *_off(one[stage], waves=waves),
+                        *_describe_misfit(one[stage], waves=waves),
                         "" if closed is None else f"{closed:.0%}",
                     ]
                 )
@@ -153,9 +153,9 @@ def report(
         [findings.catalogue.label_effect(name) for name in names] for names in findings.verdict.sets
     ]
     head = f"{findings.verdict.word.upper()} {alternatives(spoken)}".strip()
-    left = [as_sentence(findings.headline)] if findings.headline else []
+    left = [finish_sentence(findings.headline)] if findings.headline else []
     sentences = [
-        as_sentence(findings.reason),
+        finish_sentence(findings.reason),
         *left,
         *headlines(findings),
         _describe_grade(findings),
@@ -175,7 +175,7 @@ def report(
     if not findings.verdict.complete:
         _add_remainder_section(page, findings)
     if (chosen := findings.next_event) is not None:
-        page.heading("What to record next").text(as_sentence(chosen.sentence()))
+        page.heading("What to record next").text(finish_sentence(chosen.sentence()))
         section(page, chosen)
     laws(page, findings)
     candidates(page, findings)
@@ -201,7 +201,7 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
     """The gap; where nothing explains it, that of the nearest candidates beside it."""
     page.heading("How large the gap is" if not findings.names else "How much smaller the gap is")
     table, near = gap(content), findings.nearest
-    page.add(replace(table, rows=_with_nearest(near)) if near else table)
+    page.add(replace(table, rows=_describe_gap_with_nearest(near)) if near else table)
     if len(steps := content["contributions"]) > 2:
         rows = [
             [join_words(s["effects"]) or "the base model", tell_error({"value": s["model_error"]})]
@@ -222,7 +222,7 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
         page.text("The held-out events took part in choosing: what they say is no test of it.")
 
 
-def _with_nearest(near: Nearest) -> list[list[str]]:
+def _describe_gap_with_nearest(near: Nearest) -> list[list[str]]:
     """The base model's gap and that of the candidates which come nearest."""
     pairs = (("fitted", near.fitted), ("held out", near.held_out))
     stages = ("base model", "nearest candidates")
@@ -231,7 +231,7 @@ def _with_nearest(near: Nearest) -> list[list[str]]:
             label,
             stage,
             _error(c.error.to_dict()),
-            *_off(vars(c), waves=near.fitted.before.epsilon_i is not None),
+            *_describe_misfit(vars(c), waves=near.fitted.before.epsilon_i is not None),
         ]
         for label, both in pairs
         if both
@@ -247,7 +247,7 @@ def _error(entry: Mapping[str, Any]) -> str:
     )
 
 
-def _off(misfit: Mapping[str, Any], *, waves: bool) -> list[str]:
+def _describe_misfit(misfit: Mapping[str, Any], *, waves: bool) -> list[str]:
     """How far off curves are, as a table has it; of `waves` the currents, too."""
     shown = ["epsilon_p", "epsilon_q", *(["epsilon_i"] if waves else [])]
     chi2 = misfit["chi2_per_sample"]

@@ -16,7 +16,7 @@ from tractexp.identification.verdict import brief
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.model.model import compose
 from tractexp.model.sites import KINDS
-from tractexp.text.wording import alternatives, join_words, with_error
+from tractexp.text.wording import alternatives, format_with_error, join_words
 
 CURVE, TEXTBOOK = "#0072B2", "#D55E00"
 
@@ -137,7 +137,7 @@ def equations(page: Report, findings: Findings) -> None:
 def value(estimate: ParameterEstimate) -> str:
     """An estimate with its error, and whether it is at its bound."""
     bound = "" if np.isfinite(estimate.error) else ", at its bound"
-    return f"{with_error(estimate.value, estimate.error)}{bound}"
+    return f"{format_with_error(estimate.value, estimate.error)}{bound}"
 
 
 def interval(low: float, high: float) -> str:

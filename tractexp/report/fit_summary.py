@@ -8,7 +8,7 @@ from tractexp.identification.yardstick import poles_in_words
 from tractexp.report.fit_sentences import describe_rivals, describe_search_end
 from tractexp.report.fit_tables import digits, errors, parameters
 from tractexp.report.race import tabulate_race
-from tractexp.text.wording import as_sentence, shown_in_words
+from tractexp.text.wording import finish_sentence, shown_in_words
 
 if TYPE_CHECKING:
     from tractexp.api.identification import Identification
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 def summary(fit: "Identification") -> Report:
     """Grade, estimates, errors, why some parameters are not identified, and the next steps."""
     result = fit.result
-    verdicts = own_verdicts(result)
+    verdicts = select_verdicts_of_parameters(result)
     poor = [f"{name}: {verdict}" for name, verdict in name_verdicts(result).items()]
     notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
     start = [text for event in result.events if (text := starts_at_rest(event))]
     report = Report()
     if fit.headline:
-        report.text(as_sentence(fit.headline))
+        report.text(finish_sentence(fit.headline))
     report.add(parameters(fit), *tabulate_race(result.race))
     report.text(*machine(fit), *describe_rivals(fit), *filter(None, [result.on_given_base()])).add(
         errors(fit)
@@ -65,11 +65,11 @@ def network(fit: "Identification") -> list[str]:
 
 def name_verdicts(result: Any) -> dict[str, str]:
     """The verdicts of parameters that are not identified, by their names."""
-    own = own_verdicts(result).items()
+    own = select_verdicts_of_parameters(result).items()
     return {name: verdict for name, verdict in own if not verdict.startswith(IDENTIFIED)}
 
 
-def own_verdicts(result: Any) -> dict[str, str]:
+def select_verdicts_of_parameters(result: Any) -> dict[str, str]:
     """{name: verdict} without nuisances."""
     return {
         name: verdict for name, verdict in result.verdicts.items() if name not in result.nuisances
@@ -82,7 +82,7 @@ def yardstick(fit: "Identification") -> list[str]:
     """
     poles = fit.result.linear_network.get("poles")
     beside = f" The network's poles: {poles_in_words(poles)}." if poles else ""
-    return [as_sentence(fit.yardstick) + beside] if fit.yardstick else []
+    return [finish_sentence(fit.yardstick) + beside] if fit.yardstick else []
 
 
 def starts_at_rest(event: dict[str, Any]) -> str:
@@ -100,7 +100,7 @@ def starts_at_rest(event: dict[str, Any]) -> str:
 
 def headline(result: Any) -> str:
     """How many of the parameters are identified, and which are not, in one sentence."""
-    verdicts = own_verdicts(result)
+    verdicts = select_verdicts_of_parameters(result)
     poor = [
         f"{n} {v.partition(':')[0].partition(' (')[0]}"
         for n, v in verdicts.items()

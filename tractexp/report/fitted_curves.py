@@ -19,7 +19,7 @@ from tractexp.identification.yardstick import play_network
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart, show_units
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, spectrum_chart, wave_chart
-from tractexp.text.wording import as_sentence, epsilon, join_words
+from tractexp.text.wording import epsilon, finish_sentence, join_words
 
 if TYPE_CHECKING:
     from tractexp.api.identification import Identification
@@ -46,7 +46,7 @@ def add_curves(
     if names := join_words([name for name, _ in beside]):
         page.text(f"Drawn when its name in the legend is clicked: {names}.")
     noises = [deviation[:, problem.drive.part(e)] for e in range(problem.drive.events)]
-    all_curves(page, fits, noises, beside)
+    chart_all_events(page, fits, noises, beside)
     if waves:
         page.heading("What was done to the records", level=3).items(
             describe_preparation(problem, fits)
@@ -70,7 +70,7 @@ def _play_beside(
     return beside
 
 
-def all_curves(
+def chart_all_events(
     page: Report,
     fits: Sequence[Any],
     noises: Sequence[np.ndarray] = (),
@@ -131,7 +131,7 @@ def add_next_dip(page: Report, fit: "Identification") -> None:
     told = fit.result.next_dip
     if not told:
         return
-    page.heading("The next dip").text(as_sentence(told["sentence"]))
+    page.heading("The next dip").text(finish_sentence(told["sentence"]))
     if told["P"] is None:
         return
     first = fit.details.fits[0].event

@@ -22,7 +22,7 @@ from tractexp.report.fit_tables import digits, errors, list_origin, parameters, 
 from tractexp.report.fitted_curves import MOST_OPEN_EVENTS, ROLES, add_curves, add_next_dip
 from tractexp.report.race import tabulate_race
 from tractexp.report.sliders import add_sliders
-from tractexp.text.wording import as_sentence, in_words
+from tractexp.text.wording import finish_sentence, format_probability
 
 if TYPE_CHECKING:
     from tractexp.api.identification import Identification
@@ -44,28 +44,28 @@ def report(fit: "Identification") -> Report:
     lead = "; ".join([*describe_identities(of), f"{result.optimizer}, seed {result.seed}."])
     page = Report(f"Identification of {title(of, names)}", lead)
     page.verdict(
-        as_sentence(fit.headline),
+        finish_sentence(fit.headline),
         *yardstick(fit),
-        f"{as_sentence(result.acceptance)}{_of_currents(result)}",
+        f"{finish_sentence(result.acceptance)}{_describe_current_errors(result)}",
         headline(result),
         kind=KIND[fit.grade],
     )
     page.heading("Measured and calculated")
     add_curves(page, details.fits, uncertainty, fit.spec.validate)
     add_next_dip(page, fit)
-    page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
+    page.heading("Parameters").add(parameters(fit)).text(*map(finish_sentence, machine(fit)))
     if result.share_bound:
         page.chart(_draw_shares(result.share_bound["profile"]), SHARES_HELD)
     _parameters(page, fit, uncertainty)
     page.add(*tabulate_race(result.race))
     page.heading("Moved by hand")
     add_sliders(page, fit)
-    page.heading("How well it fits").add(errors(fit)).text(*map(as_sentence, samples(fit)))
+    page.heading("How well it fits").add(errors(fit)).text(*map(finish_sentence, samples(fit)))
     page.heading("What to do next").items(fit.advice)
     if together is not None:
         _events(page, uncertainty, together)
     page.heading("The search and the estimate").add(tabulate_search_end(fit)).text(
-        as_sentence(describe_search_end(fit))
+        finish_sentence(describe_search_end(fit))
     )
     page.chart(
         _fitness(fit.search_result.history, result),
@@ -87,7 +87,7 @@ def _draw_shares(profile: Sequence[dict[str, float]]) -> Chart:
     return chart.line("all else free", 100 * shares, errors, style.ACTIVE, width=2.0)
 
 
-def _of_currents(result: Any) -> str:
+def _describe_current_errors(result: Any) -> str:
     """epsilon_i of each event, in a sentence; "" in phasors."""
     values = [
         f"{e['epsilon_i']:.2%} ({e['name']}, {ROLES[e['role']]})"
@@ -104,7 +104,7 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
     result = fit.result
     if on_given_base := result.on_given_base():
         base = f"Values and bounds in the table are on the record's own base of {result.base}."
-        page.text(f"{as_sentence(on_given_base)} {base}")
+        page.text(f"{finish_sentence(on_given_base)} {base}")
     page.chart(
         _forest(uncertainty, by_event(result.search["parameters"], result.search["per_event"])),
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the"
@@ -115,7 +115,7 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
     poor = [
         f"{name}: {v}." for name, v in verdicts if v.word != IDENTIFIED and name not in nuisances
     ]
-    page.items([*map(as_sentence, describe_rivals(fit)), *poor])
+    page.items([*map(finish_sentence, describe_rivals(fit)), *poor])
 
 
 def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
@@ -237,7 +237,7 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
                     t["channel"],
                     t["name"],
                     digits(t["statistic"]),
-                    in_words(t["p"]),
+                    format_probability(t["p"]),
                     t["says"],
                 ]
                 for t in tests

@@ -7,8 +7,8 @@ from tractexp.configuration.run_command import command
 from tractexp.inference.model_error import in_percent
 from tractexp.record.identity import title_of
 from tractexp.report.fit_tables import error_table
-from tractexp.report.fitted_curves import all_curves
-from tractexp.text.wording import as_sentence
+from tractexp.report.fitted_curves import chart_all_events
+from tractexp.text.wording import finish_sentence
 
 if TYPE_CHECKING:
     from tractexp.api.linear_network import NetworkFit
@@ -57,7 +57,11 @@ def errors(fit: "NetworkFit") -> Table:
 def summary(fit: "NetworkFit") -> Report:
     """How much it leaves, its poles, and what other numbers of poles leave."""
     return (
-        Report().text(as_sentence(fit.headline)).add(poles(fit)).add(errors(fit)).add(numbers(fit))
+        Report()
+        .text(finish_sentence(fit.headline))
+        .add(poles(fit))
+        .add(errors(fit))
+        .add(numbers(fit))
     )
 
 
@@ -67,9 +71,9 @@ def report(fit: "NetworkFit") -> Report:
         f"Linear network of {title_of(event.record for event in fit.train)}",
         "A model without physics: the yardstick of every other.",
     )
-    page.verdict(as_sentence(fit.headline))
+    page.verdict(finish_sentence(fit.headline))
     page.heading("Measured and calculated")
-    all_curves(page, fit.fits)
+    chart_all_events(page, fit.fits)
     page.heading("How well it fits").add(errors(fit)).add(numbers(fit))
     page.heading("Poles").add(poles(fit))
     page.heading("How this page was made")

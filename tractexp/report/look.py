@@ -13,7 +13,7 @@ from tractexp.recording.overview import View
 from tractexp.recording.sight import Sight
 from tractexp.report import unfitted
 from tractexp.report.look_charts import add_unassigned_channels, charts
-from tractexp.text.wording import as_sentence, change, count_noun, degrees, figure, share
+from tractexp.text.wording import change, count_noun, degrees, figure, finish_sentence, share
 
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
 LATE = 60.0  # s: nobody counts more in a file; events after it have the clock's time beside
@@ -121,10 +121,10 @@ def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
     """Add the commands that fit, or why there is nothing to fit."""
     commands = [(f["name"], f["command"]) for f in entry["feeders"] if f["command"]]
     if not entry["feeders"]:
-        page.verdict(f"{as_sentence(explain_unnamed(entry))} The channels are listed below.")
+        page.verdict(f"{finish_sentence(explain_unnamed(entry))} The channels are listed below.")
     elif not commands:
         page.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
-        page.items([as_sentence(said) for said in unfitted.sentences([entry])])
+        page.items([finish_sentence(said) for said in unfitted.sentences([entry])])
     else:
         page.verdict(
             f"To fit {'what is worth it' if len(commands) > 1 else commands[0][0]}:", kind="good"
@@ -209,7 +209,7 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
     if entry["events"]:
         page.add(events(entry))
     else:
-        page.text(as_sentence(explain_no_event(entry)))
+        page.text(finish_sentence(explain_no_event(entry)))
     with page.fold_blocks(f"Charts of {entry['name']}") if folded else nullcontext():
         charts(page, view, shown)
 

@@ -51,10 +51,12 @@ CAPTION = (
 def charts(page: Report, view: View, shown: Sight) -> None:
     """Add a load's record, or its phasors and waveforms."""
     if shown.record is not None:
-        page.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
+        page.chart(_chart_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
     elif shown.phasors and view.recording is not None:
-        every, coarse = _every(view)
-        page.chart(_of_waves(view, shown, every, coarse), CAPTION + _further(view))
+        every, coarse = _choose_thinning(view)
+        page.chart(
+            _chart_waves(view, shown, every, coarse), CAPTION + _describe_status_channels(view)
+        )
         with page.fold_blocks("Spectrum before anything happened"):
             page.chart(
                 _spectrum(view.recording, shown),
@@ -119,7 +121,7 @@ def _mark_events(chart: Chart, shown: Sight) -> Chart:
     return chart
 
 
-def _of_record(shown: Sight) -> Chart:
+def _chart_record(shown: Sight) -> Chart:
     """A record's columns over time."""
     record = shown.record
     assert record is not None
@@ -148,7 +150,7 @@ def _of_record(shown: Sight) -> Chart:
     return _mark_events(chart, shown).cursor(starts[0])
 
 
-def _every(view: View) -> tuple[int, int]:
+def _choose_thinning(view: View) -> tuple[int, int]:
     """How many samples and how many phasors become one on a page, so that all loads of a file have
     room.
     """
@@ -163,7 +165,7 @@ def _every(view: View) -> tuple[int, int]:
     )
 
 
-def _of_waves(
+def _chart_waves(
     view: View,
     shown: Sight,
     every: int = 1,
@@ -203,7 +205,7 @@ def _of_waves(
     )
 
 
-def _further(view: View) -> str:
+def _describe_status_channels(view: View) -> str:
     """The caption's part on status channels; "" without them."""
     count = len(view.operations)
     most = f", the first {TRACES} of {count}" if count > TRACES else ""
@@ -350,7 +352,7 @@ def _details(page: Report, view: View, shown: Sight) -> None:
         what = event.what
         span = (what.start - AROUND[0], min(what.end, what.start + LONGEST_SHOWN_EVENT) + AROUND[1])
         with page.fold_blocks(f"Every sample of the {what.kind} at {what.start:.3f} s"):
-            page.chart(_of_waves(view, shown, span=span), "As above, not thinned.")
+            page.chart(_chart_waves(view, shown, span=span), "As above, not thinned.")
     if len(shown.events) > DETAILED:
         page.text(
             f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such"

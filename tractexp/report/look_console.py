@@ -46,7 +46,7 @@ def screen(content: Entry) -> Report:
     reasons = unfitted.sentences(entries)[:MOST_REASONS]
     page = _begin_with_answer(content).items([shorten(each, TWO_LINES) for each in reasons])
     for entry in entries[:MOST_FILES]:
-        page.text(shorten(_about(entry), TWO_LINES))
+        page.text(shorten(_describe_recorder(entry), TWO_LINES))
         if notes := entry["notes"]:
             page.items([shorten(f"note: {notes[0]}", ONE_LINE)])
         buses = _buses(entry["feeders"])
@@ -94,7 +94,7 @@ def _add_file(page: Report, entry: Entry) -> None:
     """A line on a file, and its first notes."""
     held = f"; {count_noun(len(entry['channels']), 'channel')}" if entry["channels"] else ""
     notes = entry["notes"]
-    page.text(f"{_about(entry)}{held}", *(f"  note: {note}" for note in notes[:NOTES]))
+    page.text(f"{_describe_recorder(entry)}{held}", *(f"  note: {note}" for note in notes[:NOTES]))
     if len(notes) > NOTES:
         page.text(f"  note: {len(notes) - NOTES} more")
 
@@ -118,7 +118,7 @@ def build_full_report(content: Entry) -> Report:
     """Notes, channels, loads and why they are such, all events and all commands of the files."""
     page = _begin_with_answer(content).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
-        page.text(_about(entry), *(f"  note: {n}" for n in entry["notes"]))
+        page.text(_describe_recorder(entry), *(f"  note: {n}" for n in entry["notes"]))
         if entry["channels"]:
             page.add(channels(entry))
         for feeder in entry["feeders"]:
@@ -250,7 +250,7 @@ def _clause(why: str, after: str) -> str:
     return re.split(r"[:(]", why.split(after, 1)[-1])[0].strip()
 
 
-def _about(entry: Entry) -> str:
+def _describe_recorder(entry: Entry) -> str:
     """Where and by what a file was recorded."""
     rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(entry["rates"]))
     about = [
@@ -284,7 +284,7 @@ def _common(bus: Sequence[Entry]) -> list[Entry]:
     return [event for event in each[0] if _list_shared_facts(event) in shared]
 
 
-def _of_voltage(bus: Sequence[Entry]) -> list[Entry]:
+def _list_voltage_events(bus: Sequence[Entry]) -> list[Entry]:
     """The events of a bus's voltage, each with the worst that any of its loads shows.
 
     Circuits that open at different instants divide one fault at different times: it is told from
@@ -292,7 +292,7 @@ def _of_voltage(bus: Sequence[Entry]) -> list[Entry]:
     """
     shared = _common(bus)
     loads = [feeder for feeder in bus if feeder["loaded"]] or bus
-    rest = [event for feeder in loads for event in feeder["events"] if not _beside_voltage(event)]
+    rest = [event for feeder in loads for event in feeder["events"] if not _is_current_event(event)]
     told: list[Entry] = []
     for event in sorted(rest, key=lambda each: each["start"]):
         if any(_overlap(event, other) for other in shared):
@@ -315,7 +315,7 @@ def _join_phases(*events: Entry) -> list[float]:
     return [max(phase, key=lambda x: abs(x - 1)) for phase in zip(*told, strict=True)]
 
 
-def _beside_voltage(event: Entry) -> bool:
+def _is_current_event(event: Entry) -> bool:
     """Whether an event is one of the currents, of which the voltage shows next to nothing."""
     return event["kind"] in (*OF_LOADS, "inrush") or abs(event["depth"]) < HYSTERESIS
 
@@ -328,7 +328,7 @@ def _overlap(a: Entry, b: Entry) -> bool:
 def _describe_bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     """The voltages of a bus, their size, and what happened to them, in one line."""
     names = ", ".join(entry["channels"][k]["name"] for k in bus[0]["voltages"])
-    happened = [_event(event) for event in _of_voltage(bus)]
+    happened = [_event(event) for event in _list_voltage_events(bus)]
     told = happened[:MOST_LINE_EVENTS]
     if len(happened) > MOST_LINE_EVENTS:
         told.append(f"{len(happened) - MOST_LINE_EVENTS} more")

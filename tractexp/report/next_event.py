@@ -6,7 +6,7 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
 from tractexp.discrepancy.next_event.choose import DECIDED, EventTrial, NextEvent
-from tractexp.text.wording import as_sentence
+from tractexp.text.wording import finish_sentence
 
 MOST_EVENTS_A_KIND = 2  # events of each kind that a table has
 KINDS = (
@@ -23,7 +23,8 @@ def report(choice: NextEvent, title: str) -> Report:
     page = Report("What to record next", f"For {title}, to tell {' from '.join(choice.rivals)}.")
     sure = choice.probability >= DECIDED
     page.verdict(
-        as_sentence(choice.sentence()), kind="good" if sure else "bad" if choice.same else "plain"
+        finish_sentence(choice.sentence()),
+        kind="good" if sure else "bad" if choice.same else "plain",
     )
     section(page, choice)
     return page

@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.overlay import Overlay
-from tractexp.domain.playback import as_phasors
+from tractexp.domain.playback import measure_as_phasors
 from tractexp.record import WaveEvent, describe
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.explained import Answer
@@ -55,7 +55,7 @@ def _add_overlay(page: Report, overlay: Overlay, role: str, answers: Sequence[An
         return
     page.chart(currents(event, overlay).answers(answers), f"{describe(event.phasors)}.")
     with page.fold_blocks("The same in phasors: P and Q"):
-        page.chart(in_phasors(event, overlay), IN_PHASORS)
+        page.chart(chart_phasors(event, overlay), IN_PHASORS)
 
 
 def chart(overlay: Overlay) -> Chart:
@@ -83,10 +83,10 @@ def currents(event: WaveEvent, overlay: Overlay) -> Chart:
     )
 
 
-def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
+def chart_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
     """The chart of phasors by the record's estimator, of calculated and recorded currents."""
     curves = [
-        (name, as_phasors(event, calculated), color, dash)
+        (name, measure_as_phasors(event, calculated), color, dash)
         for name, calculated, color, dash in _models(overlay)
     ]
     return event_chart(

@@ -16,7 +16,7 @@ from tractexp.blocks.style import PALETTE
 from tractexp.domain import PHASORS, WAVES
 from tractexp.identification.plan import INERTIA, ChosenEvent, Forecast, Needed, column
 from tractexp.inference.problem import Problem
-from tractexp.text.wording import as_sentence, list_first
+from tractexp.text.wording import finish_sentence, list_first
 
 DEPTH, DURATION, RATE = "depth", "duration [s]", "samples per second"
 JUMP, UNBALANCE = "phase jump [degrees]", "negative sequence, of the depth"
@@ -102,7 +102,7 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     page = Report(
         title, f"A plan for {planned.problem.model.title}, before anything more is recorded."
     )
-    page.verdict(as_sentence(str(needed)), kind="bad" if needed.depth is None else "good")
+    page.verdict(finish_sentence(str(needed)), kind="bad" if needed.depth is None else "good")
     by_depth, *others = [_chart(planned, label, legend=label == DEPTH) for label in planned.scans]
     page.chart(by_depth, _caption(needed))
     _add_question_section(page, planned)
@@ -190,7 +190,7 @@ def _add_question_section(page: Report, planned: Planned) -> None:
         [
             f"How deep must a dip be for {needed.parameter}{stands} to be known within ±"
             f" {100 * needed.within:g} %?",
-            as_sentence(planned.dip),
+            finish_sentence(planned.dip),
             f"Recorded already: {', '.join(e.record.name for e in problem.events)}.",
         ]
     )

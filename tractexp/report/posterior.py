@@ -17,7 +17,7 @@ from tractexp.report.profile import (
     find_declared_parameter,
     span,
 )
-from tractexp.text.wording import as_sentence
+from tractexp.text.wording import finish_sentence
 
 HISTOGRAM_BINS = 60  # of a histogram
 DOTS = 1500  # draws shown of a pair
@@ -37,7 +37,7 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
         " emcee's ensemble.",
     )
     sentences = (
-        ([as_sentence(grade)] if grade else [])
+        ([finish_sentence(grade)] if grade else [])
         + [_agreement(uncertainty, drawn)]
         + ([SCATTER] if not uncertainty.exact else [])
     )

@@ -14,7 +14,7 @@ from tractexp.identification.profile import End, LikelihoodProfile, Profiles
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, ParameterVerdict, format_half_width
 from tractexp.record.identity import title_of
-from tractexp.text.wording import as_sentence
+from tractexp.text.wording import finish_sentence
 
 LARGEST_END_DIFFERENCE = 0.2  # of the half interval by curvature: closer ends are the same interval
 ABOVE = 2.2  # thresholds that a chart shows
@@ -49,14 +49,14 @@ def report(scan: Profiles, grade: str = "") -> Report:
     says = {profile.name: meaning(scan, profile) for profile in scan.profiles}
     sentences = [
         *([SCATTER] if not uncertainty.exact else []),
-        *_where(says),
+        *_explain_curvature(says),
         *_list_unidentified(verdicts),
     ]
-    graded = [as_sentence(grade)] if grade else []
+    graded = [finish_sentence(grade)] if grade else []
     page.verdict(
         *graded,
         *sentences,
-        *(as_sentence(note) for note in scan.notes),
+        *(finish_sentence(note) for note in scan.notes),
         kind=_kind(verdicts, uncertainty.exact),
     )
     titles = {name: f"{name}: {verdict.word}" for name, verdict in verdicts.items()}
@@ -122,7 +122,7 @@ def meaning(scan: Profiles, profile: LikelihoodProfile) -> str:
         )
     if not said:
         said.append(_compare_half_widths(scan, profile))
-    return as_sentence("; ".join(said))
+    return finish_sentence("; ".join(said))
 
 
 def _name_sides(profile: LikelihoodProfile, how: End) -> list[str]:
@@ -150,7 +150,7 @@ def _compare_half_widths(scan: Profiles, profile: LikelihoodProfile) -> str:
     return f"lopsided: {reach:.1f} times as far {side}"
 
 
-def _where(says: Mapping[str, str]) -> list[str]:
+def _explain_curvature(says: Mapping[str, str]) -> list[str]:
     """Where curvature is enough, and where it misleads."""
     enough = [name for name, said in says.items() if said.endswith(f"{ENOUGH}.")]
     rest = [name for name in says if name not in enough]
@@ -183,7 +183,7 @@ def _list_unidentified(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
         for name, verdict in verdicts.items()
         if verdict.word != IDENTIFIED
     ]
-    return [as_sentence("; ".join(poor)) if poor else "Every parameter is identified."]
+    return [finish_sentence("; ".join(poor)) if poor else "Every parameter is identified."]
 
 
 def _curvature(scan: Profiles, name: str) -> tuple[float, float]:

@@ -17,7 +17,13 @@ from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
 from tractexp.inference.model_error import tell_error
 from tractexp.report.extended import interval
-from tractexp.text.wording import as_sentence, in_words, join_words, percent, with_error
+from tractexp.text.wording import (
+    finish_sentence,
+    format_probability,
+    format_with_error,
+    join_words,
+    percent,
+)
 
 MISSED, TERM = "#9A9A9A", "#0072B2"
 EVENTS = 4  # whose charts are shown at once
@@ -25,7 +31,9 @@ EVENTS = 4  # whose charts are shown at once
 
 def headlines(findings: Findings) -> list[str]:
     """The sentences on a proposal in the box at the top."""
-    return [as_sentence(s) for s in proposed_in_words(to_dict(findings.proposed, PLUGIN), None)[:2]]
+    return [
+        finish_sentence(s) for s in proposed_in_words(to_dict(findings.proposed, PLUGIN), None)[:2]
+    ]
 
 
 def add_proposal_section(page: Report, findings: Findings) -> None:
@@ -37,7 +45,8 @@ def add_proposal_section(page: Report, findings: Findings) -> None:
         _add_tried_terms(page, findings.proposed.tried)
         return
     page.text(
-        f"{as_sentence(proposal.term.words)} No effect of the catalogue has this term; it was found"
+        f"{finish_sentence(proposal.term.words)}"
+        " No effect of the catalogue has this term; it was found"
         " by a screen."
     )
     page.equation(proposal.term.latex)
@@ -68,7 +77,7 @@ def _numbers(page: Report, proposal: Proposal) -> None:
             p.symbol.replace("\\varphi", "φ"),
             p.about,
             p.unit,
-            with_error(k.value, k.error),
+            format_with_error(k.value, k.error),
             interval(*k.interval),
         ]
         for k in proposal.estimates
@@ -186,7 +195,7 @@ def _add_tried_terms(page: Report, tried: Sequence[tuple[Term, TermAssessment]])
                     t.words,
                     *(percent(g.explained_share) for g in gaps),
                     *(f"{g.after.chi2_per_sample:.2f}" for g in gaps),
-                    in_words(w.p),
+                    format_probability(w.p),
                 ]
                 for t, w in tried
                 for gaps in ((w.train, w.validate),)

@@ -19,8 +19,8 @@ def tabulate_race(entries: Sequence[Mapping[str, Any]]) -> list[Table]:
         [
             entry["name"],
             entry["parameters"],
-            _in_percent(entry["fitted"]),
-            _in_percent(entry["predicted"]),
+            _format_percent(entry["fitted"]),
+            _format_percent(entry["predicted"]),
             entry["why"] or ("the model" if number == 0 else ""),
         ]
         for number, entry in enumerate(entries)
@@ -29,5 +29,5 @@ def tabulate_race(entries: Sequence[Mapping[str, Any]]) -> list[Table]:
     return [Table(columns, rows, "Structures raced", CAPTION, words=(0, 4))]
 
 
-def _in_percent(error: float | None) -> str:
+def _format_percent(error: float | None) -> str:
     return "" if error is None else f"{100 * error:.3g} %"

@@ -19,9 +19,9 @@ from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import UNKNOWN, Identity, label
 from tractexp.text.wording import (
     count_noun,
+    format_with_error,
     list_first,
     shorten,
-    with_error,
     write_quantity,
 )
 
@@ -97,7 +97,7 @@ def tabulate_parameters(fit: "Identification") -> Table:
     rows = [
         [
             e.name,
-            with_error(e.value, e.standard_error or 0.0),
+            format_with_error(e.value, e.standard_error or 0.0),
             e.unit,
             "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
             name_verdict(e.verdict),

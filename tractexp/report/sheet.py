@@ -18,7 +18,7 @@ from tractexp.report.fit_sentences import describe_rivals
 from tractexp.report.fit_summary import name_verdicts
 from tractexp.report.fit_tables import error_rows, list_origin
 from tractexp.report.screen import choose_units, describe_load
-from tractexp.text.wording import as_sentence, count_noun, with_error
+from tractexp.text.wording import count_noun, finish_sentence, format_with_error
 
 if TYPE_CHECKING:
     from tractexp.api.identification import Identification
@@ -47,16 +47,16 @@ def sheet(fit: "Identification") -> Report:
     names = [event["name"] for event in result.events if event["role"] == "train"]
     page = Report(
         f"Load model of {title(result.identities, names)}",
-        as_sentence(describe_load(result, names).removeprefix("load: ")),
+        finish_sentence(describe_load(result, names).removeprefix("load: ")),
     )
     page.verdict(
-        f"{fit.usability.upper()}. {as_sentence(fit.usability_reason)}".removeprefix(". "),
+        f"{fit.usability.upper()}. {finish_sentence(fit.usability_reason)}".removeprefix(". "),
         USES[fit.usability],
         kind={"usable": "good", "unusable": "bad"}.get(fit.usability, "plain"),
     )
     page.heading("Load and record").items(describe_identities(result.identities) or names)
     page.add(_tabulate_powers(fit))
-    page.heading("Parameters").text(as_sentence(fit.model.model.title)).add(_tabulate(fit))
+    page.heading("Parameters").text(finish_sentence(fit.model.model.title)).add(_tabulate(fit))
     _add_machine(page, fit)
     page.heading("Measured and calculated").add(_tabulate_errors(fit))
     _add_charts(page, fit)
@@ -87,7 +87,7 @@ def _tabulate(fit: "Identification") -> Table:
         [
             e.name,
             e.about,
-            with_error(e.value, e.standard_error or 0.0),
+            format_with_error(e.value, e.standard_error or 0.0),
             e.unit,
             "{:.4g} to {:.4g}".format(*e.interval) if e.interval else "",
             brief(e.verdict),
@@ -105,7 +105,7 @@ def _add_machine(page: Report, fit: "Identification") -> None:
     try:
         machine = rate_machine(fit.result)
     except UserError as error:
-        page.text(as_sentence(str(error)))
+        page.text(finish_sentence(str(error)))
         return
     scale, (unit, _) = choose_units(fit.result)
     size = f"{scale * machine.rating:.4g} {'MVA' if unit == 'MW' else 'pu'}"
@@ -167,14 +167,14 @@ def _draw(chart: Chart, one: Any, scales: tuple[float, float, float]) -> None:
 
 def _list_limits(fit: "Identification") -> list[str]:
     """The limits of the model's use, a sentence each."""
-    said = [as_sentence(doubt) for doubt in fit.doubts]
+    said = [finish_sentence(doubt) for doubt in fit.doubts]
     said += [f"{name} is {verdict}." for name, verdict in name_verdicts(fit.result).items()]
-    said += map(as_sentence, describe_rivals(fit))
+    said += map(finish_sentence, describe_rivals(fit))
     if not fit.result.model_error.get("held_out"):
         said.append("No event was held out: how it predicts another dip is not known.")
     if not fit.result.base.in_mva:
         said.append("The record does not say what one per unit is, so that there are no MW.")
-    said += [as_sentence(f"next: {text}") for text in fit.advice[:1]]
+    said += [finish_sentence(f"next: {text}") for text in fit.advice[:1]]
     return said
 
 

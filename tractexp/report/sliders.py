@@ -14,7 +14,7 @@ from tractexp.errors import UserError
 from tractexp.kernel.layout import PHASOR_INPUTS
 from tractexp.storage import files
 from tractexp.text import quoting
-from tractexp.text.wording import as_sentence
+from tractexp.text.wording import finish_sentence
 
 if TYPE_CHECKING:
     from tractexp.api.identification import Identification
@@ -27,7 +27,7 @@ def add_sliders(page: Report, fit: "Identification") -> None:
     try:
         program, content = _write_program(fit), _collect(fit)
     except UserError as error:
-        page.text(as_sentence(str(error)))
+        page.text(finish_sentence(str(error)))
         return
     page.text(
         "Move a parameter: P and Q of the first event are calculated anew, in this page, by the"

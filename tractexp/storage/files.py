@@ -335,7 +335,7 @@ def write(
         Where the folder or the file cannot be written.
     """
     path = Path(path)
-    with _as_user_error(path), _make_part_file(path) as temporary:
+    with _raise_as_user_error(path), _make_part_file(path) as temporary:
         _fill(temporary, encode_text(content), lasting, private)
         os.replace(temporary, path)
         if lasting:
@@ -350,7 +350,7 @@ def encode_text(content: str | bytes) -> bytes:
 
 def copy(source: Path | str, target: Path | str) -> Path:
     """Copy a file, whole or not at all. Raises `UserError` where it cannot be read or written."""
-    with _as_user_error(Path(target)):
+    with _raise_as_user_error(Path(target)):
         content = Path(source).read_bytes()
     return write(target, content)
 
@@ -360,7 +360,7 @@ def move(source: Path | str, target: Path | str) -> Path:
     is impossible.
     """
     target = Path(target)
-    with _as_user_error(target):
+    with _raise_as_user_error(target):
         os.replace(source, target)
         _settle(target.parent)
     return target
@@ -423,7 +423,7 @@ def claim_file(path: Path, claimant: str) -> Iterator[None]:
 
     Raises `UserError` where another process holds it. A file system without locks holds nothing.
     """
-    with _as_user_error(path):
+    with _raise_as_user_error(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         file = _take_lock(path)
     with file:
@@ -479,7 +479,7 @@ def new_folder(path: Path) -> Path:
     """A folder that was not there: of this name, or with a number behind it. Raises `UserError`
     where it cannot be.
     """
-    with _as_user_error(path):
+    with _raise_as_user_error(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         for k in itertools.count(1):
             named = path if k == 1 else path.with_name(f"{path.name}_{k}")
@@ -539,7 +539,7 @@ def leftovers(folder: Path) -> list[Path]:
 
 
 @contextlib.contextmanager
-def _as_user_error(path: Path) -> Iterator[None]:
+def _raise_as_user_error(path: Path) -> Iterator[None]:
     """Within it, what the system refuses is a `UserError` that names the path."""
     try:
         yield

@@ -59,7 +59,7 @@ class Composer:
         subdir = "" if self._subdir == BY_NUMBER else str(whole.hydra.sweep.subdir)
         hydra = whole if self._reads_hydra else None
         return Composed(
-            _resolve(_without_hydra(whole)), dict(whole.hydra.runtime.choices), subdir, hydra
+            _resolve(_drop_hydra(whole)), dict(whole.hydra.runtime.choices), subdir, hydra
         )
 
     def _is_value(self, text: str) -> bool:
@@ -71,7 +71,7 @@ class Composer:
     def _composed_base(self, overrides: tuple[str, ...]) -> tuple[DictConfig, DictConfig]:
         """The configuration that some overrides give, and the task's part of it."""
         whole = self._compose_config(overrides)
-        return whole, _without_hydra(whole)
+        return whole, _drop_hydra(whole)
 
     def _compose_config(self, overrides: Iterable[str]) -> DictConfig:
         """Hydra's own composition."""
@@ -88,7 +88,7 @@ def _number(whole: DictConfig, number: int) -> None:
     HydraConfig.instance().set_config(whole)
 
 
-def _without_hydra(whole: DictConfig) -> DictConfig:
+def _drop_hydra(whole: DictConfig) -> DictConfig:
     """A configuration without Hydra's part."""
     task = copy.deepcopy(whole)
     with read_write(task), open_dict(task):

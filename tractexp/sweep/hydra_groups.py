@@ -78,7 +78,7 @@ def register(arguments: Sequence[str] = ()) -> None:
     """Discover all plugins and give Hydra their schemas. Raises `UserError` for a plugin that
     cannot be loaded.
     """
-    PluginSearchPath.own = _own_folders(arguments)
+    PluginSearchPath.own = _find_own_folder(arguments)
     from tractexp.sweep.launcher import Cores, CoresConfig
     from tractexp.sweep.sweeper import Grid, GridConfig
 
@@ -133,7 +133,7 @@ def _schema_of(group: str, name: str) -> type:
     return plugin.make_schema(plugin.get(group, name))
 
 
-def _own_folders(arguments: Sequence[str]) -> list[Path]:
+def _find_own_folder(arguments: Sequence[str]) -> list[Path]:
     """The folder of configurations that a command names."""
     parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     parser.add_argument("-cd", "--config-dir")

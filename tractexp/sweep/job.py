@@ -18,7 +18,7 @@ from tractexp.errors import UserError
 from tractexp.storage import credentials, files
 from tractexp.storage.run_folder import RunFolder, find_holder, run_folder
 from tractexp.sweep import identity, status
-from tractexp.sweep.output import printing_to
+from tractexp.sweep.output import redirect_prints
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status, select_returned_metrics
 from tractexp.sweep.surroundings import surround_job
 from tractexp.tracking.sweepfile import folder_of, parent_of
@@ -172,7 +172,7 @@ def _work_there(job: SweepJob, place: RunFolder, logs: bool) -> Status:
     started = time.perf_counter()
     output = files.Transcript(job.folder / OUTPUT)
     measured: dict[str, float] = {}
-    with output, printing_to(output), surround_job(job) as conclude:
+    with output, redirect_prints(output), surround_job(job) as conclude:
         message = _run_task(job, place, measured, logs)
         seconds = time.perf_counter() - started
         ended = replace(

@@ -29,7 +29,7 @@ class _ByThread:
 
 
 @contextlib.contextmanager
-def printing_to(output: Any) -> Iterator[None]:
+def redirect_prints(output: Any) -> Iterator[None]:
     """Send what this thread prints to `output`."""
     thread = threading.get_ident()
     with _lock:

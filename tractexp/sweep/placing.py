@@ -20,7 +20,9 @@ def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
     yet but what Hydra hides in it, as a full disk or a kill leaves it. Raises `UserError` where the
     folder of `hydra.sweep.subdir` is another job's, somebody else's or not below the sweep's.
     """
-    folders = {s.configuration: p for p in _of_jobs(folder) if (s := status.read(p)) is not None}
+    folders = {
+        s.configuration: p for p in _find_job_folders(folder) if (s := status.read(p)) is not None
+    }
     taken = set(folders.values())
     above = set(itertools.chain.from_iterable(own.parents for own in taken))
     free = (k for k in itertools.count() if not _holds_something(folder / str(k)))
@@ -105,7 +107,7 @@ def settle(job: SweepJob, end: str, problem: str) -> None:
         replace(job.status, status=end, message=problem).end(job.folder)
 
 
-def _of_jobs(folder: Path) -> list[Path]:
+def _find_job_folders(folder: Path) -> list[Path]:
     """The folders of an earlier sweep's jobs, at any depth."""
     return [path.parent for path in folder.rglob(status.FILE)]
 

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 from tractexp.storage import files
 from tractexp.storage.files import write_json
 
@@ -110,7 +110,7 @@ def select_returned_metrics(
         if name not in metrics:
             raise UserError(
                 f"sweep.returns names {name}, which this task does not"
-                f" measure{among(name, metrics)}"
+                f" measure{list_allowed(name, metrics)}"
             )
     if not names and SEARCHED not in metrics:
         return None

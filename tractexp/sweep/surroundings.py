@@ -27,7 +27,9 @@ def surround_job(job: "SweepJob") -> "Iterator[Callable[[Status], None]]":
     job.callbacks.on_job_start(config=config, task_function=None)
 
     def conclude(end: Status) -> None:
-        job.callbacks.on_job_end(config=config, job_return=_as_hydra_returns(job, config, end))
+        job.callbacks.on_job_end(
+            config=config, job_return=_convert_to_hydra_return(job, config, end)
+        )
 
     yield conclude
     for handler in logging.getLogger().handlers:
@@ -48,7 +50,7 @@ def _place_configuration(job: "SweepJob") -> Any:
     return config
 
 
-def _as_hydra_returns(job: "SweepJob", config: Any, end: Status) -> Any:
+def _convert_to_hydra_return(job: "SweepJob", config: Any, end: Status) -> Any:
     """The end of a job in Hydra's terms."""
     from hydra.core.utils import JobReturn, JobStatus
 

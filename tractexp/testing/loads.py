@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from tractexp.configuration.plugin import discover
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, list_allowed
 from tractexp.kernel.layout import INPUTS
 from tractexp.model import sites
 from tractexp.model.drive import PHASORS, WAVES, Drive
@@ -317,7 +317,7 @@ def has_sizes_that_matter(cls: type[Effect]) -> None:
     for name in cls.confused_with:
         others = effects.keys() - {cls.name}
         assert name in others, (
-            f"'{cls.name}' is confused with '{name}', no other effect{among(name, others)}"
+            f"'{cls.name}' is confused with '{name}', no other effect{list_allowed(name, others)}"
         )
 
 
@@ -353,7 +353,7 @@ def belongs_to_its_family(cls: type[Effect]) -> None:
     if not cls.family:
         return
     assert cls.family in effects, (
-        f"'{cls.name}' belongs to '{cls.family}', no effect{among(cls.family, effects)}"
+        f"'{cls.name}' belongs to '{cls.family}', no effect{list_allowed(cls.family, effects)}"
     )
     textbook = effects[cls.family]
     assert issubclass(textbook, Effect)

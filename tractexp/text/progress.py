@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-from tractexp.text.wording import one_line
+from tractexp.text.wording import write_on_one_line
 
 LOG_WIDTH = 120  # characters a table may take in a log file
 WIDTH = "COLUMNS"  # the variable by which a user says how many, wherever it is printed
@@ -69,12 +69,12 @@ def ask_for(arguments: list[str]) -> list[str]:
 
 def say(text: str = "") -> None:
     """Print one line."""
-    console().print(one_line(text), markup=False)
+    console().print(write_on_one_line(text), markup=False)
 
 
 def log(text: str) -> None:
     """Print one line of progress for a log file, beside the output."""
-    print(one_line(text), file=sys.stderr, flush=True)
+    print(write_on_one_line(text), file=sys.stderr, flush=True)
 
 
 @contextmanager
@@ -186,7 +186,7 @@ def tell_stages(progress: Progress = None) -> Iterator[Callable[[str], None]]:
         with _live(
             [SpinnerColumn(), TextColumn("{task.fields[stage]}", markup=False)], None, stage=""
         ) as update:
-            yield lambda line: update(stage=one_line(line))
+            yield lambda line: update(stage=write_on_one_line(line))
         return
     started = time.perf_counter()
 

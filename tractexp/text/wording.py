@@ -35,12 +35,12 @@ def escape_text(text: object) -> str:
     return UNSEEN.sub(lambda match: match[0].encode("unicode_escape").decode(), str(text))
 
 
-def one_line(text: object) -> str:
+def write_on_one_line(text: object) -> str:
     """The text by `escape_text` in one line: a line break would be a line of somebody else's."""
     return escape_text(text).replace("\n", "\\n")
 
 
-def in_words(p: float) -> str:
+def format_probability(p: float) -> str:
     """A probability for a sentence or a cell.
 
     Examples
@@ -53,7 +53,7 @@ def in_words(p: float) -> str:
     return f"{p:.2g}" if p >= 1e-4 else _powers(p, 2)
 
 
-def with_error(value: float, error: float) -> str:
+def format_with_error(value: float, error: float) -> str:
     """A value to the digits that its standard error leaves.
 
     Examples
@@ -158,7 +158,7 @@ def list_figures(values: Sequence[float], shown: Callable[[float], str]) -> str:
     return join_words([shown(value) for value in values])
 
 
-def as_sentence(text: str) -> str:
+def finish_sentence(text: str) -> str:
     """A clause as a sentence of its own.
 
     It begins with a capital, unless with a parameter's name, and ends with a full stop.

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import TASK, UserError, among
+from tractexp.errors import TASK, UserError, list_allowed
 from tractexp.storage import files
 from tractexp.tracking.owner import search
 from tractexp.tracking.store import open_store, sentences
@@ -54,7 +54,7 @@ def find(
         if not chosen:
             raise UserError(
                 f"the MLflow store {uri} has no experiment"
-                f" '{experiment}'{among(experiment, names.values())}"
+                f" '{experiment}'{list_allowed(experiment, names.values())}"
             )
         names = {chosen[0]: experiment}
     with sentences(uri):

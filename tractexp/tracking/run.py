@@ -128,7 +128,9 @@ def choose_curve_points(count: int) -> "np.ndarray":
     return np.unique(np.linspace(0, count - 1, min(count, CURVE_POINTS)).round().astype(int))
 
 
-def at_common_steps(steps: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
+def resample_to_common_steps(
+    steps: "np.ndarray", values: "np.ndarray"
+) -> "tuple[np.ndarray, np.ndarray]":
     """A curve (n,) of what was reached, by steps (n,) above 0, at steps that all such curves share.
 
     MLflow averages runs step by step: where each has its own, the average jumps from one run to the

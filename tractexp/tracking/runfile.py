@@ -117,7 +117,7 @@ def read(folder: Path) -> RunFile | None:
         ) from error
 
 
-def below(root: Path) -> list[Path]:
+def list_run_folders(root: Path) -> list[Path]:
     """The folders at `root` and below that have such a file, those above first."""
     found = {run for path in root.rglob(FILE) if (run := find_run(path.parent)) is not None}
     return sorted(found, key=lambda folder: (len(folder.parts), folder))

@@ -33,7 +33,7 @@ def default_uri(folder: Path) -> str:
     return f"sqlite:///{(Path(folder).absolute() / 'outputs' / 'mlflow.db').as_posix()}"
 
 
-def chosen_uri(setting: str | None) -> str:
+def choose_uri(setting: str | None) -> str:
     """The store that a setting chooses, else MLflow's own variable; "" where neither does."""
     return setting or os.environ.get(VARIABLE, "").strip()
 
@@ -44,7 +44,7 @@ def address(setting: str | None) -> str:
 
     Raises `UserError` where it holds a password.
     """
-    chosen = chosen_uri(setting)
+    chosen = choose_uri(setting)
     if not chosen:
         return default_uri(Path.cwd())
     credentials.check("the MLflow store", chosen)

@@ -57,7 +57,7 @@ def sync(
     counts: Counter[str] = Counter()
     said: set[str] = set()
     broken: dict[str, str] = {}  # {address: why it cannot be used}: nobody waits for it twice
-    for folder in runfile.below(root):
+    for folder in runfile.list_run_folders(root):
         try:
             one = runfile.read(folder)
         except UserError as error:
@@ -161,7 +161,7 @@ def _send(one: RunFile, uri: str) -> str:
     if one.sweep:
         return _sweep(one, run_there, uri)
     if run_there is not None and run_there.info.status == one.run.status:
-        _below(client, uri, run_there, one.run.parent)
+        _link_to_sweep(client, uri, run_there, one.run.parent)
         return THERE
     one.mark_logged(log(one.run, uri, again=True), uri)
     return BROUGHT
@@ -201,7 +201,7 @@ def _sweep(one: RunFile, run_there: Any, uri: str) -> str:
     return BROUGHT
 
 
-def _below(client: Any, uri: str, run_there: Any, parent: str | None) -> None:
+def _link_to_sweep(client: Any, uri: str, run_there: Any, parent: str | None) -> None:
     """Let a run that was logged point to the run of its sweep, which was not then."""
     if parent and run_there.data.tags.get("mlflow.parentRunId") != parent:
         with sentences(uri):
@@ -211,7 +211,7 @@ def _below(client: Any, uri: str, run_there: Any, parent: str | None) -> None:
 def count_unsynced(root: Path) -> int:
     """How many run files at `root` and below are in no store yet."""
     count = 0
-    for folder in runfile.below(root):
+    for folder in runfile.list_run_folders(root):
         try:
             one = runfile.read(folder)
         except UserError:

@@ -127,7 +127,7 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     the rest is points.
     """
     if any(LOAD in tags for tags in runs):
-        return STATE | _of_loads()
+        return STATE | _describe_load_table()
     keys = GROUPS[:1] if all("variant" in tags for tags in runs) else GROUPS
     groups = {".".join(f"{key}.{tags.get(key, '')}" for key in keys) for tags in runs}
     section = {
@@ -149,7 +149,7 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     }
 
 
-def _of_loads() -> dict[str, Any]:
+def _describe_load_table() -> dict[str, Any]:
     """The table of a station's runs, the best model of each load first to be found: columns that
     sort.
     """

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tractexp.text.wording import in_words, join_words, percent, with_error
+from tractexp.text.wording import format_probability, format_with_error, join_words, percent
 
 
 def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> list[str]:
@@ -33,14 +33,17 @@ def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> li
 
 def chance(p: float) -> str:
     """How often noise gives as much, as a clause."""
-    return f"noise gives the best of the whole library as much with a probability of {in_words(p)}"
+    return (
+        f"noise gives the best of the whole library as much with a probability of "
+        f"{format_probability(p)}"
+    )
 
 
 def _numbers(parameters: Mapping[str, Mapping[str, Any]]) -> str:
     """ "size = 0.12 ± 0.01, time = 0.03 ± 0.002"."""
     each: Sequence[str] = [
         f"{n} = "
-        + with_error(
+        + format_with_error(
             p["value"], float("nan") if p["standard_error"] is None else p["standard_error"]
         )
         for n, p in parameters.items()

@@ -88,7 +88,7 @@ class ComparisonResult(Written):
                 v["objective"]["median"],
                 v["objective"]["worst"],
                 v["at_floor"],
-                v["ert"]["simulations"][_hardest(content["targets"])],
+                v["ert"]["simulations"][_find_hardest(content["targets"])],
             ]
             for problem, content in each.items()
             for v in content["variants"]
@@ -270,7 +270,7 @@ def _find_folder(sweep: Path | str | Searches | None, filter: str | None) -> str
 
     if filter is not None or isinstance(sweep, Searches):
         return None
-    return str(sweep if sweep is not None else load.newest_sweep(SWEEPS))
+    return str(sweep if sweep is not None else load.find_newest_sweep(SWEEPS))
 
 
 def check(
@@ -309,7 +309,7 @@ def _report(comparison: "Comparison | Several") -> Any:
     return overall_page if isinstance(comparison, Several) else page
 
 
-def _hardest(targets: Sequence[float]) -> int:
+def _find_hardest(targets: Sequence[float]) -> int:
     """The place of the lowest target."""
     return targets.index(min(targets))
 
@@ -365,12 +365,12 @@ def _runs(
         return list(searches.runs), searches.source
     if filter is None:
         assert sweep is not None
-        return load.from_sweep(Path(sweep)), f"the sweep {Path(sweep)}"
+        return load.read_sweep(Path(sweep)), f"the sweep {Path(sweep)}"
     from tractexp import tracking
     from tractexp.tracking.find import find
 
     source = f"the filter {filter}"
-    return load.from_logged(find(tracking.address(uri), filter, experiment), source), source
+    return load.read_logged(find(tracking.address(uri), filter, experiment), source), source
 
 
 @plugin

@@ -11,7 +11,7 @@ from tractexp.api.arguments import Choice, public
 from tractexp.api.setup import Setup
 from tractexp.blocks import Table
 from tractexp.configuration.composition import list_leaves
-from tractexp.errors import UserError, among, check_distinct, check_range
+from tractexp.errors import UserError, check_distinct, check_range, list_allowed
 from tractexp.outcome import Written
 from tractexp.storage import files
 from tractexp.text.progress import Progress, count_parts, tell
@@ -154,7 +154,7 @@ def vary_switches(choices: Sequence[Choice], switches: Sequence[str]) -> list[Ch
             names = ", ".join(one.name for one in choices)
             raise UserError(
                 f"switches names {switch}, which is no switch of"
-                f" {names}{among(switch, there, 'Switches')}"
+                f" {names}{list_allowed(switch, there, 'Switches')}"
             )
     return [varied for one in choices for varied in _vary(one, switches)]
 

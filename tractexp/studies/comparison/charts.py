@@ -220,7 +220,7 @@ def mean_ranks(ranks: Ranks, label: str = "mean rank over the seeds (1 is best)"
     return chart.limits(None, min(1, spans.min()) - 0.1, max(len(names), spans.max()) + 0.1)
 
 
-def _about(values: Sequence[float]) -> tuple[float, float]:
+def _choose_axis_ends(values: Sequence[float]) -> tuple[float, float]:
     """The ends of an axis for these values: all of them, and of equal ones a neighbourhood."""
     low, high = min(values), max(values)
     edge = 0.08 * (high - low) or 1e-3 * max(abs(high), 1e-9)
@@ -251,7 +251,7 @@ def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
         _add_ends(chart, panel, name, "in the floor's valley", inside, INSIDE)
         floor = polished.parameters[name]
         chart.level(floor, panel=panel, color=INSIDE).limits(
-            panel, *_about([floor, *(run.parameters[name] for run, _ in dots)])
+            panel, *_choose_axis_ends([floor, *(run.parameters[name] for run, _ in dots)])
         )
     chart.ticks(None, range(len(variants)), [v.name for v in variants], turned)
     return chart.limits(None, -0.6, len(variants) - 0.4)

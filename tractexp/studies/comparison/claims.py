@@ -42,7 +42,7 @@ def answer(comparison: Comparison) -> str:
             f"Not settled: there are too few seeds to test. {lowest} the lowest median objective so"
             " far."
         )
-    if (tested := _best_tested(comparison)) != best:
+    if (tested := _find_best_tested(comparison)) != best:
         advice = _advice(comparison, tested, [])
         return (
             f"{best} has the lowest median objective, but too few seeds to test. Of the others:"
@@ -51,7 +51,7 @@ def answer(comparison: Comparison) -> str:
     return _advice(comparison, best, others)
 
 
-def _best_tested(comparison: Comparison) -> str:
+def _find_best_tested(comparison: Comparison) -> str:
     """The best of the variants that had seeds enough for a test; of all where none had.
 
     Summaries stand best first.
@@ -133,11 +133,11 @@ def headline(comparison: Comparison) -> str:
     return f"{said} {' and '.join(verdicts) or 'was not tested'}."
 
 
-def near_and_far(comparison: Comparison) -> tuple[list[VariantPair], list[VariantPair]]:
+def split_pairs(comparison: Comparison) -> tuple[list[VariantPair], list[VariantPair]]:
     """The pairs with the reference, or with the best variant tested where there is none; and the
     others.
     """
-    chosen = comparison.reference or _best_tested(comparison)
+    chosen = comparison.reference or _find_best_tested(comparison)
     near = [pair for pair in comparison.pairs if chosen in (pair.first, pair.second)]
     return near, [pair for pair in comparison.pairs if pair not in near]
 
@@ -147,7 +147,7 @@ def _list_names(names: list[str]) -> str:
     return join_words(sorted(names)) if len(names) <= 6 else f"{len(names)} other variants"
 
 
-def of_pair(comparison: Comparison, pair: VariantPair) -> str:
+def quote_pair(comparison: Comparison, pair: VariantPair) -> str:
     """One pair of variants, as it may be quoted."""
     one, two = (comparison.gathered[name] for name in (pair.first, pair.second))
     spent = [_spent_simulations(variant) for variant in (one, two)]
@@ -180,7 +180,7 @@ def _spent_simulations(variant: Variant) -> Spread:
     return Spread.from_values([run.simulations[-1] for run in variant.finished_runs])
 
 
-def of_ranks(comparison: Comparison) -> str:
+def describe_friedman_test(comparison: Comparison) -> str:
     """Friedman's test, or "" where it was not made."""
     ranks = comparison.ranks
     if ranks is None:
@@ -202,7 +202,7 @@ def of_ranks(comparison: Comparison) -> str:
     return text + "."
 
 
-def of_speed(comparison: Comparison) -> str:
+def describe_speed(comparison: Comparison) -> str:
     """Who needs fewest simulations to the hardest target."""
     target, index = min((target, i) for i, target in enumerate(comparison.targets))
     rows = sorted((s.ert["simulations"][index], s.name) for s in comparison.summaries)
@@ -217,7 +217,7 @@ def of_speed(comparison: Comparison) -> str:
     return text + (f"; {_list_names(never)} never did." if never else ".")
 
 
-def of_floor(comparison: Comparison) -> str:
+def describe_floor(comparison: Comparison) -> str:
     """How many runs of each variant reach the floor, in a sentence."""
     shares = _describe_shares([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
     value = number(comparison.floor.value, 5)
@@ -225,7 +225,7 @@ def of_floor(comparison: Comparison) -> str:
     return f"Runs within {FLOOR_SHARE:.0%} of the floor of {value} pu² ({source}): {shares}."
 
 
-def of_valley(comparison: Comparison) -> str:
+def describe_valley(comparison: Comparison) -> str:
     """How often a search ended where the floor's values are only a descent away; "" where that is
     not known.
     """
@@ -249,7 +249,7 @@ def _describe_shares(rows: list[tuple[float, int, str]]) -> str:
     return ", ".join(f"{name} {round(share * n)} of {n}" for share, n, name in rows[:6]) + more
 
 
-def of_effect(effect: SwitchEffect) -> str:
+def describe_effect(effect: SwitchEffect) -> str:
     """The effect of a switch, in a sentence."""
     (switch,) = effect.switches
     verdict = (
@@ -276,7 +276,7 @@ def _listed_contrasts(effect: SwitchEffect) -> str:
     )
 
 
-def of_unknown(ablation: Ablation) -> str:
+def describe_untold_effects(ablation: Ablation) -> str:
     """The sentence on effects that these variants cannot tell, and which variants would; "" where
     none is missing.
     """
@@ -294,13 +294,13 @@ def sentences(comparison: Comparison) -> list[str]:
     """All claims, the most general first."""
     claims = [
         headline(comparison),
-        of_floor(comparison),
-        of_valley(comparison),
-        of_speed(comparison),
-        of_ranks(comparison),
+        describe_floor(comparison),
+        describe_valley(comparison),
+        describe_speed(comparison),
+        describe_friedman_test(comparison),
     ]
-    claims += [of_pair(comparison, pair) for group in near_and_far(comparison) for pair in group]
+    claims += [quote_pair(comparison, pair) for group in split_pairs(comparison) for pair in group]
     if comparison.ablation:
-        claims += [of_effect(effect) for effect in comparison.ablation.effects]
-        claims.append(of_unknown(comparison.ablation))
+        claims += [describe_effect(effect) for effect in comparison.ablation.effects]
+        claims.append(describe_untold_effects(comparison.ablation))
     return [text for text in claims if text]

@@ -19,7 +19,13 @@ from tractexp.studies.comparison.ablation import family
 from tractexp.studies.comparison.comparison import Comparison, compare
 from tractexp.studies.comparison.floor import Polished, polish
 from tractexp.studies.comparison.load import nest_keys
-from tractexp.studies.comparison.overall import Overall, Several, on_functions, on_records, terms_of
+from tractexp.studies.comparison.overall import (
+    Overall,
+    Several,
+    merge_records,
+    rank_on_functions,
+    terms_of,
+)
 from tractexp.studies.comparison.runs import Gathered, SearchRun, gather
 from tractexp.text.progress import count_parts
 from tractexp.text.wording import join_words
@@ -63,12 +69,14 @@ def judge_problems(
         comparisons[label] = compare_runs(gathered, progress, judging, problem)
         by_terms.setdefault(terms, {})[label] = comparisons[label]
     without = list_plain_optimizers()
-    overall = [on_records(terms, comparisons, without) for terms, comparisons in by_terms.items()]
+    overall = [
+        merge_records(terms, comparisons, without) for terms, comparisons in by_terms.items()
+    ]
     notes = _collect_notes(comparisons)
     if bbob:
         try:
             overall.append(
-                _on_bbob(next(iter(comparisons.values())), bbob, folder, cores, progress)
+                _run_on_bbob(next(iter(comparisons.values())), bbob, folder, cores, progress)
             )
         # the records have been searched: what they say is told all the same
         except UserError as error:
@@ -90,7 +98,7 @@ def _collect_notes(comparisons: Mapping[str, Comparison]) -> list[str]:
     ]
 
 
-def _on_bbob(
+def _run_on_bbob(
     comparison: Comparison, instances: int, folder: Path | None, cores: int | None, progress: Any
 ) -> Overall:
     """The variants of a comparison on BBOB; the runs are kept beside those of the sweep, under what
@@ -117,7 +125,7 @@ def _on_bbob(
         result = unwrap(benchmark)(optimizers, **chosen, cores=cores, progress=progress)
         if folder:
             files.write_json(folder / BBOB, {"of": settings, "made": result.to_dict()})
-    return on_functions(result.bbob, family(variants, list_plain_optimizers()))
+    return rank_on_functions(result.bbob, family(variants, list_plain_optimizers()))
 
 
 def _load_stored_runs(folder: Path, settings: Mapping[str, Any]) -> BenchmarkResult | None:

@@ -25,7 +25,7 @@ MEND = "run this job again, or remove its folder"
 ENDED = ("objective", "epsilon_p", "epsilon_q")
 
 
-def newest_sweep(folder: Path) -> Path:
+def find_newest_sweep(folder: Path) -> Path:
     """The sweep under `folder` begun last. Raises `UserError` where there is none."""
     sweeps = [path for path in folder.iterdir() if _jobs(path)] if folder.is_dir() else []
     if not sweeps:
@@ -38,7 +38,7 @@ def newest_sweep(folder: Path) -> Path:
     )
 
 
-def from_sweep(folder: Path) -> list[SearchRun]:
+def read_sweep(folder: Path) -> list[SearchRun]:
     """The runs of a sweep's job folders. Raises `UserError` where there is none."""
     if not folder.is_dir():
         raise UserError(
@@ -203,7 +203,7 @@ def nest_keys(flattened: Mapping[str, Any]) -> dict[str, Any]:
     return config
 
 
-def from_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
+def read_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
     """Runs from what `tractexp.tracking.find` returns, oldest first; only identifications count, no
     parent runs.
 

@@ -61,7 +61,7 @@ def terms_of(runs: Sequence[SearchRun]) -> str:
     return f"{int(*counts)} iterations" if len(counts) == 1 else ""
 
 
-def on_records(
+def merge_records(
     terms: str, comparisons: Mapping[str, Comparison], plain: Mapping[str, str]
 ) -> Overall:
     """The variants that were run on all of these problems, {name: comparison}; `plain` as in
@@ -125,7 +125,7 @@ def _name_by_data(comparisons: Mapping[str, Comparison]) -> dict[str, str]:
     return dict(zip(comparisons, data, strict=True))
 
 
-def on_functions(benchmark: "BbobRuns", chosen: VariantFamily | None) -> Overall:
+def rank_on_functions(benchmark: "BbobRuns", chosen: VariantFamily | None) -> Overall:
     """The variants on BBOB: distances to the optimum, a function being one block; the family's
     effects on them.
     """

@@ -7,15 +7,15 @@ from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.overall import Overall, Several
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
-from tractexp.text.wording import in_words, join_words, percent
+from tractexp.text.wording import format_probability, join_words, percent
 
 
 def answer(several: Several) -> str:
     """The sentence on the best rank under each of the terms."""
-    return " ".join(of_ranks(overall) for overall in several.overall)
+    return " ".join(describe_mean_ranks(overall) for overall in several.overall)
 
 
-def of_ranks(overall: Overall) -> str:
+def describe_mean_ranks(overall: Overall) -> str:
     """Which variant has the best mean rank, and which are not told from it."""
     where = f"{overall.terms}, {overall.where}" if overall.terms else overall.where
     if overall.ranks is None:
@@ -27,27 +27,27 @@ def of_ranks(overall: Overall) -> str:
     if ranks.p >= SIGNIFICANCE_LEVEL:
         return (
             f"{said}, but the variants do not differ significantly (Friedman, p ="
-            f" {in_words(ranks.p)})."
+            f" {format_probability(ranks.p)})."
         )
     close = join_words(alike) if len(alike) < 6 else f"{len(alike)} others"
     verdict = f"; not told from it: {close}" if alike else ", significantly before all others"
     return f"{said}{verdict} (critical difference {ranks.critical_difference:.2f})."
 
 
-def of_switches(overall: Overall) -> str:
+def describe_switches(overall: Overall) -> str:
     """Which switches help and which harm, over all problems under the same terms; "" without an
     ablation.
     """
     if overall.ablation is None:
         return ""
-    effects = [of_effect(effect) for effect in overall.ablation.effects]
+    effects = [describe_effect(effect) for effect in overall.ablation.effects]
     terms = [overall.terms, "BBOB" if overall.share else ""]
     where = ", ".join(filter(None, terms))
     said = "; ".join(effects)
     return f"{where}: {said}." if where else f"{said}."
 
 
-def of_effect(effect: SwitchEffect) -> str:
+def describe_effect(effect: SwitchEffect) -> str:
     """ "levy helps (x 0.81, 0.76 to 0.87; in 64 % of the pairs)"."""
     verdict = (
         "has no effect that is shown"
@@ -61,7 +61,7 @@ def of_effect(effect: SwitchEffect) -> str:
     return f"{effect.switches[0]} {verdict} (× {number(effect.factor)}, {interval}{pairs})"
 
 
-def of_cost(overall: Overall) -> str:
+def describe_costs(overall: Overall) -> str:
     """The sentence on the simulations that each switch costs; "" where that is not known."""
     if not overall.cost:
         return ""
@@ -71,7 +71,7 @@ def of_cost(overall: Overall) -> str:
     )
 
 
-def of_agreement(several: Several) -> str:
+def describe_agreement(several: Several) -> str:
     """Whether the switches do the same under all terms; "" without ablations."""
     ablations = [overall.ablation for overall in several.overall if overall.ablation]
     if len(ablations) < 2:
@@ -99,8 +99,8 @@ def _help(names: list[str]) -> str:
 
 def sentences(several: Several) -> list[str]:
     """All claims, the most general first."""
-    claims = [of_agreement(several)]
+    claims = [describe_agreement(several)]
     for overall in several.overall:
-        claims += [of_ranks(overall), of_switches(overall)]
-    claims += [of_cost(overall) for overall in several.overall]
+        claims += [describe_mean_ranks(overall), describe_switches(overall)]
+    claims += [describe_costs(overall) for overall in several.overall]
     return [text for text in claims if text]

@@ -32,8 +32,8 @@ def report(several: Several, source: str) -> Report:
     )
     page = Report(title, f"{runs} runs of {source}. Objectives are those {one.AT_END}.")
     sentences = [
-        claims.of_agreement(several),
-        *(claims.of_ranks(overall) for overall in several.overall),
+        claims.describe_agreement(several),
+        *(claims.describe_mean_ranks(overall) for overall in several.overall),
     ]
     page.verdict(*(text for text in sentences if text))
     if several.notes:
@@ -53,7 +53,7 @@ def _overall(page: Report, overall: Overall) -> None:
     """Add what comes out over all problems."""
     page.heading(f"{overall.terms}: {overall.where}" if overall.terms else overall.where)
     if overall.ablation:
-        page.text(claims.of_switches(overall))
+        page.text(claims.describe_switches(overall))
         what, over = (
             ("distance to the optimum", " over functions") if overall.share else ("objective", "")
         )
@@ -64,7 +64,7 @@ def _overall(page: Report, overall: Overall) -> None:
         )
         _effects(page, overall, overall.ablation)
     if overall.ranks:
-        page.text(claims.of_ranks(overall))
+        page.text(claims.describe_mean_ranks(overall))
         page.chart(
             charts.mean_ranks(overall.ranks, f"mean rank within a {overall.block} (1 is best)"),
             f"Mean ranks over {overall.ranks.seeds} blocks, one for each {overall.block}, with half"
@@ -122,7 +122,7 @@ def _add_switch(
     """Draw what a switch does on each problem, in rows from the `first` on."""
     effects = [effect for _, effect in own]
     spans = np.array([(effect.low, effect.high) for effect in effects])
-    labels = [f"{label}: {claims.of_effect(effect)}" for label, effect in own]
+    labels = [f"{label}: {claims.describe_effect(effect)}" for label, effect in own]
     factors = [effect.factor for effect in effects]
     rows = list(range(first, first + len(own)))
     chart.points(switch, factors, rows, color, hover=labels, spans=spans)

@@ -32,7 +32,12 @@ def report(comparison: Comparison, source: str) -> Report:
     page = Report(
         title, f"{runs} runs of {source}. Objectives, errors and parameters are those {AT_END}."
     )
-    headlines = (claims.headline, claims.of_floor, claims.of_valley, claims.of_speed)
+    headlines = (
+        claims.headline,
+        claims.describe_floor,
+        claims.describe_valley,
+        claims.describe_speed,
+    )
     page.verdict(
         claims.answer(comparison), *(text for claim in headlines if (text := claim(comparison)))
     )
@@ -44,7 +49,7 @@ def report(comparison: Comparison, source: str) -> Report:
     _differences(page, comparison)
     if comparison.ablation:
         add_ablation(page, comparison.ablation)
-    _not_judged(page, comparison)
+    _add_unjudged_runs(page, comparison)
     _reading(page, comparison)
     return page
 
@@ -196,7 +201,7 @@ def _differences(page: Report, comparison: Comparison) -> None:
     """Add which differences are more than chance."""
     page.heading("Is the difference more than chance?")
     if comparison.ranks:
-        page.text(claims.of_ranks(comparison))
+        page.text(claims.describe_friedman_test(comparison))
         page.chart(
             charts.mean_ranks(comparison.ranks),
             "Mean ranks over seeds, with half of Nemenyi's critical difference to either side:"
@@ -205,14 +210,14 @@ def _differences(page: Report, comparison: Comparison) -> None:
         )
     if not comparison.pairs:
         return
-    main, rest = claims.near_and_far(comparison)
+    main, rest = claims.split_pairs(comparison)
     _pairs(page, main)
     if rest:
         with page.fold_blocks(
             f"the other {len(rest)} pairs" if len(rest) > 1 else "the other pair"
         ):
             _pairs(page, rest)
-    sentences = [claims.of_pair(comparison, pair) for pair in (*main, *rest)]
+    sentences = [claims.quote_pair(comparison, pair) for pair in (*main, *rest)]
     page.heading("To quote", 3).items(sentences[:MOST_OPEN_SENTENCES])
     if sentences[MOST_OPEN_SENTENCES:]:
         with page.fold_blocks(f"{len(sentences) - MOST_OPEN_SENTENCES} more sentences"):
@@ -260,7 +265,7 @@ def add_ablation(page: Report, ablation: Ablation) -> None:
     optimizer is on, how that depends on how many others are, and on each other one.
     """
     page.heading("What each ingredient does")
-    page.items([claims.of_effect(effect) for effect in ablation.effects])
+    page.items([claims.describe_effect(effect) for effect in ablation.effects])
     columns = ["switched on", "factor", "from", "to", "seeds", "shown", "contrasts"]
     groups = (
         (
@@ -277,7 +282,7 @@ def add_ablation(page: Report, ablation: Ablation) -> None:
         ]
         if rows:
             page.table(columns, rows, f"{caption} 95 % bootstrap intervals over seeds.")
-    if unknown := claims.of_unknown(ablation):
+    if unknown := claims.describe_untold_effects(ablation):
         page.text(unknown)
 
 
@@ -286,10 +291,10 @@ def factor(effect: SwitchEffect) -> list[str]:
     return [" with ".join(effect.switches), *map(number, (effect.factor, effect.low, effect.high))]
 
 
-def _not_judged(page: Report, comparison: Comparison) -> None:
+def _add_unjudged_runs(page: Report, comparison: Comparison) -> None:
     """Add the runs that failed or were interrupted."""
     for title, rows in zip(
-        ("Failures", "Interrupted: not judged"), _without_result(comparison), strict=True
+        ("Failures", "Interrupted: not judged"), _list_runs_without_result(comparison), strict=True
     ):
         if rows:
             page.heading(f"{title}: {len(rows)}")
@@ -300,7 +305,7 @@ def _not_judged(page: Report, comparison: Comparison) -> None:
             )
 
 
-def _without_result(comparison: Comparison) -> list[list[dict[str, Any]]]:
+def _list_runs_without_result(comparison: Comparison) -> list[list[dict[str, Any]]]:
     """The runs that failed, and those that were interrupted: variant, seed, job and why."""
     failed = [
         (v.name, run, run.failure) for v in comparison.variants for run in v.runs if run.failure
@@ -340,7 +345,7 @@ def _reading(page: Report, comparison: Comparison) -> None:
 
 def content(comparison: Comparison, source: str) -> dict[str, Any]:
     """The content of `comparison.json`: every number of the page. What is not finite is None."""
-    failed, interrupted = _without_result(comparison)
+    failed, interrupted = _list_runs_without_result(comparison)
     polished = comparison.polished
     return files.plain(
         {
@@ -356,7 +361,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
             "ties": comparison.ties,
             "variants": comparison.summaries,
             "runs": [
-                _of_run(variant, run, comparison)
+                _describe_run(variant, run, comparison)
                 for variant in comparison.variants
                 for run in variant.finished_runs
             ],
@@ -373,7 +378,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
     )
 
 
-def _of_run(variant: Variant, run: SearchRun, comparison: Comparison) -> dict[str, Any]:
+def _describe_run(variant: Variant, run: SearchRun, comparison: Comparison) -> dict[str, Any]:
     """The entry of a run in `comparison.json`."""
     inside = comparison.polished.in_valley(run) if comparison.polished else None
     fields = {

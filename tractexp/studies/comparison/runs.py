@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from tractexp.errors import TASK, UserError, among
+from tractexp.errors import TASK, UserError, list_allowed
 from tractexp.storage import files
 
 # The parts of a configuration. Every key belongs to one of them, so that nothing swept is pooled
@@ -115,7 +115,7 @@ class Gathered:
         if not variants:
             raise UserError(
                 f"there is no variant '{name}' in this"
-                f" comparison{among(name, (v.name for v in self.variants))}"
+                f" comparison{list_allowed(name, (v.name for v in self.variants))}"
             )
         return variants[0]
 
@@ -126,7 +126,8 @@ def select_runs_on(runs: Sequence[SearchRun], source: str, data: str) -> list[Se
     if not chosen:
         choices = {run.data for run in runs}
         raise UserError(
-            f"{TASK.data}={data}: {source} has no run on these data{among(data, choices, 'Data')}"
+            f"{TASK.data}={data}: {source} has no run on these data"
+            f"{list_allowed(data, choices, 'Data')}"
         )
     return chosen
 

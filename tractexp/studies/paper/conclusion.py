@@ -102,7 +102,7 @@ def _differ(study: Study, first: str, second: str, by: str) -> bool:
 
 def _lack(study: Study) -> str:
     """The reasons why the sparrow searches rank behind PSO, in a sentence."""
-    said = why.answer(why.lacks(study))
+    said = why.answer(why.compare_with_ssa(study))
     return (
         f"That convergence at the end, not exploration, is what the sparrow searches lack {said}."
     )
@@ -136,7 +136,7 @@ def reasons(study: Study) -> list[str]:
         f"Is it convergence at the end, and not exploration, that the sparrows lack? {_lack(study)}"
         f" {_random(study)}"
     ]
-    paragraphs += [_describe_lack(lack) for lack in why.lacks(study)]
+    paragraphs += [_describe_lack(lack) for lack in why.compare_with_ssa(study)]
     rival, limited, control = (
         study.shares(why.RIVAL),
         study.shares("pso_limited"),

@@ -71,7 +71,7 @@ def classical(f: Field, y: np.ndarray, h: float) -> np.ndarray:
     return _runge_kutta(f, y, h, h / 2)
 
 
-def as_printed(f: Field, y: np.ndarray, h: float) -> np.ndarray:
+def step_as_printed(f: Field, y: np.ndarray, h: float) -> np.ndarray:
     """One step of Eq. (4) as printed, h/6 in the second and third stage, its twice named K1 read as
     K3 and K4.
     """
@@ -191,7 +191,7 @@ def _errors() -> list[Check]:
 
 def _methods() -> list[Check]:
     """Eqs. (4) and (15), and what is printed twice."""
-    wrong, right = order(as_printed), order(classical)
+    wrong, right = order(step_as_printed), order(classical)
     slopes = {formula: maps.tail_exponent(steps) for formula, steps in maps.tails().items()}
     return [
         Check(

@@ -33,7 +33,7 @@ def figure9(study: Study) -> list[Claim]:
             verdicts = {}
             phrases = []
             for how, names in readings_of(first, second).items():
-                verdicts[how], numbers = faster(study, names[first], names[second], by)
+                verdicts[how], numbers = compare_speed(study, names[first], names[second], by)
                 phrases.append(f"{how} {LABELS[first]} {numbers[0]}, {LABELS[second]} {numbers[1]}")
             text = f"{LABELS[first]} converges faster than {LABELS[second]}, by {by}"
             measured = f"expected {by} to {targets} times the floor: {'; '.join(phrases)}"
@@ -42,7 +42,7 @@ def figure9(study: Study) -> list[Claim]:
     return claims
 
 
-def faster(study: Study, first: str, second: str, by: str) -> tuple[str, list[str]]:
+def compare_speed(study: Study, first: str, second: str, by: str) -> tuple[str, list[str]]:
     """Whether `first` reaches every target with less, over paired seeds, and the expected running
     times of both.
     """

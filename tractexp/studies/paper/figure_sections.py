@@ -23,7 +23,7 @@ from tractexp.studies.paper.study import (
     Study,
 )
 from tractexp.studies.paper.verdict import middle, number
-from tractexp.text.wording import as_sentence
+from tractexp.text.wording import finish_sentence
 
 SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
 
@@ -85,7 +85,7 @@ def _fit(sheet: Report, fit: Any, role: str) -> None:
     curve = CalculatedCurve("calculated", np.stack((fit.P, fit.Q)), PALETTE[1])
     sheet.chart(
         event_chart(fit.event, [curve]),
-        " ".join([caption, CAPTION, *map(as_sentence, record.notes)]),
+        " ".join([caption, CAPTION, *map(finish_sentence, record.notes)]),
     )
 
 
@@ -199,7 +199,7 @@ def _reasons(sheet: Report, study: Study) -> None:
                     for t in (k.convergence, k.valley, k.random, k.best, k.polished)
                 ),
             ]
-            for k in why.lacks(study)
+            for k in why.compare_with_ssa(study)
         ],
         "First and last Wilcoxon's test over paired seeds, the others Fisher's exact test;"
         " two-sided, all by Holm's correction. SD = 20, no velocity limit.",
@@ -221,7 +221,7 @@ def _valleys(sheet: Report, study: Study) -> None:
         (float(v[index[TRADED]]), f / study.floor) for f, _, v in study.control.group_valleys()[:2]
     ]
     sheet.chart(
-        figures.along(TRADED, grid, shown, own, bottoms),
+        figures.chart_objective_along(TRADED, grid, shown, own, bottoms),
         f"The best fit for each value of {TRADED}, all other parameters fitted again. Dots: the two"
         f" valleys. Shaded: beyond the bounds of {TRADED}. Q_s0 is what is left of Q before the dip"
         " to the static load.",
@@ -270,7 +270,7 @@ def _add_valleys_by_bounds(sheet: Report, study: Study, traded: int) -> None:
     )
 
 
-def held_out(figure: str, kind: str) -> Callable[..., None]:
+def explain_held_out_figure(figure: str, kind: str) -> Callable[..., None]:
     def section(sheet: Report, study: Study) -> None:
         sheet.heading(f"Figure {figure}: {kind}")
         fits = study.first("issa")

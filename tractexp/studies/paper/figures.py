@@ -78,7 +78,7 @@ def record(t: np.ndarray, U: np.ndarray, P: np.ndarray, Q: np.ndarray) -> Chart:
     return chart.limits(None, float(t[0]), float(t[-1]))
 
 
-def along(
+def chart_objective_along(
     name: str,
     grid: np.ndarray,
     panels: Mapping[str, np.ndarray],

@@ -10,12 +10,12 @@ from tractexp.blocks import Report
 from tractexp.studies.paper import conclusion, equations, printed
 from tractexp.studies.paper.claims import count_verdicts
 from tractexp.studies.paper.figure_sections import (
+    explain_held_out_figure,
     figure3,
     figure4,
     figure6,
     figure8,
     figure9,
-    held_out,
 )
 from tractexp.studies.paper.printed import LABELS, READINGS
 from tractexp.studies.paper.study import Study
@@ -176,8 +176,8 @@ SECTIONS: dict[str, Callable[[Report, Study], None]] = {
     "figure6": figure6,
     "figure8": figure8,
     "figure9": figure9,
-    "figure10": held_out("10", "interpolation"),
-    "figure11": held_out("11", "extrapolation"),
+    "figure10": explain_held_out_figure("10", "interpolation"),
+    "figure11": explain_held_out_figure("11", "extrapolation"),
     "equations": equations_section,
     "readings": readings_section,
 }

@@ -278,11 +278,11 @@ class Study:
     @functools.cached_property
     def path(self) -> tuple[np.ndarray, valleys.Ends]:
         """Values of C beyond its bounds, and the best fit at each."""
-        wide = valleys.with_bounds(self.problem, TRADED, *WIDE)
+        wide = valleys.rebound_problem(self.problem, TRADED, *WIDE)
         grid = np.linspace(*WIDE, 63)
         low = np.array([values for _, _, values in self.control.group_valleys()[:2]])
         return grid, self._descents(
-            wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor)
+            wide, low, lambda: valleys.follow_valley(wide, low, TRADED, grid, self.floor)
         )
 
     @functools.cached_property
@@ -290,7 +290,7 @@ class Study:
         """{bounds of C: where random points descend within them}."""
         own = next(p.bounds for p in self.problem.parameters if p.name == TRADED)
         others = {
-            bounds: self.random_ends(valleys.with_bounds(self.problem, TRADED, *bounds))
+            bounds: self.random_ends(valleys.rebound_problem(self.problem, TRADED, *bounds))
             for bounds in (WIDE, NARROW)
         }
         return {own: self.control, **others}

@@ -16,8 +16,8 @@ from tractexp.studies.paper.verdict import (
     PAIRS,
     REFUTED,
     Claim,
-    better,
     compare_ends,
+    compare_final_values,
     decide,
     lower,
     merge_verdicts,
@@ -99,10 +99,11 @@ def table2(study: Study) -> list[Claim]:
     for name in ("issa", printed.TEN["issa"], printed.LITERAL["issa"]):
         fits = [several[0] for several in study.fits(name)]
         P, Q = (np.array([getattr(f, e) for f in fits]) for e in ("epsilon_p", "epsilon_q"))
-        worst[how_read(name)] = max(P.max(), Q.max())
+        worst[describe_reading(name)] = max(P.max(), Q.max())
         phrases.append(
-            f"{how_read(name)} medians {percent(np.median(P))} and {percent(np.median(Q))}, worst"
-            f" {percent(worst[how_read(name)])}"
+            f"{describe_reading(name)} medians {percent(np.median(P))} and "
+            f"{percent(np.median(Q))}, worst"
+            f" {percent(worst[describe_reading(name)])}"
         )
     sine = equations.steady_state_sine(printed.TABLE_3["issa"])
     accepted = {how: CONFIRMED if error < ACCEPTED else REFUTED for how, error in worst.items()}
@@ -129,7 +130,7 @@ def table2(study: Study) -> list[Claim]:
     ]
 
 
-def how_read(name: str) -> str:
+def describe_reading(name: str) -> str:
     """A reading as a sentence has it."""
     return {"issa": "with SD = 20", printed.TEN["issa"]: "with 10 perceivers"}.get(
         name, printed.READINGS[name].words
@@ -181,7 +182,10 @@ def _compare_pairs(study: Study) -> list[Claim]:
 
 def _compare_to_the_letter(study: Study) -> Claim:
     """Whether the paper's optimizer ends lower when it is read to the letter."""
-    letter = [(pair, *better(study, printed.LITERAL, pair, "iterations")) for pair in PAIRS[:2]]
+    letter = [
+        (pair, *compare_final_values(study, printed.LITERAL, pair, "iterations"))
+        for pair in PAIRS[:2]
+    ]
     measured = "; ".join(f"{LABELS[a]} and {LABELS[b]}: {said}" for (a, b), _, said in letter)
     won = all(verdict == CONFIRMED for _, verdict, _ in letter)
     text = "to the letter, ISSA is more accurate than SSA and PSO, after 300 iterations"
@@ -285,7 +289,7 @@ def agreement(study: Study) -> list[Claim]:
     """The claims on printed values against the printed equations."""
     checks = equations.checks()
     failed = [check for check in checks if not check.holds]
-    wrong = equations.order(equations.as_printed)
+    wrong = equations.order(equations.step_as_printed)
     right = equations.order(equations.classical)
     return [
         Claim(

@@ -113,11 +113,13 @@ def _rows_of_parameters(study: Study, columns: Sequence[tuple[str, str]]) -> lis
         row = [parameter, bounds[parameter] if parameter in index else "-"]
         for name, what in columns:
             values = _list_values(study, name, index.get(parameter))
-            row.append(f"{printed.TABLE_3[name][k]:g}" if what == "paper" else _one(values, what))
+            row.append(
+                f"{printed.TABLE_3[name][k]:g}" if what == "paper" else _render_cell(values, what)
+            )
         rows.append(row)
     for error, table in (("epsilon_p", printed.EPSILON_P), ("epsilon_q", printed.EPSILON_Q)):
         rows.append([error, "", *_list_errors(study, columns, error, table)])
-    ends = [_one(study.objectives(n), w, printed.OBJECTIVE, n) for n, w in columns]
+    ends = [_render_cell(study.objectives(n), w, printed.OBJECTIVE, n) for n, w in columns]
     return [*rows, ["Obj.E [pu²]", "", *ends]]
 
 
@@ -126,10 +128,10 @@ def _list_errors(
 ) -> list[str]:
     """A row's cells of one error of the first dip."""
     found = {name: [getattr(fits[0], error) for fits in study.fits(name)] for name, _ in columns}
-    return [_one(found[name], what, table, name) for name, what in columns]
+    return [_render_cell(found[name], what, table, name) for name, what in columns]
 
 
-def _one(values: Any, what: str, table: Any = None, name: str = "") -> str:
+def _render_cell(values: Any, what: str, table: Any = None, name: str = "") -> str:
     """A cell: what the paper prints, the value of seed 0, or the median."""
     if what == "paper":
         return f"{table[name]:g}"

@@ -59,7 +59,7 @@ def draw_uniform_points(problem: Problem, n: int, seed: int) -> np.ndarray:
     return points[:n]
 
 
-def with_bounds(problem: Problem, name: str, low: float, high: float) -> Problem:
+def rebound_problem(problem: Problem, name: str, low: float, high: float) -> Problem:
     """The problem with other bounds of one parameter, and as many Runge-Kutta steps a sample."""
     bounds = {p.name: p.bounds for p in problem.parameters} | {name: (low, high)}
     step = int(problem.step.substeps.max())
@@ -68,7 +68,9 @@ def with_bounds(problem: Problem, name: str, low: float, high: float) -> Problem
     )
 
 
-def along(problem: Problem, starts: np.ndarray, name: str, grid: np.ndarray, floor: float) -> Ends:
+def follow_valley(
+    problem: Problem, starts: np.ndarray, name: str, grid: np.ndarray, floor: float
+) -> Ends:
     """The lowest objective at each value of a parameter, all others fitted: followed from each
     start both ways.
     """

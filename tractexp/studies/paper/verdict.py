@@ -66,7 +66,7 @@ def compare_ends(study: Study, first: str, second: str, by: str) -> tuple[str, s
     verdicts = {}
     phrases = []
     for how, names in readings_of(first, second).items():
-        verdicts[how], numbers = better(study, names, (first, second), by)
+        verdicts[how], numbers = compare_final_values(study, names, (first, second), by)
         phrases.append(f"{how} {numbers}")
     return merge_verdicts(verdicts), "; ".join(phrases)
 
@@ -93,7 +93,7 @@ def merge_verdicts(verdicts: Mapping[str, str]) -> str:
     )
 
 
-def better(
+def compare_final_values(
     study: Study, names: Mapping[str, str], pair: tuple[str, str], by: str
 ) -> tuple[str, str]:
     """Whether the first of a pair ends lower, the three optimizers read as `names` says."""

@@ -64,7 +64,7 @@ class Lack:
         return self.valley.lacks or self.random.lacks or self.best.lacks
 
 
-def lacks(study: Study) -> list[Lack]:
+def compare_with_ssa(study: Study) -> list[Lack]:
     """ISSA's and SSA's; the p-values are corrected over the tests of both."""
     tests = [test for name in SPARROWS for test in _tests(study, name)]
     corrected = holm([test.p for test in tests]).tolist()
