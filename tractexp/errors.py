@@ -134,7 +134,7 @@ def list_allowed(name: object, allowed: Iterable[str], label: str = "Available")
 
     Examples
     --------
-    >>> among("zipp", ["zip", "none"], "Loads")
+    >>> list_allowed("zipp", ["zip", "none"], "Loads")
     "; did you mean 'zip'? Loads: none, zip"
     """
     allowed = sorted(map(str, allowed))

@@ -46,7 +46,7 @@ def limit_to_one_thread(function: Callable[P, R]) -> Callable[P, R]:
     Examples
     --------
     >>> from threadpoolctl import threadpool_info
-    >>> count = in_one_thread(lambda: {one["num_threads"] for one in threadpool_info()})
+    >>> count = limit_to_one_thread(lambda: {one["num_threads"] for one in threadpool_info()})
     >>> count()
     {1}
     """

@@ -160,7 +160,7 @@ def fill_gaps(x: np.ndarray) -> np.ndarray:
 
     Examples
     --------
-    >>> without_gaps(np.array([1.0, np.nan, 2.0])).tolist()
+    >>> fill_gaps(np.array([1.0, np.nan, 2.0])).tolist()
     [1.0, 1.5, 2.0]
     """
     valid = np.isfinite(x)

@@ -55,7 +55,7 @@ def measure_offset_from_nominal(voltage: float) -> float:
 
     Examples
     --------
-    >>> round(off_nominal(110.0), 6), off_nominal(0.0)
+    >>> round(measure_offset_from_nominal(110.0), 6), measure_offset_from_nominal(0.0)
     (0.0, inf)
     """
     return (

@@ -45,7 +45,7 @@ def format_probability(p: float) -> str:
 
     Examples
     --------
-    >>> in_words(0.4543), in_words(0.00012), in_words(1e-9)
+    >>> format_probability(0.4543), format_probability(0.00012), format_probability(1e-9)
     ('0.45', '0.00012', 'less than one in a million')
     """
     if p < NEGLIGIBLE:
@@ -58,9 +58,9 @@ def format_with_error(value: float, error: float) -> str:
 
     Examples
     --------
-    >>> with_error(0.0220163, 7.78e-5)
+    >>> format_with_error(0.0220163, 7.78e-5)
     '0.022016 ± 0.000078'
-    >>> with_error(0.25, float("nan"))
+    >>> format_with_error(0.25, float("nan"))
     '0.25'
     """
     if not (math.isfinite(error) and error > 0):
@@ -165,7 +165,7 @@ def finish_sentence(text: str) -> str:
 
     Examples
     --------
-    >>> as_sentence("the motor stalls"), as_sentence("T_m is at its bound")
+    >>> finish_sentence("the motor stalls"), finish_sentence("T_m is at its bound")
     ('The motor stalls.', 'T_m is at its bound.')
     """
     return f"{text if '_' in text.split(' ')[0] else text[:1].upper() + text[1:]}."
