@@ -10,7 +10,7 @@ from tractexp.configuration.model_file import LARGEST, read_model_file
 from tractexp.configuration.overrides import quote_overrides
 from tractexp.configuration.repeatable import explain_refusal
 from tractexp.errors import UserError
-from tractexp.storage.files import DEEPEST
+from tractexp.storage.yaml_files import DEEPEST
 
 GOOD = """\
 # A comment, and @package hydra within it

@@ -36,7 +36,7 @@ import numpy as np
 
 from tractexp.cache import provenance
 from tractexp.errors import UserError
-from tractexp.storage import files
+from tractexp.storage import files, locks
 
 CHOICE = "TRACTEXP_CACHE_DIR"
 SUM = hashlib.sha256().digest_size  # bytes a file begins with
@@ -191,7 +191,7 @@ def read_secret() -> bytes:
     """
     path = cache_folder() / SECRET
     if not path.exists():
-        with files.lock_file(path.with_suffix(".lock"), LONGEST_WAIT):
+        with locks.lock_file(path.with_suffix(".lock"), LONGEST_WAIT):
             if not path.exists():
                 files.write(path, secrets.token_bytes(SUM), private=True)
     secret = files.read(path)

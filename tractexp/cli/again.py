@@ -13,7 +13,7 @@ from tractexp.configuration.plugin import get
 from tractexp.configuration.repeatable import explain_refusal
 from tractexp.configuration.run_command import group_of
 from tractexp.errors import UserError
-from tractexp.storage import files
+from tractexp.storage import yaml_files
 from tractexp.storage.run_folder import CONFIGURATION as FOLDER
 from tractexp.storage.run_folder import settle
 from tractexp.text import quoting
@@ -111,7 +111,8 @@ def _read_stored_run(folder: Path) -> tuple[list[str], Path, list[str]]:
     """
     try:
         whole, arguments = (
-            files.read_yaml(folder / FOLDER / name) for name in ("hydra.yaml", "overrides.yaml")
+            yaml_files.read_yaml(folder / FOLDER / name)
+            for name in ("hydra.yaml", "overrides.yaml")
         )
         runtime = whole["hydra"]["runtime"]
         sources = [

@@ -14,7 +14,7 @@ from typing import Any
 
 from tractexp.configuration.schema import ModelConfig
 from tractexp.errors import UserError, list_allowed
-from tractexp.storage import files
+from tractexp.storage import yaml_files
 
 ENDINGS = (".yaml", ".yml")
 LARGEST = 1 << 20  # bytes
@@ -39,7 +39,7 @@ def read_model_file(path: Path | str) -> dict[str, Any]:
     values of a model.
     """
     try:
-        content = files.read_yaml(path, LARGEST) or {}
+        content = yaml_files.read_yaml(path, LARGEST) or {}
     except FileNotFoundError:
         raise UserError(f"model={path}: there is no such file") from None
     if not isinstance(content, dict):

@@ -5,7 +5,7 @@ text.
 from tractexp.exchange.circuit import TCircuit
 from tractexp.exchange.format import Format, Restored, Simulated
 from tractexp.exchange.playback import dip
-from tractexp.storage.files import lock_file
+from tractexp.storage.locks import lock_file
 from tractexp.text import quoting
 
 __all__ = ["Format", "Restored", "Simulated", "TCircuit", "dip", "lock_file", "quoting"]

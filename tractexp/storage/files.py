@@ -8,7 +8,6 @@ in.
 import contextlib
 import dataclasses
 import errno
-import functools
 import importlib.resources
 import io
 import itertools
@@ -35,7 +34,6 @@ PART = ".tractexp.part"  # ends the name of a file that is being written
 OWN = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(PART), re.DOTALL)
 LARGEST = 2 << 30  # bytes of a file that is read at once: a record
 CONFIGURATION, RESULT = 4 << 20, 128 << 20  # bytes of what a run reads, and leaves
-MOST_NODES, DEEPEST = 100_000, 50  # values of a configuration, and how deep within one another
 ODD = {
     stat.S_IFIFO: "a named pipe",
     stat.S_IFSOCK: "a socket",
@@ -241,73 +239,6 @@ def parse_json(text: str, path: Path | str) -> Any:
         raise UserError(f"{path}: a whole number in it has more digits than can be read") from error
 
 
-def read_yaml(path: Path | str, largest: int = CONFIGURATION) -> Any:
-    """The content of a configuration in YAML: plain data, in which 1e-3 is a number. Raises
-    `UserError` for what is none, and as `read`.
-
-    An alias repeats what it stands for, so that a few lines of aliases of aliases fill any memory.
-    What they come to is counted before anything is made of it.
-    """
-    import yaml
-
-    text = read_text(path, largest)
-    try:
-        _count_nodes(text, path)
-        return yaml.load(text, _yaml_loader())
-    except yaml.MarkedYAMLError as error:
-        line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
-        raise UserError(
-            f"{path}: {line}not valid YAML ({error.problem or error.context})"
-        ) from error
-    # a sign that YAML has not, a date that the calendar has not
-    except (yaml.YAMLError, ValueError) as error:
-        raise UserError(f"{path}: not valid YAML ({str(error).splitlines()[0]:.200})") from error
-
-
-@functools.cache
-def _yaml_loader() -> Any:
-    """YAML's safe loader, for which 1e-3 is a number, as for people."""
-    import yaml
-
-    base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-    loader: Any = type("Loader", (base,), {})
-    number = re.compile(r"[-+]?\d[\d_]*[eE][-+]?\d+$")
-    loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+0123456789"))
-    return loader
-
-
-def _count_nodes(text: str, path: Path | str) -> None:
-    """Raise `UserError` where YAML holds more, or nests deeper, than any configuration, its aliases
-    written out.
-    """
-    import yaml
-
-    sizes: dict[str, int] = {}
-    # collections that are open: anchor, nodes so far
-    within: list[tuple[str | None, int]] = [(None, 0)]
-    for event in yaml.parse(text, _yaml_loader()):
-        if isinstance(event, yaml.CollectionStartEvent):
-            within.append((event.anchor, 1))
-        elif isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent):
-            if isinstance(event, yaml.AliasEvent):
-                # one that is open: it holds itself
-                anchor, size = None, sizes.get(event.anchor, MOST_NODES + 1)
-            else:
-                anchor, size = (
-                    within.pop()
-                    if isinstance(event, yaml.CollectionEndEvent)
-                    else (event.anchor, 1)
-                )
-            if anchor is not None:
-                sizes[anchor] = size
-            within[-1] = within[-1][0], within[-1][1] + size
-        if len(within) > DEEPEST or within[-1][1] > MOST_NODES:
-            raise UserError(
-                f"{path} holds more than {MOST_NODES} values, aliases written out, or nests them"
-                f" more than {DEEPEST} deep, which no configuration does"
-            )
-
-
 def write(
     path: Path | str, content: str | bytes, *, lasting: bool = True, private: bool = False
 ) -> Path:
@@ -335,7 +266,7 @@ def write(
         Where the folder or the file cannot be written.
     """
     path = Path(path)
-    with _raise_as_user_error(path), _make_part_file(path) as temporary:
+    with raise_as_user_error(path), _make_part_file(path) as temporary:
         _fill(temporary, encode_text(content), lasting, private)
         os.replace(temporary, path)
         if lasting:
@@ -350,7 +281,7 @@ def encode_text(content: str | bytes) -> bytes:
 
 def copy(source: Path | str, target: Path | str) -> Path:
     """Copy a file, whole or not at all. Raises `UserError` where it cannot be read or written."""
-    with _raise_as_user_error(Path(target)):
+    with raise_as_user_error(Path(target)):
         content = Path(source).read_bytes()
     return write(target, content)
 
@@ -360,7 +291,7 @@ def move(source: Path | str, target: Path | str) -> Path:
     is impossible.
     """
     target = Path(target)
-    with _raise_as_user_error(target):
+    with raise_as_user_error(target):
         os.replace(source, target)
         _settle(target.parent)
     return target
@@ -401,85 +332,11 @@ class Transcript(io.TextIOBase):
         super().close()
 
 
-@contextlib.contextmanager
-def lock_file(path: Path, seconds: float) -> Iterator[None]:
-    """Hold the file `path` exclusively among processes; one that dies lets go of it.
-
-    Raises `TimeoutError` where another process holds it for so long.
-    """
-    deadline = time.monotonic() + seconds
-    with path.open("a+b") as file:
-        while not _try_lock(file):
-            if time.monotonic() > deadline:
-                raise TimeoutError(f"another process has held {path} for {seconds:.0f} s")
-            time.sleep(0.05)
-        yield
-
-
-@contextlib.contextmanager
-def claim_file(path: Path, claimant: str) -> Iterator[None]:
-    """Hold the file `path`, which says by whom, and remove it at the end; a process that dies lets
-    go of it.
-
-    Raises `UserError` where another process holds it. A file system without locks holds nothing.
-    """
-    with _raise_as_user_error(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = _take_lock(path)
-    with file:
-        file.truncate(0)
-        file.write(encode_text(claimant))
-        file.flush()
-        try:
-            yield
-        finally:
-            with contextlib.suppress(OSError):
-                path.unlink()
-
-
-def read_claim(path: Path) -> str:
-    """By whom a file is held that `claim_file` made; "" where nobody holds it."""
-    try:
-        with open_ordinary_file(path) as file:
-            return "" if _try_lock(file) else _read_claimant(file)
-    except OSError:
-        return ""
-
-
-def _read_claimant(file: IO[bytes]) -> str:
-    """Who holds a lock, as its file says."""
-    return file.read(200).decode(errors="replace") or "another process"
-
-
-def _take_lock(path: Path) -> IO[bytes]:
-    """The file of a lock, locked. What was removed between opening and locking it is
-    none any more.
-    """
-    while True:
-        there(path)
-        file = path.open("a+b")
-        try:
-            if not _try_lock(file):
-                file.seek(0)
-                raise UserError(
-                    f"{path.parent} is in use by {_read_claimant(file)}: wait until that has ended,"
-                    " or give another folder"
-                )
-            if os.name == "nt" or (
-                path.exists() and os.path.samestat(os.fstat(file.fileno()), os.stat(path))
-            ):
-                return file
-        except BaseException:
-            file.close()
-            raise
-        file.close()
-
-
 def new_folder(path: Path) -> Path:
     """A folder that was not there: of this name, or with a number behind it. Raises `UserError`
     where it cannot be.
     """
-    with _raise_as_user_error(path):
+    with raise_as_user_error(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         for k in itertools.count(1):
             named = path if k == 1 else path.with_name(f"{path.name}_{k}")
@@ -487,27 +344,6 @@ def new_folder(path: Path) -> Path:
                 named.mkdir()
                 return named
     raise AssertionError("numbers end nowhere")
-
-
-def _try_lock(file: IO[bytes]) -> bool:
-    """Whether this process got the lock of an open file."""
-    try:
-        if os.name == "nt":
-            import msvcrt
-
-            file.seek(0)
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno in (errno.EACCES, errno.EAGAIN, errno.EDEADLK):
-            return False
-        # a file system that knows no locks
-        if error.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):
-            raise
-    return True
 
 
 def inside(path: Path, folder: Path) -> bool:
@@ -539,7 +375,7 @@ def leftovers(folder: Path) -> list[Path]:
 
 
 @contextlib.contextmanager
-def _raise_as_user_error(path: Path) -> Iterator[None]:
+def raise_as_user_error(path: Path) -> Iterator[None]:
     """Within it, what the system refuses is a `UserError` that names the path."""
     try:
         yield

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from tractexp.errors import UserError
-from tractexp.storage import files
+from tractexp.storage import files, locks
 
 CONFIGURATION, RESULT = ".hydra", "result.json"
 WHOLE, NEXT, LOCK, GOES = (
@@ -167,7 +167,7 @@ def find_run(folder: Path) -> Path | None:
 
 def find_holder(folder: Path) -> str:
     """Which other process is at work in a folder; "" where none is."""
-    holder = files.read_claim(folder / LOCK)
+    holder = locks.read_claim(folder / LOCK)
     return "" if holder.startswith(_describe_process()) else holder
 
 
@@ -183,7 +183,7 @@ def hold(folder: Path) -> Iterator[None]:
     """
     since = time.strftime("%Y-%m-%d %H:%M:%S")
     try:
-        with files.claim_file(folder / LOCK, f"{_describe_process()}since {since}"):
+        with locks.claim_file(folder / LOCK, f"{_describe_process()}since {since}"):
             yield
     finally:
         with contextlib.suppress(OSError):  # where it is not empty

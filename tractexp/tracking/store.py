@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp.errors import UserError
-from tractexp.storage import credentials, files
+from tractexp.storage import credentials, files, locks
 from tractexp.text import quoting
 from tractexp.tracking.owner import close_quietly
 
@@ -85,7 +85,7 @@ def open_store(uri: str) -> Any:
             close_quietly(client)
             return client
         database.parent.mkdir(parents=True, exist_ok=True)
-        with files.lock_file(database.with_name(database.name + ".lock"), LONGEST_STORE_WAIT):
+        with locks.lock_file(database.with_name(database.name + ".lock"), LONGEST_STORE_WAIT):
             if not database.exists():
                 _create_database(database)
             _check_database(database)

@@ -12,7 +12,7 @@ import numpy as np
 from tractexp.configuration.composition import list_leaves
 from tractexp.errors import TASK, UserError
 from tractexp.identification.result import by_event, parse_history
-from tractexp.storage import files
+from tractexp.storage import files, yaml_files
 from tractexp.studies.comparison.runs import SearchRun
 from tractexp.tracking.sweepfile import folder_of
 
@@ -183,7 +183,7 @@ def _explain_missing_result(folder: Path, status: Mapping[str, Any]) -> dict[str
 def _yaml(path: Path) -> Any:
     """The content of a file of a run."""
     with _readable(path):
-        return files.read_yaml(path)
+        return yaml_files.read_yaml(path)
 
 
 def flat(node: Mapping[str, Any]) -> dict[str, Any]:
