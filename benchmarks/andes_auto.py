@@ -44,6 +44,7 @@ def predict(model: str, fitted: Sequence[Any], held: Sequence[Any]) -> float:
         optimizer="multistart_least_squares",
         check_intervals=False,
         frequency_swing=0.0,
+        unbalance=0.0,
         progress=False,
     )
     error = fit.model_error_held_out

@@ -60,6 +60,7 @@ def fit(name: str, fitted: int, how: str, won: str) -> dict[str, Any]:
         optimizer="multistart_least_squares",
         check_intervals=False,
         frequency_swing=0.0,
+        unbalance=0.0,
         progress=False,
     )
     result, point = found.result, found.operating_point

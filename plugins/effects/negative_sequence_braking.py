@@ -36,7 +36,7 @@ class NegativeSequenceBraking(Effect):
     phasors_only = (
         "in waveforms the motor's equations carry negative sequence and its torque themselves"
     )
-    relevant = {"negative_sequence": 0.5}
+    relevant, theory = {"negative_sequence": 0.5}, {"negative_sequence": 1.0}
     confused_with = ("second_motor_group", "shunt_capacitor")
 
     def edit(self, eq, negative_sequence):

@@ -1,4 +1,4 @@
-"""What a frequency that nobody recorded does to parameters, and what is told of it."""
+"""What a frequency or an unbalance that nobody recorded does to parameters, and what is told."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,8 @@ def record(swing):
     P, Q = load.simulate(Drive.from_events([event]), values, 4).outputs[:, 0]
     rng = np.random.default_rng(5)
     noise = 2e-4 * rng.standard_normal((2, len(t)))
-    return {"t": t, "U": U, "P": P + noise[0], "Q": Q + noise[1], "f": f}
+    columns = {"t": t, "U": U, "P": P + noise[0], "Q": Q + noise[1], "f": f}
+    return columns | {"U2": np.zeros(len(t))}
 
 
 def fit(columns, model="third_order_impedance", **settings):
@@ -64,15 +65,15 @@ def test_with_the_frequency_nothing_is_told_and_the_truth_is_found(swinging):
 
 def test_without_it_the_swing_is_told_by_parameter(blind, still):
     """The swing that was there moves T_m by 8 %, four times its interval, within what is told."""
-    told, T_m = blind.result.unrecorded, blind.parameters["T_m"]
+    told, T_m = blind.result.unrecorded["f"], blind.parameters["T_m"]
     off = abs(T_m.value - TRUTH["T_m"])
     low, high = still.parameters["T_m"].interval
     assert off > 0.05 * TRUTH["T_m"]
     assert not low <= TRUTH["T_m"] <= high
     assert still.parameters["T_m"].verdict == "identified"
     assert off <= 1.2 * told["moves"]["T_m"]
-    assert (told["channel"], told["beyond"]) == ("f", ["T_m"])
-    assert T_m.verdict.startswith("weakly identified: f was not recorded, and a swing of 0.2 Hz")
+    assert told["beyond"] == ["T_m"]
+    assert T_m.verdict.startswith("weakly identified: f was not recorded, and 0.2 Hz of f moves")
 
 
 def test_the_interval_reaches_over_what_it_moves(blind):
@@ -89,7 +90,7 @@ def test_a_row_says_what_the_swing_moves_and_what_to_record(blind):
 
 def test_a_course_of_the_frequency_that_explains_what_is_left_is_a_candidate(blind):
     """It is fitted beside the parameters, which it brings near the truth that they miss without."""
-    course = blind.result.unrecorded["course"]
+    course = blind.result.unrecorded["f"]["course"]
     assert course["error"] < 0.25 * course["error_without"]
     assert 0.1 < course["strays"] < 0.3
     T_m = course["parameters"]["T_m"]
@@ -109,7 +110,7 @@ def test_an_investigation_tells_the_course_where_no_effect_explains_what_is_left
         progress=False,
     )
     assert (found.verdict, found.names) == ("unexplained", ())
-    course = found.content["frequency_course"]
+    course = found.content["unrecorded_course"]
     assert course["error"] < 0.25 * course["error_without"]
     assert found.content["recommendation"].startswith("record f or U_angle: a frequency that")
     assert "record f or U_angle" in found.report().html
@@ -120,10 +121,95 @@ def test_what_a_load_has_and_the_model_lacks_is_no_course_of_the_frequency():
     plain = {name: x for name, x in record(0.0).items() if name != "f"}
     found = fit(plain, "second_order_exponential", check_intervals=False)
     assert not found.adequate
-    assert found.result.unrecorded["course"] == {}
+    assert found.result.unrecorded["f"]["course"] == {}
     assert not any("nobody recorded" in line for line in found.advice)
 
 
 def test_a_frequency_that_stood_still_moves_nothing(still):
     assert still.result.unrecorded == {}
     assert "f was not recorded" not in still.parameters["T_m"].verdict
+
+
+def record_unbalanced(share):
+    """A load at the theory's size in a dip whose negative sequence is a share of its depth."""
+    t = np.arange(700) * STEP
+    U = np.where((t > 0.5) & (t < 0.75), 0.65, 1.0)
+    U2 = share * (1 - U)
+    still = np.ones(len(t))
+    event = Excitation(STEP, U, still, still, 1.0, 1.0, 0.6, U2=U2, U20=0.0)
+    parts = get("model/motor", "electromechanical")(), get("model/static", "constant_impedance")()
+    load = compose(*parts, [get("effect", "negative_sequence_braking")()])
+    truth = TRUTH | {"negative_sequence": 1.0}
+    values = np.array([[truth[name] for name in load.names]])
+    P, Q = load.simulate(Drive.from_events([event]), values, 4).outputs[:, 0]
+    noise = 2e-4 * np.random.default_rng(5).standard_normal((2, len(t)))
+    columns = {"t": t, "U": U, "P": P + noise[0], "Q": Q + noise[1], "U2": U2}
+    return columns | {"f": np.full(len(t), 50.0)}
+
+
+def without_U2(columns):
+    return {name: x for name, x in columns.items() if name != "U2"}
+
+
+@pytest.fixture(scope="module")
+def unbalanced():
+    return record_unbalanced(0.3)
+
+
+@pytest.fixture(scope="module")
+def blind_to_U2(unbalanced):
+    return fit(without_U2(unbalanced))
+
+
+def test_an_unbalance_that_nobody_recorded_is_told_by_parameter(blind_to_U2):
+    """The one that was there moves M by 7 %, beyond an interval that knows nothing of it."""
+    told, M = blind_to_U2.result.unrecorded, blind_to_U2.parameters["M"]
+    off = abs(M.value - TRUTH["M"])
+    assert [*told] == ["U2"]
+    assert 0.05 * TRUTH["M"] < off < 1.2 * told["U2"]["moves"]["M"]
+    assert "M" in told["U2"]["beyond"]
+    assert "U2 was not recorded, and U2 of 100 % of the dip moves it by" in M.verdict
+    for name, truth in TRUTH.items():
+        low, high = blind_to_U2.parameters[name].interval
+        assert low <= truth <= high, name
+
+
+def test_its_course_is_a_candidate_of_the_measurement(blind_to_U2, unbalanced):
+    assert blind_to_U2.table().columns[-1] == "U2 of 100 % of the dip moves"
+    course = blind_to_U2.result.unrecorded["U2"]["course"]
+    assert course["error"] < 0.25 * course["error_without"]
+    assert course["strays"] == pytest.approx(unbalanced["U2"].max(), rel=0.3)
+    assert any(line.startswith("record U2 or the three phases: ") for line in blind_to_U2.advice)
+    assert "U2 of 100 % of the dip moves" in blind_to_U2.report().html
+
+
+def test_of_a_recorded_unbalance_nothing_is_told(unbalanced):
+    found = fit(unbalanced)
+    assert found.result.unrecorded == {}
+    low, high = found.parameters["M"].interval
+    assert not low <= TRUTH["M"] <= high  # whose effect the model lacks
+
+
+def test_how_large_it_may_have_been_is_a_setting(unbalanced):
+    """Of balanced dips nothing is told; a fault of half the unbalance moves a quarter."""
+    assert fit(without_U2(unbalanced), unbalance=0.0, check_intervals=False).result.unrecorded == {}
+    small, half = (
+        fit(without_U2(unbalanced), unbalance=share, check_intervals=False).result.unrecorded["U2"]
+        for share in (0.05, 0.1)
+    )
+    assert (small["size"], half["size"]) == (0.05, 0.1)
+    assert half["moves"]["M"] == pytest.approx(4 * small["moves"]["M"], rel=1e-3)
+
+
+def test_a_load_that_is_balanced_stays_identified():
+    """What the record would show if it were there is bounded by its noise."""
+    found = fit(without_U2(record_unbalanced(0.0)))
+    assert found.adequate
+    assert found.parameters["M"].verdict == "identified"
+    assert found.result.unrecorded["U2"]["beyond"] == []
+
+
+def test_of_a_load_without_a_motor_on_which_it_acts_nothing_is_told():
+    columns = without_U2(record_unbalanced(0.0))
+    found = fit(columns, "static_exponential", check_intervals=False)
+    assert found.result.unrecorded == {}

@@ -1,6 +1,6 @@
 """What a search led to: the estimate with its intervals, its grade and what to do next."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -80,7 +80,7 @@ def _complete_uncertainty(
         uncertainty = check_by_profiles(uncertainty, points)
         structures = counter("structures fitted beside", progress)
         uncertainty = with_rivals(uncertainty, structures)
-    uncertainty = with_unrecorded(uncertainty, setup.frequency_swing)
+    uncertainty = with_unrecorded(uncertainty, setup.unrecorded_inputs)
     uncertainty = with_unfinished(with_load_drift(uncertainty))
     return say_ranges(uncertainty, setup.model.held)
 
@@ -125,24 +125,19 @@ def _advise(setup: FitSpec, result: Result, details: FitDetails) -> list[str]:
     return [
         *advise(details.uncertainty, details.adequacy, odd, data=data),
         *_suggest_machine_ranges(setup, result),
-        *_suggest_frequency(details.uncertainty),
+        *_suggest_recording(details.uncertainty),
     ]
 
 
-def _suggest_frequency(uncertainty: "Uncertainty") -> list[str]:
+def _suggest_recording(uncertainty: "Uncertainty") -> Iterator[str]:
     """To record what moves parameters beyond their intervals, or would explain most of what is
-    left; [] where nothing does.
+    left.
     """
-    missing = uncertainty.unrecorded
-    if not missing or not (missing["beyond"] or missing["course"]):
-        return []
-    still = "(task.frequency_swing=0 where it stood still)"
-    if course := missing["course"]:
-        return [f"record f or U_angle: {course['sentence']} {still}"]
-    return [
-        f"record f or U_angle: without it a swing of {missing['swing']:g} Hz moves"
-        f" {join_words(missing['beyond'])} {still}"
-    ]
+    for missing in uncertainty.unrecorded.values():
+        beyond, course = join_words(missing["beyond"]), missing["course"]
+        moved = beyond and f"without it {missing['words']} moves {beyond}"
+        if why := course.get("sentence", moved):
+            yield f"{missing['remedy']}: {why} ({missing['unless']})"
 
 
 def _suggest_machine_ranges(setup: FitSpec, result: Result) -> list[str]:

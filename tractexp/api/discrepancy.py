@@ -170,7 +170,7 @@ class Discrepancy(Task, call=investigate):
     `contributions`, what each name is good for; `remainder`, the loudest shapes of what is left
     (ringing, decay, step, pulse), and `left`, p of each test of it; `next_event` {`sentence`,
     `rivals`, `model_error`, `recommended`, `indistinguishable`, `no_event_separates`, `tried`};
-    `frequency_course`, of a frequency that nobody recorded, where it explains what no effect does;
+    `unrecorded_course`, of an input that nobody recorded, where it explains what no effect does;
     `adequacy`, the grade.
 
     `proposal` is null, and `no_proposal` says why, or it holds `terms` [{`balance`, `signal`,

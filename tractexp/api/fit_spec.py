@@ -8,9 +8,15 @@ from tractexp.api.arguments import Choice
 from tractexp.api.setup import Setup
 from tractexp.identification.conclude import conclude
 from tractexp.identification.fit import Fit
-from tractexp.identification.frequency_course import FREQUENCY_SWING
 from tractexp.identification.result import Result
 from tractexp.identification.search import SearchResult
+from tractexp.identification.unrecorded_input import (
+    FREQUENCY_SWING,
+    UNBALANCE,
+    UnrecordedFrequency,
+    UnrecordedInput,
+    UnrecordedUnbalance,
+)
 from tractexp.text.progress import Progress, tell
 
 
@@ -21,6 +27,12 @@ class FitSpec(Setup):
     optimizer: Choice
     check_intervals: bool = True
     frequency_swing: float = FREQUENCY_SWING
+    unbalance: float = UNBALANCE
+
+    @property
+    def unrecorded_inputs(self) -> list[UnrecordedInput]:
+        """What records may lack, and how far it may have strayed."""
+        return [UnrecordedFrequency(self.frequency_swing), UnrecordedUnbalance(self.unbalance)]
 
     def search_end(self, progress: Progress) -> SearchResult:
         """Where the search ends; raises `UserError` where the input is wrong, before anything is

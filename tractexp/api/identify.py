@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import Choice, public
-from tractexp.api.fit_spec import FREQUENCY_SWING, FitSpec
+from tractexp.api.fit_spec import FREQUENCY_SWING, UNBALANCE, FitSpec
 from tractexp.api.identification import Identification
 from tractexp.api.job import Job
 from tractexp.api.task import Task
@@ -41,6 +41,7 @@ def identify(
     seed: int = 0,
     check_intervals: bool = True,
     frequency_swing: float = FREQUENCY_SWING,
+    unbalance: float = UNBALANCE,
     progress: Progress = None,
 ) -> Identification:
     """Fit the free parameters of a load model to recorded dips, and judge the fit on these and on
@@ -85,6 +86,9 @@ def identify(
     frequency_swing : float [Hz]
         Where records have no f: of a frequency that swings so far is told by how much it would move
         each parameter; 0: it was nominal.
+    unbalance : float
+        As much where they have no U2, of one that is so much of what the voltage falls by; 0: the
+        dips were balanced.
     progress : None, False or callable
         None shows how far the search is, False does not; a callable is told what is read and done,
         a sentence at a time.
@@ -136,6 +140,7 @@ def identify(
         optimizer=Choice.from_argument("optimizer", optimizer),
         check_intervals=check_intervals,
         frequency_swing=frequency_swing,
+        unbalance=unbalance,
     )
     end = None
     try:

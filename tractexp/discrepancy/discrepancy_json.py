@@ -51,7 +51,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
         "remainder": _remainder(investigation),
-        "frequency_course": investigation.frequency_course or None,
+        "unrecorded_course": investigation.unrecorded_course or None,
         "proposal": proposal_dict(investigation.proposed, generate.PLUGIN),
         "no_proposal": investigation.proposed.why or None,
         "recommendation": recommendation(investigation),

@@ -33,12 +33,9 @@ from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult
 from tractexp.discrepancy.rest import Rest, find_shapes, share_of
 from tractexp.identification.conclude import at_bound
-from tractexp.identification.frequency_course import (
-    FREQUENCY_SWING,
-    find_course,
-    is_frequency_unknown,
-)
 from tractexp.identification.grade import GradedModel
+from tractexp.identification.unrecorded_course import find_course
+from tractexp.identification.unrecorded_input import UnrecordedFrequency, UnrecordedUnbalance
 from tractexp.identification.verdict import UNIDENTIFIED, size
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.catalogue import Catalogue
@@ -323,15 +320,18 @@ class Findings:
         return [*self.final_grade.parameters, *held]
 
     @functools.cached_property
-    def frequency_course(self) -> dict[str, Any]:
-        """The course of a frequency that nobody recorded which explains what no effect does; {}
-        where there is none, or where an effect explains it.
+    def unrecorded_course(self) -> dict[str, Any]:
+        """The course of an input that nobody recorded which explains what no effect does, and the
+        `remedy`; {} where there is none, or where an effect explains it.
         """
-        uncertainty = self.base_grade.uncertainty
-        unknown = is_frequency_unknown(uncertainty.likelihood.problem)
-        if not unknown or self.verdict.word != UNEXPLAINED:
+        if self.verdict.word != UNEXPLAINED:
             return {}
-        return find_course(uncertainty, FREQUENCY_SWING)
+        uncertainty, courses = self.base_grade.uncertainty, list[dict[str, Any]]()
+        for missing in (UnrecordedFrequency(), UnrecordedUnbalance()):
+            if missing.is_unknown(uncertainty.likelihood.problem):
+                course = find_course(uncertainty, missing)
+                courses += [course | {"remedy": missing.remedy}] if course else []
+        return min(courses, key=lambda course: course["error"], default={})
 
     @functools.cached_property
     def rest(self) -> Rest:

@@ -14,8 +14,8 @@ from tractexp.text.wording import join_words
 def recommendation(investigation: Findings) -> str:
     """What to do next, one sentence."""
     chosen = investigation.next_event
-    if course := investigation.frequency_course:
-        return f"record f or U_angle: {course['sentence']}"
+    if course := investigation.unrecorded_course:
+        return f"{course['remedy']}: {course['sentence']}"
     if chosen is not None and investigation.verdict.word == TIED:
         return chosen.sentence()
     if (proposal := investigation.proposed.proposal) is not None:

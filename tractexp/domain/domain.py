@@ -117,8 +117,8 @@ class Domain(ABC):
         Excitation or WaveformDrive
         """
 
-    def lacks_frequency(self, events: Sequence[Event]) -> bool:
-        """Whether nothing recorded says how fast the voltage turned in one of the events."""
+    def lacks(self, channel: str, events: Sequence[Event]) -> bool:
+        """Whether nothing recorded says what an input was in one of the events."""
         return False
 
     @abstractmethod

@@ -51,8 +51,8 @@ class PhasorDomain(Domain):
         """U, f and U2 of an event as inputs, P and Q as measurements, each with its weight."""
         return excitation.phasors(event, model, weights)
 
-    def lacks_frequency(self, events: Sequence[Event]) -> bool:
-        return any(event.record.f is None for event in events)
+    def lacks(self, channel: str, events: Sequence[Event]) -> bool:
+        return any(channel not in event.channels for event in events)
 
     def smooth_event(self, event: Event) -> SmoothedEvent:
         """The event with its voltage smoothed where it is smooth, and what that leaves of its

@@ -109,8 +109,9 @@ class Result(Plain):
     race: list[dict[str, Any]] = field(default_factory=list)
     # the optimum of a fit whose machine is held to no range; empty: none of these holds the fit
     free_optimum: dict[str, Any] = field(default_factory=dict)
-    # channel that the records lack, swing it may have, moves {parameter: by how much}; empty: none
-    unrecorded: dict[str, Any] = field(default_factory=dict)
+    # of inputs that the records lack, by channel: size, words, moves {parameter: by how much},
+    # beyond, course, remedy
+    unrecorded: dict[str, dict[str, Any]] = field(default_factory=dict)
     # speeds {event: from that at rest}, errors [%], parameters; empty: a steady start does as well
     unsteady_start: dict[str, Any] = field(default_factory=dict)
     # of the motors, where the records bound it from below alone: low, high, profile, sentence

@@ -118,7 +118,7 @@ def _structures(model: Model) -> Iterator[tuple[str, Model]]:
     for name in sorted(registered.get("effect", {}).keys() - there):
         cls = get("effect", name)
         if cls.rival and model.acceptance(cls()).refusal is None:
-            yield name, compose(model.motor, model.static, [*model.effects, cls()], *beside)
+            yield name, model.extend([cls()])
 
 
 def _composes(model: Model) -> bool:

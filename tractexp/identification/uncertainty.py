@@ -64,8 +64,8 @@ class Uncertainty:
         Coordinates of others that fit as well.
     rivals : tuple of RivalStructure
         Structures that fit as well.
-    unrecorded : dict
-        An input that the records lack, as of `with_unrecorded`.
+    unrecorded : {channel: dict}
+        Inputs that the records lack, as of `with_unrecorded`.
     """
 
     likelihood: Likelihood
@@ -83,7 +83,8 @@ class Uncertainty:
     profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     local_minima: tuple[np.ndarray, ...] = ()  # others that fit as well
     rivals: "tuple[RivalStructure, ...]" = ()  # structures that fit as well
-    unrecorded: Mapping[str, Any] = field(default_factory=dict)  # an input that the records lack
+    # inputs that the records lack, by channel
+    unrecorded: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def elsewhere(self) -> np.ndarray:
@@ -213,7 +214,7 @@ class Uncertainty:
 
         Where another local minimum fits as well, they reach over it, too. Where more than noise is
         left, so do they over what each rival structure makes of a parameter, as far beyond it as
-        beyond the estimate, and over what an input that was not recorded moves it by.
+        beyond the estimate, and over what inputs that were not recorded move it by.
         """
         ends = self.values[:, None] + self.half[:, None] * [-1.0, 1.0]
         for name, interval in self.profiled.items():
@@ -231,8 +232,8 @@ class Uncertainty:
             ends = np.stack(
                 [np.fmin(ends[:, 0], there[:, 0]), np.fmax(ends[:, 1], there[:, 1])], axis=1
             )
-        if self.unrecorded and not self.exact:
-            moves = np.array([self.unrecorded["moves"][name] for name in self.names])
+        for missing in self.unrecorded.values():
+            moves = np.array([missing["moves"][name] for name in self.names])
             ends = ends + moves[:, None] * [-1.0, 1.0]
         return np.clip(ends, self.lower[:, None], self.upper[:, None])
 

@@ -19,7 +19,6 @@ from tractexp.inference.model_error import model_error
 from tractexp.inference.multistart import explore_minima
 from tractexp.inference.problem import Problem
 from tractexp.model.equations import OWN, Equations
-from tractexp.model.model import Model
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 from tractexp.record import Event
@@ -118,14 +117,7 @@ def _free_starts(problem: Problem) -> Problem | None:
     own_states = [s for s in model.equations.states.values() if s.writer == OWN]
     if not {"speed", "flux"} <= {s.role for s in own_states if s.derivative != 0}:
         return None
-    started = Model(
-        model.motor,
-        model.static,
-        [*model.effects, UnsteadyStart()],
-        model.integration,
-        model.domain,
-        model.window,
-    )
+    started = model.extend([UnsteadyStart()])
     own = [parameter.name for parameter in UnsteadyStart.parameters]
     return Problem(
         started,

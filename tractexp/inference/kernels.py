@@ -20,7 +20,7 @@ from tractexp.inference.injection import PUSHES, Injection
 from tractexp.inference.problem import Problem
 from tractexp.model.declaration import Refused
 from tractexp.model.drive import Drive
-from tractexp.model.model import Model, compose
+from tractexp.model.model import Model
 from tractexp.model.parts import Effect
 from tractexp.record import Event
 
@@ -51,16 +51,7 @@ class Family:
         Model
         """
         effects = [self._effect(name) for name in {*names, *self.catalogue.of_measurement}]
-        base = self.model
-        model = compose(
-            base.motor,
-            base.static,
-            [*base.effects, *effects],
-            base.integration,
-            base.domain,
-            base.window,
-        )
-        return model.place_behind_recorder(base.recorder)
+        return self.model.extend(effects)
 
     def _effect(self, name: str) -> Effect:
         """The effect of a name, or the injected perturbations of all balances."""

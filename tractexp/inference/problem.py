@@ -15,6 +15,7 @@ from tractexp.inference.records import check_channels, check_power
 from tractexp.inference.steps import Step, choose_steps, count_steps
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
+from tractexp.model.parts import Effect
 from tractexp.noise.quiet import quiet_stretches
 from tractexp.noise.random_walk import Load
 from tractexp.parameter import Box, spread_evenly
@@ -250,6 +251,28 @@ class Problem:
         per_event = [name for name in self.per_event if name in model.names]
         substeps = int(self.step.substeps.max())
         return Problem(model, self.events, bounds, fixed, substeps, per_event, self.loss)
+
+    def extend(self, effects: Sequence[Effect], events: Sequence[Event]) -> "Problem":
+        """The problem with effects of the size of their `theory`, which nothing frees.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            That the model has not.
+        events : sequence of Event
+            As of `driven_by`, with the channels that the effects read.
+
+        Returns
+        -------
+        Problem
+            Its free parameters and Runge-Kutta steps are those of this one.
+        """
+        model, bounds = self.model.extend(effects), {p.name: p.bounds for p in self.parameters}
+        sizes = {name: size for effect in effects for name, size in effect.theory.items()}
+        substeps = self.step.substeps.tolist()
+        fixed, priors = self.fixed | sizes, self.priors
+        per_event = list(self.per_event)
+        return Problem(model, events, bounds, fixed, substeps, per_event, self.loss, priors=priors)
 
     @property
     def domain(self) -> Domain:

@@ -5,7 +5,7 @@ in LaTeX.
 import copy
 import functools
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -151,6 +151,12 @@ class Model:
         model = copy.copy(self)
         model.recorder, model.measurements = recorder, (recorder, *self.measurements)
         return model
+
+    def extend(self, effects: Iterable[Effect]) -> "Model":
+        """The load with further effects, as the same recorder shows it."""
+        parts = self.motor, self.static, [*self.effects, *effects]
+        model = compose(*parts, self.integration, self.domain, self.window)
+        return model.place_behind_recorder(self.recorder)
 
     @functools.cached_property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -225,6 +225,8 @@ class Effect(Part):
         The values of each parameter without a null at which to look for the effect.
     relevant : {parameter: float}
         The smallest departure of a size from its null that matters.
+    theory : {parameter: float}
+        Its size by theory, by which an input that it alone reads acts where nobody recorded it.
     reads : names
         The recorded channels without which the effect cannot be seen.
     confused_with : names
@@ -252,6 +254,7 @@ class Effect(Part):
     order: ClassVar[int] = 0
     grid: ClassVar[dict[str, tuple[float, ...]]] = {}
     relevant: ClassVar[dict[str, float]] = {}
+    theory: ClassVar[dict[str, float]] = {}
     confused_with: ClassVar[tuple[str, ...]] = ()
     places: ClassVar[tuple[str, ...]] = ()
     kind: ClassVar[str] = ""

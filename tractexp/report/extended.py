@@ -14,7 +14,6 @@ from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.forms import CATALOGUE, forms
 from tractexp.identification.verdict import brief
 from tractexp.inference.interval import ParameterEstimate
-from tractexp.model.model import compose
 from tractexp.model.sites import KINDS
 from tractexp.text.wording import alternatives, format_with_error, join_words
 
@@ -121,10 +120,7 @@ def equations(page: Report, findings: Findings) -> None:
         " in:"
     )
     base = findings.context.load
-    effects = [findings.catalogue[n].effect for n in findings.names]
-    extended = compose(
-        base.motor, base.static, [*base.effects, *effects], domain=base.domain, window=base.window
-    )
+    extended = base.extend(findings.catalogue[n].effect for n in findings.names)
     for was, line in list_changed_lines(base.latex(), extended.latex()):
         if was is not None:
             page.text("before").equation(was).text("after")

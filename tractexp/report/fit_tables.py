@@ -60,8 +60,8 @@ def parameters(fit: "Identification") -> Table:
         "verdict",
     ]
     caption = EXACT if fit.adequate else SCATTERED
-    if missing := fit.result.unrecorded:  # a further column: what it would move each by
-        columns.append(f"{missing['swing']:g} Hz of {missing['channel']} moves")
+    for missing in fit.result.unrecorded.values():  # a further column: what it would move each by
+        columns.append(f"{missing['words']} moves")
         rows = [[*row, missing["moves"].get(row[0])] for row in rows]
     return Table(
         columns,
