@@ -229,7 +229,7 @@ class _Report:
     def find_reactive_share(self) -> float:
         """The share of the reactance in the impedance at the start."""
         drawn = self.course.S[self.start_part]
-        return float(np.median(np.abs(drawn.imag) / np.abs(drawn)))
+        return float(np.median(np.abs(np.sin(np.angle(drawn)))))
 
     def measure_unbalance(self, ohm: float) -> TypeValue | None:
         """The impedance of the negative sequence; None where there is hardly any."""
