@@ -154,7 +154,10 @@ def _groups(rows: Rows) -> dict[str, Rows]:
             r for r in nulls if r["group"].startswith("null, ") and "error" not in r["group"]
         ],
         "nothing, in loads of which no model is exact to 1 %": [
-            r for r in nulls if "error" in r["group"]
+            r for r in nulls if r["group"].startswith("null, error")
+        ],
+        "nothing, inexact to 1 % by laws of no family": [
+            r for r in nulls if r["group"].startswith("null, foreign")
         ],
         "faults of the measurement only": [r for r in nulls if "nuisances" in r["group"]],
     }

@@ -42,6 +42,7 @@ from hidden_effects import cases  # noqa: E402
 from hidden_effects.effects import CATALOG, PHYSICAL  # noqa: E402
 from hidden_effects.generator import draw_dips, make, scene, truth  # noqa: E402
 from hidden_effects.laws import FAMILY  # noqa: E402
+from hidden_effects.limits import part_misfits  # noqa: E402
 from hidden_effects.outside import OUTSIDE  # noqa: E402
 
 LEFT_OUT = "left out "  # the group of trials whose effect is taken from the catalogue
@@ -63,7 +64,7 @@ HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
 }
 Trials = Iterator[cases.Planned]
 ERROR = 0.01  # of the response: how inexact the loads are in which nothing is hidden
-SUITES = ("nulls", "nuisances", "inexact", *HIDDEN, "field", "loud", "pairs")
+SUITES = ("nulls", "nuisances", "inexact", "foreign", *HIDDEN, "field", "loud", "pairs")
 UNUSED_STREAMS = 7, 8  # of a seed's numbers: the dip and the noise of an unused event
 BEST = 3  # single effects of which the least that any leaves is taken
 SAME = {  # effects whose amount is a parameter of the model, in its units
@@ -90,6 +91,9 @@ def rows_of(
         yield "null with nuisances", cases.nuisances(salt, **settings)
     elif name == "inexact":
         yield f"null, error {ERROR:.0%}", cases.inexact(ERROR, salt, **settings)
+    elif name == "foreign":
+        trials = cases.inexact(ERROR, salt, is_foreign=True, **settings)
+        yield f"null, foreign error {ERROR:.0%}", trials
     elif name == "field":
         for multiple, effect in itertools.product((m for m in PAIRED if m in multiples), PHYSICAL):
             yield f"field {multiple:g} x", cases.in_the_field(effect, multiple, salt, **settings)
@@ -156,6 +160,7 @@ def run(group: str, planned: cases.Planned, events: int, held: int) -> dict:
     recorder = trial.case.recorder
     row |= {
         "imperfect": bool(trial.case.imperfections),
+        "parts": part_misfits(trial.case, trial.seed),
         "noise": asdict(trial.case.noise),
         "rate": recorder.rate,
         "window": recorder.pmu or recorder.phasor_window,

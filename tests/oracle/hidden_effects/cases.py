@@ -2,7 +2,7 @@
 seed.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, cycle
@@ -13,7 +13,7 @@ import numpy as np
 
 from hidden_effects.effects import NUISANCES, PHYSICAL
 from hidden_effects.generator import EFFECTS, Case, scene
-from hidden_effects.imperfections import IMPERFECTIONS
+from hidden_effects.imperfections import FOREIGN, IMPERFECTIONS
 from hidden_effects.limits import detection_limit, joint_limit, misfit, size_of_error
 from hidden_effects.noise import Noise
 from hidden_effects.recorder import Recorder
@@ -99,7 +99,9 @@ def nuisances(salt: int | None = None, **settings: Any) -> Iterator[Planned]:
         )
 
 
-def imperfect(case: Case, seed: int, error: float) -> Case:
+def imperfect(
+    case: Case, seed: int, error: float, kinds: Sequence[str] = tuple(IMPERFECTIONS)
+) -> Case:
     """The case with a load of which the base model, once fitted, misses about `error` of the
     response in S.
 
@@ -108,14 +110,12 @@ def imperfect(case: Case, seed: int, error: float) -> Case:
     if not error:
         return case
     case = replace(case, swing=case.needs("swing"), negative=case.needs("negative"))
-    parts = np.random.default_rng([seed, 5]).dirichlet(np.ones(len(IMPERFECTIONS)))
+    parts = np.random.default_rng([seed, 5]).dirichlet(np.ones(len(kinds)))
+    most = [EFFECTS[name].largest / EFFECTS[name].reference for name in kinds]
     size = 1.0
     for _ in range(3):  # nearly linear
-        sizes = zip(IMPERFECTIONS.items(), (size * parts).tolist(), strict=True)
-        case = replace(
-            case,
-            imperfections=tuple((n, min(s, own.largest / own.reference)) for (n, own), s in sizes),
-        )
+        sizes = np.minimum(size * parts, most).tolist()
+        case = replace(case, imperfections=tuple(zip(kinds, sizes, strict=True)))
         try:
             size *= min(error / misfit(case, seed), 4.0)
         except (ValueError, ArithmeticError):  # no steady state
@@ -123,18 +123,21 @@ def imperfect(case: Case, seed: int, error: float) -> Case:
     return case
 
 
-def inexact(error: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
-    """Nothing hidden in a load that no model is exact for, under each of `NOISES` in turn."""
+def inexact(
+    error: float, salt: int | None = None, is_foreign: bool = False, **settings: Any
+) -> Iterator[Planned]:
+    """Nothing hidden in a load that no model is exact for, under each of `NOISES` in turn; foreign
+    where what makes it inexact is of no family of the catalogue.
+    """
+    series, kinds = ("foreign", FOREIGN) if is_foreign else ("inexact", tuple(IMPERFECTIONS))
+    label = f"{'foreign ' if is_foreign else ''}error {error:.0%}"
 
     def made(noise: str, seed: int) -> Trial:
-        return Trial(
-            f"error {error:.0%}",
-            imperfect(Case(noise=NOISES[noise], **settings), seed, error),
-            seed,
-        )
+        case = Case(noise=NOISES[noise], **settings)
+        return Trial(label, imperfect(case, seed, error, kinds), seed)
 
-    for noise, seed in zip(cycle(NOISES), seeds("inexact", salt), strict=False):
-        yield Planned(f"error {error:.0%}", seed, partial(made, noise, seed))
+    for noise, seed in zip(cycle(NOISES), seeds(series, salt), strict=False):
+        yield Planned(label, seed, partial(made, noise, seed))
 
 
 def in_the_field(

@@ -75,3 +75,14 @@ IMPERFECTIONS: dict[str, type[Hidden]] = {
     "mixing_exponents": MixingExponents,
     "other_motors": OtherMotors,
 }
+# what is of no family of the catalogue: a law of the static load, three of what rides on the power,
+# three of the measurement
+FOREIGN = (
+    "mixing_exponents",
+    "voltage_rate",
+    "harmonic_ripple",
+    "subsynchronous_ring",
+    "current_transformer_saturation",
+    "voltage_gain_drift",
+    "phase_jump",
+)

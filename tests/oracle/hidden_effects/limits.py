@@ -91,6 +91,12 @@ def misfit(case: Case, seed: int) -> float:
     )
 
 
+def part_misfits(case: Case, seed: int) -> dict[str, float]:
+    """What each imperfection of a case leaves of the response in S, as `misfit`, alone."""
+    alone = {one[0]: replace(case, imperfections=(one,)) for one in case.imperfections}
+    return {name: misfit(one, seed) for name, one in alone.items()}
+
+
 def size_of_error(case: Case, seed: int) -> float:
     """Size at which the case's one effect leaves as much of the base model as the imperfections do;
     0 without any.
