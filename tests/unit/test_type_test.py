@@ -49,7 +49,7 @@ def report(started=True, unbalance=0.0, fan=False, sigma=5e-4):
 def measure(record):
     [segment] = record.segments
     found = find_type_test(
-        Course.from_phasors(phasors_of(record, THREE, segment)), record.frequency
+        Course.from_phasors(phasors_of(record, THREE, segment), 50.0), record.frequency
     )
     return found and {each.name: each for each in found.values}
 
@@ -74,34 +74,49 @@ def test_an_unbalance_tells_the_impedance_without_a_start():
     found = measure(report(started=False, unbalance=0.02))
     assert found.keys() == {"X_2", "T0'", "H"}
     check(found["X_2"], X_LOCKED, 0.05)
-    test = find_type_test(
-        Course.from_phasors(phasors_of(report(started=False), THREE, report().segments[0])), 50.0
-    )
+    phasors = phasors_of(report(started=False), THREE, report().segments[0])
+    test = find_type_test(Course.from_phasors(phasors, 50.0), 50.0)
     assert test.power == pytest.approx(3 * KV * KA, rel=0.01)
     assert test.voltage == pytest.approx(110, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("R_r", "H", "unbalance"), [(0.015, 0.8, 0.0), (0.025, 1.2, 0.0), (0.015, 0.8, 0.03)]
-)
-def test_the_intervals_hold_the_truth_of_a_motor_solved_from_standstill(
-    R_r, H, unbalance, tmp_path
-):
+def solve_type_test(R_r, H, unbalance, folder):
+    """The test that `look` tells of a solved motor, its values by name, and what holds: T0' [s],
+    and what it draws running over the machine's power.
+    """
     V, I, T0 = solve_motor(RATE, R_r, H, 4.0, 5.0, unbalance)
     turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
     waves = np.sqrt(2) * np.concatenate([KV * (V * turn).real, KA * (I * turn).real])
     waves += noise(waves.shape, 5e-4) * np.repeat([KV, KA], 3)[:, None]
-    write(recording(waves, RATE), tmp_path / "motor.cfg", "BINARY", 1999)
-    (feeder,) = tractexp.look(tmp_path / "motor.cfg").content["files"][0]["feeders"]
+    write(recording(waves, RATE), folder / "motor.cfg", "BINARY", 1999)
+    (feeder,) = tractexp.look(folder / "motor.cfg").content["files"][0]["feeders"]
     test = feeder["type_test"]
-    found = {row["name"]: row for row in test["values"]}
-    base = test["power"] / (3 * KV * KA)  # of what it draws running over the machine's
+    return test, {row["name"]: row for row in test["values"]}, T0, test["power"] / (3 * KV * KA)
+
+
+@pytest.mark.parametrize(
+    ("R_r", "H", "unbalance"),
+    [(0.015, 0.8, 0.0), (0.025, 1.2, 0.0), (0.015, 0.8, 0.03), (0.05, 0.3, 0.0)],
+)
+def test_the_intervals_hold_the_truth_of_a_motor_solved_from_standstill(
+    R_r, H, unbalance, tmp_path
+):
+    test, found, T0, base = solve_type_test(R_r, H, unbalance, tmp_path)
     assert found["T0'"]["low"] < T0 < found["T0'"]["high"]
     assert found["H"]["low"] < H / base < found["H"]["high"]
     assert found["H"]["high"] < 1.2 * found["H"]["low"]
     low, high = test["bounds"]["X_prime"]
     assert low < X_PRIME * base < high
     assert ("X_2" in found) == (unbalance > 0)
+
+
+def test_a_motor_that_coasts_for_70_ms_tells_time_constant_and_inertia(tmp_path):
+    """Its voltage is followed below the frequencies that windows track."""
+    _, found, T0, base = solve_type_test(0.16, 0.08, 0.0, tmp_path)
+    assert found.keys() == {"T0'", "H"}
+    assert pytest.approx(0.07, rel=0.03) == T0
+    assert found["T0'"]["low"] < T0 < found["T0'"]["high"] < 1.1 * found["T0'"]["low"]
+    assert found["H"]["low"] < 0.08 / base < found["H"]["high"] < 1.2 * found["H"]["low"]
 
 
 def test_a_load_that_is_switched_off_a_live_bus_is_no_type_test():

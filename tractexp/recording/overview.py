@@ -309,7 +309,7 @@ def describe_load(
 
 def _find_type_test(phasors: Sequence[Phasors], nominal: float) -> TypeTest | None:
     """The first type test that a stretch of a load shows."""
-    courses = (Course.from_phasors(each) for each in phasors if len(each.V) == 3)
+    courses = (Course.from_phasors(each, nominal) for each in phasors if len(each.V) == 3)
     found = (find_type_test(each, nominal) for each in courses)
     return next((each for each in found if each is not None), None)
 

@@ -3,7 +3,8 @@ coasting after it are a type test.
 
     start, unbalance:   Z = |V1|/|I1| at standstill, |V2|/|I2| near it (slip 2 - s)
     after the breaker:  |V1|/f ~ exp(-t/T0')
-    and at its opening: 2 H (df/dt)/f = -P/S of before, while nothing but the load brakes
+    and at its opening: 2 H df/dt = -f_n P/S of before, while nothing but the load brakes, by a
+                        torque of a power k of the speed: f^(1 - k) falls on a straight line
 
 Impedances and H are per unit of the voltage before the trip (or the start) and of the apparent
 power that the motor drew running. Source: Kundur 1994, ch. 7; IEEE 112-2017, tests of locked rotor
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.record.change import runs
-from tractexp.record.phasor import SLOWEST, Phasors
+from tractexp.record.phasor import FASTEST, SLOWEST, Phasors
 from tractexp.record.record import Record
 from tractexp.record.regression import fit_line
 
@@ -33,6 +34,10 @@ LEAST_LEFT = 0.1  # of it: with less the frequency is not measured
 STEADY_CURRENT = 0.1  # of a current: by more it changes while a motor still runs up
 LEAST_ERROR = 0.02  # of a value: of what transformers of measurement and windows leave
 TWO_ERRORS = 2.0
+# of the nominal frequency: down to where the voltage of a motor that coasts is followed
+SLOWEST_COASTING = 0.6
+BRAKING_LAWS = (0.0, 0.5, 1.0, 1.5, 2.0)  # powers of the speed by which a load's torque goes
+MOST_WORSE_LAW = 2.0  # times what the best law leaves: what one leaves that may be it, too
 # of the power drawn: what a stator loses, usually two to five percent, brakes no rotor
 MOST_STATOR_LOSS = 0.06
 FEWEST_PHASORS = 20
@@ -100,8 +105,8 @@ class TypeTest:
 @dataclass(frozen=True, eq=False)
 class Course:
     """A motor over time: t (N,) [s], voltage U and its negative sequence U2 [kV, line to line],
-    currents I and I2 [kA] of one phase, power S [MVA], complex, frequency f [Hz]; `U2` and `I2` are
-    None where a record has not both.
+    currents I and I2 [kA] of one phase, power S [MVA], complex, frequency f [Hz], followed down to
+    `slowest` of the nominal one; `U2` and `I2` are None where a record has not both.
     """
 
     t: np.ndarray
@@ -111,20 +116,27 @@ class Course:
     f: np.ndarray
     U2: np.ndarray | None = None
     I2: np.ndarray | None = None
+    slowest: float = SLOWEST
 
     @classmethod
-    def from_phasors(cls, phasors: Phasors) -> "Course":
-        """The course of phasors of three phases."""
+    def from_phasors(cls, phasors: Phasors, nominal: float) -> "Course":
+        """The course of phasors of three phases.
+
+        A mean over one cycle of a frequency that is tracked no further lessens the voltage of a
+        motor that turns slower, by as much as can be told.
+        """
         current = np.abs(phasors.I1)
         second = np.abs(phasors.I2)
+        tracked = np.clip(phasors.f, SLOWEST * nominal, FASTEST * nominal)
         return cls(
             phasors.t,
-            phasors.U,
+            phasors.U / np.sinc(phasors.f / tracked - 1),
             current,
             phasors.S,
             phasors.f,
             phasors.U2,
             second,
+            SLOWEST_COASTING,
         )
 
     @classmethod
@@ -258,19 +270,16 @@ class _Report:
         f = self.course.f[first:]
         t = self.course.t[first:] - self.course.t[self.closed.stop]
         # phasors follow a frequency so far
-        seen = (LEAST_LEFT * V[0] < V) & (f > SLOWEST * self.nominal)
+        seen = (LEAST_LEFT * V[0] < V) & (f > self.course.slowest * self.nominal)
         left = int(np.argmin([*seen, False]))
         V, f, t = V[:left], f[:left], t[:left]
         if len(V) < self.least or V[-1] > LEAST_DECAY * V[0] or f[-1] >= f[0]:
             return []
         drawn = float(np.median(np.real(self.course.S[running]))) / power
         before = float(np.median(self.course.f[running]))
-        decays = _fit_slopes(t, np.log(V / f), 1)
-        # braked by the torque of before, and by one that falls with the speed
-        falls = _fit_slopes(t, f, 2)
-        falls += _fit_slopes(t, f, 1)
+        decays = _fit_slopes(t, np.log(V / f))
         times = [-1 / slope for slope in decays if slope < 0]
-        inertias = [-drawn * before / (2 * slope) for slope in falls if slope < 0]
+        inertias = [-drawn / (2 * slope) for slope in _fit_braking(t, f / before) if slope < 0]
         inertias += [(1 - MOST_STATOR_LOSS) * H for H in inertias[:1]]
         constant = _tell("T0'", times, "the decay of U/f after the trip")
         inertia = _tell("H", inertias, "df/dt at the trip")
@@ -311,10 +320,31 @@ def _tell(name: str, values: list[float], how: str) -> TypeValue | None:
     )
 
 
-def _fit_slopes(t: np.ndarray, y: np.ndarray, degree: int) -> list[float]:
-    """The slope at t = 0 of a polynomial through y (n,), then both ends of its 95 % interval."""
-    X = np.vander(t, degree + 1, increasing=True)
+def _fit_slopes(t: np.ndarray, y: np.ndarray) -> list[float]:
+    """The slope of a straight line through y (n,), then both ends of its 95 % interval."""
+    X = np.vander(t, 2, increasing=True)
     fit, errors = fit_line(X, y)
     slope = float(fit[1])
     half = TWO_ERRORS * float(errors[1])
     return [slope, slope - half, slope + half]
+
+
+def _fit_braking(t: np.ndarray, speed: np.ndarray) -> list[float]:
+    """Slopes at t = 0 of a speed (n,) that a load brakes, with both ends of their 95 % intervals:
+    those of the law that fits best, then those of all that may be it.
+    """
+    fits = sorted(_fit_law(t, speed, k) for k in BRAKING_LAWS)
+    least, _ = fits[0]
+    return [slope for left, slopes in fits if left <= MOST_WORSE_LAW * least for slope in slopes]
+
+
+def _fit_law(t: np.ndarray, speed: np.ndarray, k: float) -> tuple[float, list[float]]:
+    """What the torque of a power k of the speed (n,) leaves, and the slopes at t = 0 by it."""
+    from scipy.special import boxcox, inv_boxcox
+
+    straight = boxcox(speed, 1 - k)
+    slopes = _fit_slopes(t, straight)
+    level = float(np.mean(straight - slopes[0] * t))
+    left = float(np.std(straight - slopes[0] * t))
+    start = float(inv_boxcox(level, 1 - k))
+    return left, [start**k * slope for slope in slopes]
