@@ -262,3 +262,29 @@ def best_distinct(
             np.linalg.norm(unit[remaining] - unit[remaining[0]], norm, axis=1) > distance
         ]
     return np.array(chosen, dtype=int)
+
+
+def find_unlike(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which rows are no copies of an earlier one, to the last bit.
+
+    Parameters
+    ----------
+    rows : (n, d)
+        Points.
+
+    Returns
+    -------
+    (m,) array of ints
+        The first of each kind.
+    (n,) array of ints
+        Of which of these each row is a copy.
+
+    Examples
+    --------
+    >>> chosen, copies = find_unlike(np.array([[0.1], [0.9], [0.1]]))
+    >>> chosen.tolist(), copies.tolist()
+    ([0, 1], [0, 1, 0])
+    """
+    places: dict[bytes, int] = {}
+    copies = np.array([places.setdefault(row.tobytes(), len(places)) for row in rows], dtype=int)
+    return np.unique(copies, return_index=True)[1], copies

@@ -23,6 +23,7 @@ from tractexp.inference.separable import SeparableColumns
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
+from tractexp.parameter import find_unlike
 from tractexp.record import Event
 
 # Standard deviation of a fault of the measurement before anything is seen, in its relevant sizes:
@@ -350,8 +351,13 @@ class Context:
             Whitened residuals, then the departures from the priors in standard deviations, then the
             m rows of the motor's prior, where there is one.
         """
-        raw = self.residuals_of(unit, sets)
+        # what is frozen in a lane moves nothing, and moves clipped to a bound are alike
+        own = list(dict.fromkeys(map(tuple, sets)))
+        of_set = [own.index(tuple(names)) for names in sets]
+        chosen, copies = find_unlike(np.column_stack([unit, of_set]))
+        raw = self.residuals_of(unit[chosen], [sets[k] for k in chosen])
         white = self.whiten(noise, raw)
+        white = white if len(chosen) == len(unit) else white[copies]
         at = self.coordinates
         prior = [(unit[:, k] - at.null[k])[:, None] / at.prior_deviation[k] for k in faults]
         if self.prior:
