@@ -2,6 +2,7 @@
 kernel.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -270,7 +271,7 @@ class Drive:
         """The samples of one event."""
         return slice(int(self.first[event]), int(self.first[event + 1]))
 
-    @property
+    @functools.cached_property
     def parts(self) -> list[slice]:
         """The samples of each event."""
         return [self.part(event) for event in range(self.events)]

@@ -282,7 +282,9 @@ class Model:
         outputs = np.empty((drive.channels, n, drive.samples))
         outputs.fill(np.nan)
         _, miss = self._run(drive, candidates, substeps, outputs)
-        outputs[(outputs > LARGEST_OUTPUT) | (outputs < -LARGEST_OUTPUT)] = np.nan
+        largest = max(outputs.max(initial=0.0), -outputs.min(initial=0.0))
+        if not largest <= LARGEST_OUTPUT:  # nor where it is nan
+            outputs[(outputs > LARGEST_OUTPUT) | (outputs < -LARGEST_OUTPUT)] = np.nan
         for e, window in enumerate(drive.windows):
             if window is not None:
                 part = drive.part(e)

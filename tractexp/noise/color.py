@@ -85,8 +85,11 @@ class Autoregression:
         [1.0, 1.0, 1.0]
         """
         out = np.empty_like(rows) if out is None else out
-        out[..., ~valid] = 0.0
-        if parts := runs(valid):
+        parts = [slice(0, len(valid))] if len(valid) else []
+        if not valid.all():
+            out[..., ~valid] = 0.0
+            parts = runs(valid)
+        if parts:
             self._whiten(np.atleast_2d(rows), parts, np.atleast_2d(out))
         return out
 

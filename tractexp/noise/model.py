@@ -302,7 +302,13 @@ class Noise:
 
     def _mix_channels(self, rows: np.ndarray) -> np.ndarray:
         """Channels (n, C, N) mixed so that their noise is independent."""
-        return rows if self.mix is None else self.mix @ rows
+        return rows if self._mix_matrix is None else self._mix_matrix @ rows
+
+    @functools.cached_property
+    def _mix_matrix(self) -> np.ndarray | None:
+        """What mixes channels; None where they are independent as they stand."""
+        is_plain = self.mix is None or np.array_equal(self.mix, np.eye(self.channels))
+        return None if is_plain else self.mix
 
     def _fast(
         self, mixed: np.ndarray, valid: np.ndarray, event: int, out: np.ndarray
