@@ -355,7 +355,7 @@ class Context:
         own = list(dict.fromkeys(map(tuple, sets)))
         of_set = [own.index(tuple(names)) for names in sets]
         chosen, copies = find_unlike(np.column_stack([unit, of_set]))
-        raw = self.residuals_of(unit[chosen], [sets[k] for k in chosen])
+        raw = self.residuals_of(unit[chosen], [sets[k] for k in map(int, chosen)])
         white = self.whiten(noise, raw)
         white = white if len(chosen) == len(unit) else white[copies]
         at = self.coordinates
