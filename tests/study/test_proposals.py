@@ -38,7 +38,7 @@ from tractexp.discrepancy.proposal.library import (
 )
 from tractexp.discrepancy.proposal.propose import propose, to_dict
 from tractexp.discrepancy.proposal.refit import term_fits
-from tractexp.discrepancy.proposal.screen import Ground, scores, screen
+from tractexp.discrepancy.proposal.screen import Ground, compute_library_p, scores, screen
 from tractexp.discrepancy.proposal.wording import proposed_in_words
 from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import catalogue
@@ -149,11 +149,19 @@ def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small():
     there = Ground.from_coordinates(
         bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise
     )
-    made = term_fits(there, screen(there, [term(STEP)], 0, 20)[0], [])
+    made = term_fits(there, screen(there, [term(STEP)]), [])
     (found,) = scores(there, [(term(STEP), {"instant": made.values(made.fits[0])["instant"]})])
     lowered = made.bare.deviance - made.fits[0].deviance
     assert lowered > 20
     assert found.drop == pytest.approx(lowered, rel=0.1)
+
+
+def test_noise_gives_the_best_of_many_tries_as_much_as_often_as_is_told():
+    rng = np.random.default_rng(4)
+    for name, sizes in (("timed:power_P:step:of_dip", 1), (STEP, len(sizes_of(term(STEP))))):
+        best = rng.chisquare(sizes, (4000, 200)).max(axis=1)
+        p = np.array([compute_library_p(term(name), drop, 200) for drop in best])
+        assert 0.04 < np.mean(p < 0.05) < 0.06
 
 
 def test_equal_bits_of_the_base_model_on_both_benches():

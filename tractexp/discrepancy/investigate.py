@@ -144,7 +144,7 @@ def investigate(
                 if of_all.closes_share
                 else findings
             )
-        return replace(findings, proposed=_proposal(findings, seed))
+        return replace(findings, proposed=_proposal(findings))
 
 
 def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grader) -> Findings:
@@ -215,7 +215,7 @@ def _complete_row(findings: Findings, validate: Sequence[Event]) -> Findings:
     return replace(findings, evidence=evidence, verdict=decide(evidence, findings.context.criteria))
 
 
-def _proposal(findings: Findings, seed: int) -> ProposalResult:
+def _proposal(findings: Findings) -> ProposalResult:
     """The term that an unexplained disagreement asks for."""
     base = findings.base
     explained = findings.explanations
@@ -225,7 +225,7 @@ def _proposal(findings: Findings, seed: int) -> ProposalResult:
     if evidence.is_mild:
         return ProposalResult(why="the held-out events are too mild to show a term")
     return propose(
-        base, explained.steps[0], evidence.base.fit, explained.last.noise, findings.withheld, seed
+        base, explained.steps[0], evidence.base.fit, explained.last.noise, findings.withheld
     )
 
 

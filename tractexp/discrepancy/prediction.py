@@ -158,7 +158,7 @@ def _find_best_term(context: Context, table: Evidence) -> SetEvidence:
     ground = Ground.from_coordinates(
         under, carried_over(under, context, table.base.fit.unit), noise
     )
-    found = term_fits(ground, screen(ground, terms(), seed=0, draws=0)[0], [])
+    found = term_fits(ground, screen(ground, terms()), [])
     best = _fit_without_faults(found.context, noise, found.fits[:MOST_JUDGED_TERMS])
     beside = found.context.move_to_records(there.records)
     rows = [SetEvidence(fit, fit.names, fit.names, prediction=predict(beside, fit)) for fit in best]

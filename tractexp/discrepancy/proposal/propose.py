@@ -31,7 +31,6 @@ from tractexp.noise.span import project_out
 from tractexp.record import Event
 from tractexp.text.wording import join_words
 
-LIBRARY_DRAWS = 99  # of noise, for the best of the whole library
 LEAST_ACTING_SHARE = 0.1  # of the largest change: from where a term is said to act
 LOOKS_LIKE = 0.5  # of a term's change that a textbook effect could have made
 
@@ -76,7 +75,6 @@ def propose(
     bare: Refit,
     noise: Noise,
     validate: Sequence[Event],
-    seed: int,
     among: Sequence[Term] = (),
 ) -> ProposalResult:
     """Search a term for what the model lacks; `bare` is the base model's fit, `noise` that of the
@@ -92,13 +90,16 @@ def propose(
     under = context_of_terms(context)
     ground = Ground.from_coordinates(under, carried_over(under, context, bare.unit), noise)
     context.effort.say("screening a library of terms")
-    screened, chance = screen(ground, among or terms(), seed, LIBRARY_DRAWS)
+    screened = screen(ground, among or terms())
     context.effort.say("refitting the most promising terms")
     result = term_fits(
         ground, screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]]
     )
     context.effort.say("judging terms on the held-out events")
-    p = [compute_library_p(result.bare.deviance - fit.deviance, chance) for fit in result.fits]
+    p = [
+        compute_library_p(result.term(fit), result.bare.deviance - fit.deviance, len(screened))
+        for fit in result.fits
+    ]
     ranked = term_assessments(context, result, validate, p)
     tried = tuple((result.term(w.fit), w) for w in ranked)
     standing = [w for w in ranked if not w.objections(context.criteria)]

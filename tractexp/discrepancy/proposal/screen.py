@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import chdtrc
 
 from tractexp.discrepancy.proposal.bed import Setting, place, sizes_of
 from tractexp.discrepancy.proposal.library import Term
@@ -64,14 +65,6 @@ class Ground:
         raw /= spans[:, None, None]
         return self.context.whiten(self.noise, np.nan_to_num(raw, copy=False))
 
-    def draw_noise(self, seed: int, draws: int) -> np.ndarray:
-        """Noise (draws, R), whitened and projected as the fit's residual is."""
-        context = self.context
-        white = self.noise.draw_white(
-            np.random.default_rng(seed), draws, context.drive, context.valid
-        )
-        return self.off(np.pad(white, ((0, 0), (0, len(self.r) - white.shape[1]))))
-
 
 @dataclass(frozen=True, eq=False)
 class TermScore:
@@ -83,36 +76,24 @@ class TermScore:
     sizes: tuple[float, ...]
 
 
-def screen(
-    ground: Ground, terms: Sequence[Term], seed: int, draws: int
-) -> tuple[list[TermScore], np.ndarray]:
-    """Every term at every setting of its grid, the most promising first, and the best of each draw
-    of noise (b,).
-    """
-    noise = ground.draw_noise(seed, draws)
-    best = np.zeros(draws)
-    scored = []
-    for score, drops in _scores(ground, [(t, s) for t in terms for s in t.signal.settings], noise):
-        scored.append(score)
-        best = np.maximum(best, drops)
-    return sorted(scored, key=lambda s: -s.drop), best
+def screen(ground: Ground, terms: Sequence[Term]) -> list[TermScore]:
+    """Every term at every setting of its grid, the most promising first."""
+    every = [(t, s) for t in terms for s in t.signal.settings]
+    return sorted(_scores(ground, every), key=lambda s: -s.drop)
 
 
-def compute_library_p(drop: float, draws: np.ndarray) -> float:
-    """How often noise alone lowers the deviance as much by the best of the whole library, whose
-    drops in draws of noise are known: a Gumbel tail.
+def compute_library_p(term: Term, drop: float, tries: int) -> float:
+    """At most how often noise alone lowers the deviance as much by the best of so many tries, if
+    all had as many sizes as this term: their number times the p of one.
     """
-    scale = max(float(draws.std()) * np.sqrt(6) / np.pi, 1e-9)
-    location = float(draws.mean()) - np.euler_gamma * scale
-    return float(-np.expm1(-np.exp(min(-(drop - location) / scale, 700.0))))
+    phases = sum(shape.name == "phase" for shape in term.signal.shapes)
+    sizes = len(term.balance.sizes) * (1 + phases)
+    return min(tries * float(chdtrc(sizes, max(drop, 0.0))), 1.0)
 
 
 def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[TermScore]:
     """Score terms at settings of their own, in this order; a phase is found, not given."""
-    by_key = {
-        (s.term.name, _key(s.setting)): s
-        for s, _ in _scores(ground, wanted, np.zeros((0, len(ground.r))))
-    }
+    by_key = {(s.term.name, _key(s.setting)): s for s in _scores(ground, wanted)}
     return [by_key[t.name, _key({k: v for k, v in s.items() if k != "phase"})] for t, s in wanted]
 
 
@@ -121,14 +102,10 @@ def _key(setting: Setting) -> tuple:
     return tuple(sorted((k, v) for k, v in setting.items() if k != "phase"))
 
 
-def _scores(
-    ground: Ground, wanted: Sequence[tuple[Term, Setting]], noise: np.ndarray
-) -> Iterator[tuple[TermScore, np.ndarray]]:
-    """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal
-    share columns.
-    """
+def _scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> Iterator[TermScore]:
+    """Each term with its score. Balances of a signal share columns."""
     ground.noise.prepare(ground.context.drive, ground.context.valid)
-    scored = lambda batch: _batch(ground, batch, noise)  # noqa: E731
+    scored = lambda batch: _batch(ground, batch)  # noqa: E731
     return itertools.chain(*each_apart(scored, _batches(wanted), ground.context.effort))
 
 
@@ -153,7 +130,7 @@ def _kind(members: Members) -> str:
     return members[0][0].signal.kind
 
 
-def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermScore, np.ndarray]]:
+def _batch(ground: Ground, batch: Batch) -> list[TermScore]:
     """The scores of terms that are simulated together."""
     at = ground.context.coordinates
     index = {}
@@ -180,18 +157,15 @@ def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermSc
     columns = ground.columns(np.array(points), np.array(spans), blocks[0][0].signal.kind)
     seen = columns.shape[1]
     side = columns @ ground.r[:seen]
-    drawn = columns @ noise[:, :seen].T
     along = columns @ ground.Q[:seen]
-    pairs = []
+    scored = []
     for t, s, rows in blocks:
         # what the nuisances explain taken away
         gram = columns[rows] @ columns[rows].T - along[rows] @ along[rows].T
         inverse = _inverse(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
         sizes = -inverse @ side[rows]
-        chance = drawn[rows]
-        drops = (chance * (inverse @ chance)).sum(axis=0)
-        pairs.append((_build_term_score(t, s, sizes, float(-sizes @ side[rows])), drops))
-    return pairs
+        scored.append(_build_term_score(t, s, sizes, float(-sizes @ side[rows])))
+    return scored
 
 
 def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
