@@ -5,6 +5,7 @@ motors in each, and each dip predicted by those before it.
 import copy
 import importlib.util
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from tractexp.identification.station import Dip, LoadSpec, fit_dips, predict_in_
 from tractexp.inference.sized_problem import SizedProblem
 from tractexp.record import OwnBase
 from tractexp.report import station
+from tractexp.text import progress
 
 DIPS, FAULTY = 12, 5
 
@@ -166,6 +168,19 @@ def test_a_cluster_fits_the_same(tmp_path):
         for backend in ("dask", "loky")
     )
     assert of_cluster.content == own.content
+
+
+def test_a_command_counts_files_with_the_time_left_and_not_line_by_line(
+    tmp_path, monkeypatch, capsys
+):
+    """A command's progress is told what begins; of ten thousand files it is told none."""
+    monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
+    for k in (0, 5):
+        draw_frame(k).to_csv(tmp_path / f"dip{k}.csv", index=False)
+    told = []
+    tractexp.survey(tmp_path, cores=1, progress=told.append)
+    assert not any("1 of 2" in line for line in told)
+    assert re.search(r"1 of 2 files, \S+ a second, about \d+ s left", capsys.readouterr().err)
 
 
 def test_what_was_read_and_fitted_is_not_done_again(fitted, made, monkeypatch):

@@ -32,7 +32,7 @@ from tractexp.process.workers import Workers, backends
 from tractexp.report import station as shown
 from tractexp.storage import files
 from tractexp.text import quoting
-from tractexp.text.progress import Progress, count_parts, tell
+from tractexp.text.progress import Progress, counter, tell
 from tractexp.text.wording import count_noun
 
 if TYPE_CHECKING:
@@ -314,7 +314,7 @@ def _fit_loads(
     found = {k: entry for k, entry in entries if entry is not None}
     fresh = [k for k in range(len(jobs)) if k not in found]
     position = {id(jobs[k]): k for k in fresh}
-    with count_parts("loads", len(fresh), progress) as count:
+    with counter("loads", progress)(len(fresh)) as count:
         for job, told in workers.results(fit_load, [jobs[k] for k in fresh]):
             k = position[id(job)]
             killed = "the program was killed at this load, as where the memory is too small for it"

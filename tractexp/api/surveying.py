@@ -22,7 +22,7 @@ from tractexp.recording.sight import LoadEvent, Sight
 from tractexp.report.look import describe_dead_phases
 from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
 from tractexp.storage import files, time_limit
-from tractexp.text.progress import Progress, count_parts
+from tractexp.text.progress import Progress, counter
 
 Rows = list[dict[str, Any]]
 
@@ -247,7 +247,7 @@ def complete_entries(
     entries = {file: store.read_json(name) for file, name in names.items()}
     found = {file: entry for file, entry in entries.items() if entry is not None}
     fresh = [file for file in own if file not in found]
-    with count_parts(what, len(fresh), progress) as count:
+    with counter(what, progress)(len(fresh)) as count:
         for file, entry in compute(fresh):
             found[file] = files.plain(entry)
             store.write_json(names[file], found[file])
