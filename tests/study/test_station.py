@@ -175,12 +175,15 @@ def test_a_command_counts_files_with_the_time_left_and_not_line_by_line(
 ):
     """A command's progress is told what begins; of ten thousand files it is told none."""
     monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
-    for k in (0, 5):
+    monkeypatch.setattr(progress, "NEXT_LINES", 0.0)
+    for k in (0, 5, 7):
         draw_frame(k).to_csv(tmp_path / f"dip{k}.csv", index=False)
     told = []
     tractexp.survey(tmp_path, cores=1, progress=told.append)
-    assert not any("1 of 2" in line for line in told)
-    assert re.search(r"1 of 2 files, \S+ a second, about \d+ s left", capsys.readouterr().err)
+    assert not any("of 3 files" in line for line in told)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "  1 of 3 files"
+    assert re.fullmatch(r"  2 of 3 files, \S+ a second, about \d+ s left", lines[1])
 
 
 def test_what_was_read_and_fitted_is_not_done_again(fitted, made, monkeypatch):

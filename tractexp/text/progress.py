@@ -10,7 +10,7 @@ import itertools
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
@@ -150,18 +150,31 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
         with _live(columns, total) as update:
             yield lambda: update(advance=1)
         return
-    pace = Pace()
-    done = 0
+    pace, moments = Pace(), list[float]()
 
     def count() -> None:
-        nonlocal done
-        done += 1
-        if (spent := pace()) and done < total:
-            rate = done / spent
-            rest = spent * (total - done) / done
-            log(f"  {done} of {total} {what}, {rate:.2g} a second, about {rest:.0f} s left")
+        moments.append(time.perf_counter())
+        done = len(moments)
+        if pace() and done < total:
+            log(f"  {done} of {total} {what}{describe_rate(moments, total)}")
 
     yield count
+
+
+def describe_rate(moments: Sequence[float], total: int) -> str:
+    """The end of a progress line: how fast parts end and the time that the rest of `total` takes,
+    by the moments [s] when parts ended; "" after the first one, before which workers start.
+
+    Examples
+    --------
+    >>> describe_rate([12.0, 13.0, 14.0], 5)
+    ', 1 a second, about 2 s left'
+    """
+    spent = moments[-1] - moments[0]
+    if spent <= 0:
+        return ""
+    rate = (len(moments) - 1) / spent
+    return f", {rate:.2g} a second, about {(total - len(moments)) / rate:.0f} s left"
 
 
 def counter(what: str, progress: Progress = None) -> Callable[[int], Counting]:
