@@ -131,11 +131,9 @@ def run(group: str, planned: cases.Planned, events: int, held: int) -> dict:
     """One data set investigated, its last `held` events kept for validation. What fails is a row
     with its message.
     """
-    from tractexp.configuration.plugin import discover, get
+    from tractexp.configuration.plugin import discover
     from tractexp.discrepancy.investigate import investigate
     from tractexp.errors import UserError
-    from tractexp.model.model import compose
-    from tractexp.record import Record, detect
 
     row = {
         "group": group,
@@ -170,20 +168,30 @@ def run(group: str, planned: cases.Planned, events: int, held: int) -> dict:
         row["truth"], only = [], [n for n in discover()["effect"] if n not in hidden]
     try:
         records = make(trial.case, trial.seed)
-        seen = [
-            detect(Record(f"event{k + 1}", **r, source=f"{k}").check())
-            for k, r in enumerate(records)
-        ]
-        model = compose(
-            get("model/motor", "electromechanical")(), get("model/static", "exponential")()
-        )
+        seen = [detect_event(f"event{k}", one) for k, one in enumerate(records, 1)]
         row["generated"] = time.perf_counter() - started
-        found = investigate(model, seen[: events - held], seen[events - held :], only=only, seed=0)
+        model, fitted = compose_model(), events - held
+        found = investigate(model, seen[:fitted], seen[fitted:], only=only, seed=0)
         row |= _counted(found) | _compared(found, trial)
         row["closed_unused"] = find_share_unused(found, trial)
     except (UserError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         row["failed"] = f"{type(error).__name__}: {error}"
     return row | {"seconds": time.perf_counter() - started}
+
+
+def compose_model():
+    """The base model: a motor of the third order beside an exponential static load."""
+    from tractexp.configuration.plugin import get
+    from tractexp.model.model import compose
+
+    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+
+
+def detect_event(name: str, columns: dict[str, np.ndarray]):
+    """The event in a record of these columns."""
+    from tractexp.record import Record, detect
+
+    return detect(Record(name, **columns, source=name).check())
 
 
 def _counted(found) -> dict:
@@ -314,7 +322,6 @@ def find_share_unused(found, trial: cases.Trial) -> float | None:
     None where nothing is kept, or where the load does not survive the event.
     """
     from tractexp.discrepancy.held_out import compare_on
-    from tractexp.record import Record, detect
 
     if (chosen := found.verdict.chosen) is None:
         return None
@@ -323,7 +330,7 @@ def find_share_unused(found, trial: cases.Trial) -> float | None:
     except (ValueError, ArithmeticError):
         return None
     fit = chosen.reported_fit
-    event = detect(Record("unused", **record, source="unused").check())
+    event = detect_event("unused", record)
     return compare_on(found.context, [event], found.bare, [fit])[fit.names].closed_share
 
 

@@ -6,54 +6,48 @@ said, no seed twice. `--keep` adds those of judgement.jsonl, or of another file 
 before a later set takes their place. Without it the table is written into docs/judgement.md.
 
 What is said counts by label, and by class: effects of one class predict alike, so that records
-show the class and not which of its members is there. The classes are those in which 1,196 data sets
-of earlier versions took one effect for another; they were fixed before the newest set was drawn.
+show the class and not which of its members is there. The classes come from a simulation on other
+seeds (`imitations.py`). In a load of which no model is exact the part that dominates counts as what
+is hidden: what is right is its family, or one of its class. `--parts` finds those of sets that were
+drawn before rows held them.
 """
 
 import argparse
 import itertools
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import hidden_effects_evidence as evidence
 import hidden_effects_study as study
+import imitations
 import marked
 import numpy as np
+
+from hidden_effects.limits import part_misfits
+from tractexp.storage import files
 
 STORED = Path(__file__).with_suffix(".jsonl")
 KEPT = ("frozen", "group", "label", "seed", "truth", "verdict", "sets")
 MARK = "benchmarks/judgement_pooled.py"
-CLASSES = (
-    ("stator_resistance", "feeder_impedance"),
-    (
-        "constant_power_converter",
-        "voltage_dependent_power_limit",
-        "dc_link_lag",
-        "exponential_recovery",
-    ),
-    (
-        "magnetic_saturation",
-        "static_var_compensator",
-        "shunt_capacitor",
-        "polynomial_static_load",
-    ),
-    ("second_motor_group", "speed_dependent_torque", "low_frequency_oscillation"),
-)
-# what every load has of which no model is exact (`hidden_effects.imperfections`), in the names of
-# the catalogue: a broken torque, a bounded flux, motors of another make
-IMPERFECT = ("magnetic_saturation", "second_motor_group", "speed_dependent_torque")
-CLASS_OF = {name: one[0] for one in CLASSES for name in one}
+IMITATORS = imitations.find_imitators(evidence.read(imitations.STORED))
+FAMILIES = {  # of what makes a load inexact; what is missing here is of none
+    "broken_torque": "speed_dependent_torque",
+    "bounded_flux": "magnetic_saturation",
+    "other_motors": "second_motor_group",
+}
 GROUPS = {  # lines of the table, by the groups of rows
     "nothing": lambda group: group.startswith("null, ") and "error" not in group,
-    "nothing, no model exact to 1 %": lambda group: "error" in group,
+    "nothing, no model exact to 1 %": lambda group: group.startswith("null, error"),
+    "nothing, inexact to 1 % by no family": lambda group: group.startswith("null, foreign"),
     "one effect, 4 x": lambda group: group in ("4 x", "law 4 x", "field 4 x"),
     "one effect, 4 x, no model exact to 2 %": lambda group: group == "loud 4 x",
     "two effects, 4 x": lambda group: group == "pairs 4 x",
     "left out of the catalogue, 8 x": lambda group: group == "left out 8 x",
 }
 SILENT = ("none", "unexplained")
+EVENTS = 4  # of a data set
 HEAD = [
     "hidden",
     "version",
@@ -70,9 +64,24 @@ HEAD = [
 Row = dict[str, Any]
 
 
-def find_class(names: Iterable[str]) -> list[str]:
-    """The classes of effects, by one member each."""
-    return sorted(CLASS_OF.get(name, name) for name in names)
+def find_hidden(row: Row) -> list[str]:
+    """What is hidden: of an inexact load the family of the part that dominates, of what was left
+    out of the catalogue what that was.
+    """
+    if is_inexact(row):
+        family = FAMILIES.get(row.get("dominates", ""))
+        return [family] if family else []
+    return [row["label"]] if row["group"].startswith(study.LEFT_OUT) else row["truth"]
+
+
+def find_said(row: Row) -> list[list[str]]:
+    """The sets that are told, tied ones side by side."""
+    return row["sets"] if row["verdict"] not in SILENT else []
+
+
+def find_class(name: str) -> set[str]:
+    """An effect and those that imitate it."""
+    return {name, *IMITATORS.get(name, ())}
 
 
 def is_inexact(row: Row) -> bool:
@@ -81,28 +90,28 @@ def is_inexact(row: Row) -> bool:
 
 
 def is_right(row: Row, by_class: bool = False) -> bool:
-    """Whether what is said is what is hidden: by label the one set, by class one of those tied, and
-    of an effect that was left out of the catalogue another one of its class.
+    """Whether what is said is what is hidden: by label the one set, by class one of those tied,
+    with a member of the class of each effect.
     """
-    hidden = [row["label"]] if row["group"].startswith(study.LEFT_OUT) else row["truth"]
-    sets = row["sets"] if row["verdict"] not in SILENT else []
+    hidden, sets = find_hidden(row), find_said(row)
     if not by_class:
-        return len(sets) == 1 and sorted(sets[0]) == sorted(hidden)
-    return any(find_class(names) == find_class(hidden) for names in sets)
+        return bool(hidden) and len(sets) == 1 and sorted(sets[0]) == sorted(hidden)
+    return bool(hidden) and any(is_of_classes(names, hidden) for names in sets)
+
+
+def is_of_classes(names: Sequence[str], hidden: Sequence[str]) -> bool:
+    """Whether each name is of the class of another hidden effect, and none is left."""
+    return len(names) == len(hidden) and any(
+        all(name in find_class(effect) for name, effect in zip(names, order, strict=True))
+        for order in itertools.permutations(hidden)
+    )
 
 
 def is_wrong(row: Row, by_class: bool = False) -> bool:
-    """Whether something is said that is not hidden, even in part: of sets that are tied, by all. By
-    class what makes a load inexact is there.
-    """
-    hidden = [row["label"]] if row["group"].startswith(study.LEFT_OUT) else row["truth"]
-    sets = row["sets"] if row["verdict"] not in SILENT else []
-    if by_class and is_inexact(row):
-        return bool(sets) and not any({*names} <= {*IMPERFECT} for names in sets)
-    if not by_class:
-        return bool(sets) and not any({*names} <= {*hidden} for names in sets)
-    there = {*find_class(hidden)}
-    return bool(sets) and not any({*find_class(names)} <= there for names in sets)
+    """Whether something is said that is not hidden, even in part: of sets that are tied, by all."""
+    hidden, sets = find_hidden(row), find_said(row)
+    there = {*hidden} if not by_class else {*itertools.chain(*map(find_class, hidden))}
+    return bool(sets) and not any({*names} <= there for names in sets)
 
 
 def is_reached(row: Row) -> bool:
@@ -127,9 +136,8 @@ def make_table(rows: list[Row], newest: str) -> str:
             for counted in (is_right, is_wrong)
             for by_class in (False, True)
         ]
-        # of nothing hidden silence is right, which has a column
         cells = [evidence.share(count, len(own)) for count in counts]
-        if not any(row["truth"] or row["group"].startswith(study.LEFT_OUT) for row in own):
+        if not any(map(find_hidden, own)):  # silence is right, which has a column
             cells[:2] = "", ""
         named = sum(row["verdict"] == "named" and is_wrong(row, by_class=True) for row in own)
         candidates = sum(row["verdict"] == "candidate" for row in own)
@@ -151,7 +159,35 @@ def describe_unused(rows: Iterable[Row]) -> str:
 def shorten(row: Row) -> Row:
     """What is kept of a row."""
     known = {"reached": is_reached(row), "unused": row.get("closed_unused")}
-    return {key: row[key] for key in KEPT} | known
+    kept = {key: row[key] for key in KEPT} | known
+    return kept | {"dominates": find_largest(row["parts"])} if is_inexact(row) else kept
+
+
+def find_largest(parts: Mapping[str, float]) -> str:
+    """The part that leaves most of the response alone."""
+    return max(parts, key=lambda name: parts[name])
+
+
+def find_dominating(row: Row) -> str:
+    """The part that dominates an inexact load, made anew from the series of its set."""
+    salt = int(row["frozen"][:12], 16)
+    planned = next(
+        one
+        for one in study.cases.inexact(study.ERROR, salt, events=EVENTS)
+        if one.seed == row["seed"]
+    )
+    return find_largest(part_misfits(planned.make().case, planned.seed))
+
+
+def add_parts() -> None:
+    """Write into the stored rows of inexact loads in which something is said which part dominates,
+    where they lack it.
+    """
+    rows = evidence.read(STORED)
+    for row in rows:
+        if is_inexact(row) and find_said(row) and "dominates" not in row:
+            row["dominates"] = find_dominating(row)
+    files.write(STORED, "".join(json.dumps(row) + "\n" for row in rows))
 
 
 def keep(rows: Iterable[Row]) -> None:
@@ -168,7 +204,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--keep", action="store_true", help="add rows, and stop")
     parser.add_argument("--rows", type=Path, default=study.NEWEST)
+    parser.add_argument(
+        "--parts", action="store_true", help="find the parts that dominate, and stop"
+    )
     asked = parser.parse_args()
+    if asked.parts:
+        add_parts()
+        return
     if asked.keep:
         keep(evidence.read(asked.rows))
         return

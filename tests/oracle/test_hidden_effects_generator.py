@@ -45,9 +45,15 @@ from hidden_effects.controls import (
     VoltageLink,
 )
 from hidden_effects.devices import Converter, Inrush, Link, Statcom
-from hidden_effects.imperfections import IMPERFECTIONS
+from hidden_effects.imperfections import FOREIGN, IMPERFECTIONS
 from hidden_effects.laws import FAMILY, LAWS, MEMBERS_LAW
-from hidden_effects.limits import detection_limit, joint_limit, misfit, size_of_error
+from hidden_effects.limits import (
+    detection_limit,
+    joint_limit,
+    misfit,
+    part_misfits,
+    size_of_error,
+)
 from hidden_effects.motor import Motor
 from hidden_effects.noise import autoregressive
 from hidden_effects.recorder import weighed
@@ -922,6 +928,19 @@ def test_an_imperfect_load_misses_what_is_asked_once_the_base_model_is_fitted():
         size_of_error(named, 3) / 2, rel=0.2
     )
     assert truth(named, 3)["imperfections"][0]["name"] == next(iter(IMPERFECTIONS))
+
+
+def test_a_foreign_load_is_inexact_by_what_no_family_has():
+    """Each part misses a share of the response alone, the only one as much as the whole."""
+    case = cases.imperfect(Case(events=1), 3, 0.01, FOREIGN)
+    assert misfit(case, 3) == pytest.approx(0.01, rel=0.05)
+    parts = part_misfits(case, 3)
+    assert tuple(parts) == FOREIGN
+    assert not {*parts} & {*FAMILY, *CATALOG, *(IMPERFECTIONS.keys() - {"mixing_exponents"})}
+    (largest,) = (one for one in case.imperfections if one[0] == max(parts, key=parts.__getitem__))
+    alone = replace(case, imperfections=(largest,))
+    assert part_misfits(alone, 3) == {largest[0]: misfit(alone, 3)}
+    assert 0.0 < max(parts.values()) < 0.02
 
 
 @pytest.mark.long

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import false_alarms
 import hidden_effects_evidence as evidence
 import hidden_effects_study as study
+import imitations
 import judgement_pooled
 import marked
 import numpy as np
@@ -46,7 +47,7 @@ def test_seeds_follow_from_the_commit_that_froze_product_and_generator():
 
 def series_of(group: str, label: str) -> str:
     """Of which series of seeds a row's is: one for all pairs, all inexact loads."""
-    shared = {"pairs": "pairs", "null, error": "inexact"}
+    shared = {"pairs": "pairs", "null, error": "inexact", "null, foreign": "foreign"}
     own = {"null, ": f"null {label}", "field": f"field {label}", "loud": f"loud {label}"}
     return next(
         (series for start, series in (shared | own).items() if group.startswith(start)), label
@@ -282,7 +283,11 @@ def test_what_names_close_of_unused_events_is_told_as_a_median():
         ([], False, False, False, False),
     ],
 )
-def test_a_name_counts_by_label_and_by_class(sets, right, by_class, wrong, wrong_by_class):
+def test_a_name_counts_by_label_and_by_class(
+    sets, right, by_class, wrong, wrong_by_class, monkeypatch
+):
+    alike = {"stator_resistance": ("feeder_impedance",)}
+    monkeypatch.setattr(judgement_pooled, "IMITATORS", alike)
     row = {
         "group": "4 x",
         "label": "stator_resistance",
@@ -291,17 +296,61 @@ def test_a_name_counts_by_label_and_by_class(sets, right, by_class, wrong, wrong
         "sets": sets,
     }
     left_out = row | {"group": "left out 8 x", "truth": []}
-    for one in (row, left_out):
+    inexact = row | {"group": "null, error 1%", "truth": [], "dominates": "copper"}
+    monkeypatch.setattr(judgement_pooled, "FAMILIES", {"copper": "stator_resistance"})
+    for one in (row, left_out, inexact):
         assert judgement_pooled.is_right(one) == right
         assert judgement_pooled.is_right(one, by_class=True) == by_class
         assert judgement_pooled.is_wrong(one) == wrong
         assert judgement_pooled.is_wrong(one, by_class=True) == wrong_by_class
 
 
-def test_what_makes_a_load_inexact_is_there_by_class():
-    """A torque that depends on the speed is in every such load; a power limit in none."""
-    row = {"group": "null, error 1%", "label": "error 1%", "truth": [], "verdict": "named"}
-    for names, wrong in ((["speed_dependent_torque"], False), (["dc_link_lag"], True)):
-        said = row | {"sets": [names]}
-        assert judgement_pooled.is_wrong(said)
-        assert judgement_pooled.is_wrong(said, by_class=True) == wrong
+def test_each_of_two_effects_needs_a_member_of_its_class(monkeypatch):
+    """Two imitators of one effect do not make a pair right."""
+    alike = {"time_skew": ("dc_link_lag", "measurement_window"), "load_change": ()}
+    monkeypatch.setattr(judgement_pooled, "IMITATORS", alike)
+    pair = {"group": "pairs 4 x", "truth": ["load_change", "time_skew"], "verdict": "named"}
+    for said, right in (
+        (["dc_link_lag", "load_change"], True),
+        (["dc_link_lag", "measurement_window"], False),
+        (["load_change"], False),
+    ):
+        assert judgement_pooled.is_right(pair | {"sets": [said]}, by_class=True) == right
+
+
+@pytest.mark.parametrize(
+    ("group", "dominates", "is_wrong"),
+    [
+        ("null, error 1%", "broken_torque", False),
+        ("null, error 1%", "other_motors", True),
+        ("null, error 1%", "mixing_exponents", True),
+        ("null, foreign error 1%", "voltage_rate", True),
+    ],
+)
+def test_an_inexact_load_counts_by_the_part_that_dominates(group, dominates, is_wrong, monkeypatch):
+    """A torque that depends on the speed is right where that is the largest part, and no name is
+    where the largest is of no family.
+    """
+    monkeypatch.setattr(judgement_pooled, "IMITATORS", {})
+    row = {"group": group, "label": "error 1%", "truth": [], "verdict": "named"}
+    row |= {"sets": [["speed_dependent_torque"]], "dominates": dominates}
+    assert judgement_pooled.is_wrong(row) == judgement_pooled.is_wrong(row, by_class=True)
+    assert judgement_pooled.is_wrong(row) == is_wrong
+    assert judgement_pooled.is_right(row) == (not is_wrong)
+
+
+def test_the_largest_part_of_an_inexact_load_is_kept():
+    parts = {"broken_torque": 0.004, "other_motors": 0.008}
+    whole = row(group="null, error 1%", parts=parts, frozen="0" * 40, closed_unused=None)
+    assert judgement_pooled.shorten(whole)["dominates"] == "other_motors"
+    assert "dominates" not in judgement_pooled.shorten(whole | {"group": "null, white 1 %"})
+
+
+def test_effects_imitate_what_they_take_as_much_away_of_as_a_name_must():
+    """In the median of the loads; an effect does not imitate itself."""
+    rows = [
+        {"hidden": "time_skew", "shares": {"time_skew": 0.99, "dc_link_lag": share}}
+        for share in (0.1, 0.85, 0.9)
+    ]
+    assert imitations.find_imitators(rows) == {"time_skew": ("dc_link_lag",)}
+    assert imitations.find_imitators(rows[:2]) == {"time_skew": ()}
