@@ -7,7 +7,9 @@ Of each channel half the band is the root of
 N is the largest excursion that noise makes in so many samples; a the largest change of S that the
 model calculates, as means over a cycle; m what it missed of the known events beyond their noise, at
 worst, over their a (the root of the mean of squares over the events); F how far the next event may
-exceed that; s the largest scatter of the calculated power by that of the parameters.
+exceed that; s the largest scatter of the calculated power by that of the parameters. What noise
+adds to the worst of a known event is what it makes in every second one (the median): its largest
+excursion would hide as much of what the model misses.
 
 Within a load the logarithm of m scatters from event to event by `EVENT_SPREAD`, the next event's
 about that of K known ones by `EVENT_SPREAD` √(1 + 1/K). It was measured on loads that the benchmark
@@ -25,6 +27,7 @@ from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
 
 EVENT_SPREAD = 0.45
 SCATTER_STEP = 0.02  # standard errors by which the scatter of the calculated power is probed
+MEDIAN = 0.5
 NO_CHANGE = 1e-9  # pu: an event that changes S by less tells nothing of a share of it
 
 
@@ -94,18 +97,18 @@ def measure_band(played: Sequence[Playback]) -> PredictionBand | None:
             continue
         noise = np.nanstd(left[:, event.steady], axis=1)
         after = np.nan_to_num(left[:, event.start :])
-        peak = find_noise_peak(after.shape[1]) * noise
-        squares = np.abs(after).max(axis=1) ** 2 - peak**2
-        missed.append(np.sqrt(np.maximum(squares, 0.0)) / change)
-        noises.append(noise)
+        peak = find_noise_peak(after.shape[1], MEDIAN) * noise
+        missed.append((np.abs(after).max(axis=1) ** 2 - peak**2) / change**2)
+        noises.append(noise**2)
     if not missed:
         return None
-    share, noise = (np.sqrt(np.mean(np.square(rows), axis=0)).tolist() for rows in (missed, noises))
+    means = (np.maximum(np.mean(squares, axis=0), 0.0) for squares in (missed, noises))
+    share, noise = (np.sqrt(mean).tolist() for mean in means)
     return PredictionBand((noise[0], noise[1]), (share[0], share[1]), len(missed))
 
 
-def find_noise_peak(samples: int) -> float:
-    """The standard deviations that no sample of white noise exceeds in 95 % of cases.
+def find_noise_peak(samples: int, level: float = INTERVAL_LEVEL) -> float:
+    """The standard deviations that no sample of white noise exceeds in this share of cases.
 
     Examples
     --------
@@ -114,7 +117,7 @@ def find_noise_peak(samples: int) -> float:
     """
     from scipy.special import ndtri
 
-    return float(ndtri((1 + INTERVAL_LEVEL ** (1 / max(samples, 1))) / 2))
+    return float(ndtri((1 + level ** (1 / max(samples, 1))) / 2))
 
 
 def find_largest_change(change: np.ndarray, step: float, frequency: float) -> float:
