@@ -58,7 +58,6 @@ HEAD = [
     "wrong by class",
     "of these named",
     "candidates",
-    "silent",
     "closed in an unused event",
 ]
 Row = dict[str, Any]
@@ -141,9 +140,8 @@ def make_table(rows: list[Row], newest: str) -> str:
             cells[:2] = "", ""
         named = sum(row["verdict"] == "named" and is_wrong(row, by_class=True) for row in own)
         candidates = sum(row["verdict"] == "candidate" for row in own)
-        silent = sum(row["verdict"] in SILENT for row in own)
         version = newest[:8] if is_newest else "before"
-        told = [*cells, named, candidates, silent, describe_unused(own)]
+        told = [*cells, named, candidates, describe_unused(own)]
         lines.append([what, version, len(own), *told])
     return marked.table(HEAD, lines)
 
