@@ -5,8 +5,8 @@ white noise of 0.05 to 0.5 %; five dips of 5 to 60 % each. One, two or three of 
 each of the others is a next dip: does the worst sample of P and of Q lie within the band? Rows are
 appended to next_dip.jsonl, so that a study goes on where it stopped; `--docs` writes their table
 into docs/coverage.md. `EVENT_SPREAD` of `tractexp/inference/prediction_band.py` was chosen on
-the series `choose`, what noise adds to a worst sample on `judge`; the series `report`, whose seeds
-are others, is told.
+the series `choose`, what noise adds to a worst sample on `judge` and `report`; the series `unseen`,
+whose seeds are others, is told.
 """
 
 import argparse
@@ -33,7 +33,7 @@ HERE = Path(__file__).parent
 ROWS = HERE / "next_dip.jsonl"
 PAGE = HERE.parent / "docs" / "coverage.md"
 MARK = "benchmarks/next_dip.py"
-SERIES = ("choose", "judge", "report")
+SERIES = ("choose", "judge", "report", "unseen")
 EVENTS = 5
 FITTED = (1, 2, 3)
 LOADS = {"exact": (0.0,), "inexact to 0.5 or 1 %": (0.005, 0.01), "to 2 or 5 %": (0.02, 0.05)}

@@ -55,12 +55,12 @@ def test_of_an_exact_model_the_noise_alone_is_left_and_19_of_20_events_are_withi
     worst = np.abs(np.array(left))[:, :, START:].max(axis=2)
     held = [(worst <= half).mean(axis=0) for half in halves]
     assert (np.mean(held, axis=0) > 0.95).all()
-    assert (np.mean(halves, axis=0) < 4.6 * 0.002).all()
+    assert (np.mean(halves, axis=0) < 5 * 0.002).all()
 
 
 def test_what_the_noise_of_known_events_hides_is_not_taken_to_be_nothing():
     """An error of one sample and two standard deviations is hidden in the known events and six in
-    one that is three times as large: more than every second band is as wide. Of the largest
+    one that is three times as large: more than six of ten bands are as wide. Of the largest
     excursion of noise taken from what the known events show every fourth is.
     """
     error = np.where(np.arange(SAMPLES) == START + 20, 2 * 0.002, 0.0)
@@ -70,7 +70,7 @@ def test_what_the_noise_of_known_events_hides_is_not_taken_to_be_nothing():
         known = [Playback.of_power(one.event, one.P + error, one.Q) for one in played]
         half = measure_band(known).find_half_width(3 * CHANGE, SAMPLES - START, np.zeros(2))
         held.append(half[0] >= 6 * 0.002)
-    assert np.mean(held) > 0.5
+    assert np.mean(held) > 0.6
 
 
 def test_the_peak_of_one_sample_is_that_of_a_95_percent_interval_and_grows_slowly():

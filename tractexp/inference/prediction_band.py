@@ -8,8 +8,9 @@ N is the largest excursion that noise makes in so many samples; a the largest ch
 model calculates, as means over a cycle; m what it missed of the known events beyond their noise, at
 worst, over their a (the root of the mean of squares over the events); F how far the next event may
 exceed that; s the largest scatter of the calculated power by that of the parameters. What noise
-adds to the worst of a known event is what it makes in every second one (the median): its largest
-excursion would hide as much of what the model misses.
+adds to the worst of a known event is what it makes in every second one (the median); by as much as
+it may make less, in 95 % of cases, the model may have missed more. That part, of K events less by
+their root, is in m, and F does not multiply it.
 
 Within a load the logarithm of m scatters from event to event by `EVENT_SPREAD`, the next event's
 about that of K known ones by `EVENT_SPREAD` √(1 + 1/K). It was measured on loads that the benchmark
@@ -84,6 +85,7 @@ def measure_band(played: Sequence[Playback]) -> PredictionBand | None:
         None where its motor stalls on one, or where none changes the load.
     """
     missed = []
+    hidden = []
     noises = []
     for one in played:
         event = one.event
@@ -97,14 +99,23 @@ def measure_band(played: Sequence[Playback]) -> PredictionBand | None:
             continue
         noise = np.nanstd(left[:, event.steady], axis=1)
         after = np.nan_to_num(left[:, event.start :])
-        peak = find_noise_peak(after.shape[1], MEDIAN) * noise
-        missed.append((np.abs(after).max(axis=1) ** 2 - peak**2) / change**2)
-        noises.append(noise**2)
+        levels = (MEDIAN, 1 - INTERVAL_LEVEL)
+        usual, least = ((find_noise_peak(after.shape[1], one) * noise) ** 2 for one in levels)
+        missed.append((np.abs(after).max(axis=1) ** 2 - usual) / change**2)
+        hidden.append((usual - least) / change**2)
+        noises.append(noise)
     if not missed:
         return None
-    means = (np.maximum(np.mean(squares, axis=0), 0.0) for squares in (missed, noises))
-    share, noise = (np.sqrt(mean).tolist() for mean in means)
-    return PredictionBand((noise[0], noise[1]), (share[0], share[1]), len(missed))
+    events = len(missed)
+    unknown = find_rms(hidden) / np.sqrt(events) / _find_next_event_factor(events) ** 2
+    share = np.sqrt(np.maximum(np.mean(missed, axis=0), 0.0) + unknown).tolist()
+    level = find_rms(noises).tolist()
+    return PredictionBand((level[0], level[1]), (share[0], share[1]), events)
+
+
+def find_rms(rows: Sequence[np.ndarray]) -> np.ndarray:
+    """The root of the mean of squares of rows (K, n): (n,)."""
+    return np.sqrt(np.mean(np.square(rows), axis=0))
 
 
 def find_noise_peak(samples: int, level: float = INTERVAL_LEVEL) -> float:
