@@ -19,9 +19,10 @@ LONGEST_FILES = (
     "study/test_discrepancy.py",
     "process/test_lost.py",
     "process/test_export.py",
+    "process/test_tutorial.py",
+    "study/test_prediction.py",
     "process/test_ten_minutes.py",
     "process/test_commands.py",
-    "study/test_prediction.py",
     "study/test_docs_run.py",
     "process/test_trust.py",
     "study/test_paper.py",
@@ -48,7 +49,6 @@ LONGEST_FILES = (
     "process/test_cli.py",
     "model/test_model.py",
     "unit/test_tables.py",
-    "process/test_tutorial.py",
 )
 MOTOR = {
     "T_prime": 0.12,
