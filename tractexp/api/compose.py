@@ -138,6 +138,8 @@ class LoadModel(Portable, Plain, Tabulated):
                 models[name] = prepared
             except UserError as error:
                 refused.append(Entry(name, 0, math.inf, math.inf, str(error)))
+        if not models:
+            raise UserError(f"none of the structures can be fitted: {refused[0].why}")
         candidates = [Candidate(name, one.model, one.bounds) for name, one in models.items()]
         entries = race_structures(candidates, events, self.fixed)
         race = [entry.to_dict() for entry in (*entries, *refused)]

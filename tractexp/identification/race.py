@@ -92,10 +92,8 @@ def race_structures(
             entries.append(entry)
             ended()
     entries.sort(key=lambda entry: (entry.predicted, entry.fitted))
-    if not entries or not np.isfinite(entries[0].predicted):
-        raise UserError(
-            f"none of the structures can be fitted: {entries[0].why if entries else ''}"
-        )
+    if not np.isfinite(entries[0].predicted):
+        raise UserError(f"none of the structures can be fitted: {entries[0].why}")
     near = [e for e in entries if e.predicted <= AS_GOOD * entries[0].predicted]
     winner = min(near, key=lambda entry: (entry.parameters, entry.predicted))
     return [winner, *(entry for entry in entries if entry is not winner)]
