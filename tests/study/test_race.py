@@ -94,7 +94,7 @@ def test_two_structures_that_are_one_on_these_records_are_raced_once():
 
 
 def test_where_none_can_be_fitted_it_is_told():
-    with pytest.raises(UserError, match="none of the structures can be fitted: .*domain=phasors"):
+    with pytest.raises(UserError, match=r"none of the structures can be fitted: .*domain=phasors"):
         auto("line_side_converter").fit_for([dip("none")])
 
 
