@@ -40,9 +40,12 @@ class NegativeSequenceBraking(Effect):
     confused_with = ("second_motor_group", "shunt_capacitor")
 
     def edit(self, eq, negative_sequence):
-        from sympy import im, re
+        from sympy import I, diff, im, re
 
-        Z = eq[sites.stator_impedance]
+        if sites.stator_impedance in eq:
+            Z = eq[sites.stator_impedance]
+        else:  # a stator whose flux has dynamics: what its current meets at once
+            Z = eq["R_s"] + I / diff(eq.expression(sites.stator_current), eq["psi"])
         R_2 = eq[sites.coupling] * im(Z) / (eq.omega_n * eq[sites.time_constant])
         R, X = re(Z) + R_2 / 2, im(Z)  # Z_2, in which R_2/s at slip 2
         current_squared = negative_sequence * (eq.U2**2 - eq.U20**2) / (R**2 + X**2)

@@ -213,3 +213,36 @@ def test_of_a_load_without_a_motor_on_which_it_acts_nothing_is_told():
     columns = without_U2(record_unbalanced(0.0))
     found = fit(columns, "static_exponential", check_intervals=False)
     assert found.result.unrecorded == {}
+
+
+def answer_to_U2(motor, **more):
+    """By how much an unbalance of 0.2 pu moves P and Q (2,) of a motor after 0.6 s."""
+    t = np.arange(600) * 1e-3
+    U, still = np.full(len(t), 1.0), np.ones(len(t))
+    U2 = 0.2 * np.clip((t - 0.05) / 0.1, 0, 1)
+    load = compose(
+        get("model/motor", motor)(),
+        get("model/static", "constant_impedance")(),
+        [get("effect", "negative_sequence_braking")()],
+    )
+    truth = TRUTH | {"X_second": 0.2, "T_second": 0.01} | more
+    event = Excitation(1e-3, U, still, still, 1.0, 1.0, 0.6, U2=U2, U20=0.0)
+    drive = Drive.from_events([event])
+    with_it, without = (
+        load.simulate(
+            drive, np.array([[(truth | {"negative_sequence": k})[n] for n in load.names]]), 8
+        ).outputs[:, 0]
+        for k in (1.0, 0.0)
+    )
+    return (with_it - without)[:, -1]
+
+
+@pytest.mark.parametrize(
+    ("stiff", "moving"),
+    [("electromechanical", "stator_flux"), ("double_cage", "double_cage_stator_flux")],
+)
+def test_behind_a_stator_flux_negative_sequence_acts_as_on_a_motor_without(stiff, moving):
+    """In the end; winners of `model=auto` have one, and records without U2 are told there, too."""
+    there = answer_to_U2(moving, R_s=1e-5)
+    assert np.abs(there).min() > 1e-3
+    assert there == pytest.approx(answer_to_U2(stiff), rel=0.02)

@@ -55,7 +55,9 @@ def _tell_input(uncertainty: Uncertainty, missing: UnrecordedInput) -> dict[str,
     """What an input does, `beyond` apart; {} where it was recorded, or moves nothing."""
     if not missing.is_unknown(uncertainty.likelihood.problem):
         return {}
-    moved = np.abs(_find_moves(uncertainty, missing))
+    width = uncertainty.upper - uncertainty.lower
+    # what no record sees to first order moves from bound to bound at most
+    moved = np.minimum(np.abs(_find_moves(uncertainty, missing)), width)
     if not moved.any():
         return {}
     return {
