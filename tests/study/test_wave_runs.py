@@ -144,6 +144,8 @@ def test_the_periodic_steady_state_is_measured_by_what_still_changes(fit):
     grown = turning * (1 + decay)
     told = np.sqrt(np.mean((last * (np.e - 1)) ** 2)) / np.sqrt(np.mean((1 + last) ** 2))
     assert measure_unsteadiness(event, grown) == pytest.approx(told, rel=0.02)
+    grown[0, event.lead - 3 :] = np.nan  # the load diverges
+    assert np.isnan(measure_unsteadiness(event, grown))
 
 
 def test_a_fit_in_waveforms_is_saved_and_read_back(fit, tmp_path):

@@ -161,7 +161,7 @@ def measure_unsteadiness(event: WaveEvent, currents: np.ndarray) -> float:
     -------
     float
         The rms of the last cycle of the lead less the one before it, over that of the last one; nan
-        where the lead is shorter than two cycles.
+        where the lead is shorter than two cycles, and where the load diverges in it.
     """
     from scipy.interpolate import CubicSpline
 
@@ -170,9 +170,10 @@ def measure_unsteadiness(event: WaveEvent, currents: np.ndarray) -> float:
     if event.lead < 2 * cycle + 2:
         return float("nan")
     first = int(last[0] - cycle) - 2
-    before = CubicSpline(np.arange(first, event.lead), currents[:, first : event.lead], axis=1)(
-        last - cycle
-    )
+    lead = currents[:, first : event.lead]
+    if not np.isfinite(lead).all():
+        return float("nan")
+    before = CubicSpline(np.arange(first, event.lead), lead, axis=1)(last - cycle)
     late = event.of_phases(currents[:, last])
     return float(
         np.sqrt(np.mean((late - event.of_phases(before)) ** 2) / max(np.mean(late**2), 1e-30))
