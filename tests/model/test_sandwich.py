@@ -7,6 +7,7 @@ import pytest
 import uncertainty as study
 from written_out import dense, printed_dip
 
+import tractexp
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.inference.blocks import LENGTH, blocks_of
 from tractexp.inference.interval import interval_factor
@@ -211,3 +212,20 @@ def test_where_the_power_before_is_held_only_the_parameters_are_free():
     free = Likelihood.of_squares(case, NOISE).free_set
     assert free.names == case.space.names
     assert not len(free.before)
+
+
+def test_a_fit_whose_parameters_all_stand_on_bounds_is_told():
+    """Nothing is left inside, as where bounds are narrow and the load is another."""
+    t = np.arange(300) * 0.01
+    U = np.where((t > 1.0) & (t < 1.3), 0.7, 1.0)
+    noise = 1e-4 * np.random.default_rng(0).standard_normal((2, len(t)))
+    columns = {"t": t, "U": U, "P": U + noise[0], "Q": 0.5 * U + noise[1]}
+    found = tractexp.identify(
+        tractexp.read(columns),
+        "static_exponential",
+        bounds={"p_v": (4.0, 5.0), "q_v": (4.0, 5.0)},
+        optimizer="multistart_least_squares",
+        progress=False,
+    )
+    assert [found.parameters[name].value for name in ("p_v", "q_v")] == [4.0, 4.0]
+    assert str(found.grade) == "wrong_model"

@@ -213,11 +213,10 @@ def moves_without_blocks(
     -----
     Source: the jackknife of Bell and McCaffrey 2002, blocks in place of clusters.
     """
-    k = len(whole)
     scale = np.sqrt(np.maximum(np.diag(whole), 1e-300))
     moves = []
     for block, shift in zip(blocks, shifts or [0.0] * len(blocks), strict=True):
-        a = J[:, block].reshape(-1, k)
+        a = np.concatenate(J[:, block])
         r = rows[:, block].ravel()
         rest = (whole - a.T @ a) / np.outer(scale, scale)
         moves.append(
