@@ -179,7 +179,7 @@ REFUSED = {
     "voltage": {"speed_dependent_torque", "second_motor_group", "torque_curve", "rotor_flux"},
     "electromechanical": {"rotor_flux", "rotor_speed"},
     "double_cage": {"rotor_flux", "rotor_speed", "second_cage"},
-    "stator_flux": {"stator_resistance", "negative_sequence_braking", "saturation_curve", *ORDERS},
+    "stator_flux": {"stator_resistance", "saturation_curve", *ORDERS},
 }
 
 

@@ -14,7 +14,7 @@ from tractexp.api.identification import UNUSABLE, Identification
 from tractexp.api.job import Job
 from tractexp.api.joint_command import build_fit_command
 from tractexp.api.listed import Listed
-from tractexp.api.station_load import LoadJob, fit_load, read_files
+from tractexp.api.station_load import LoadJob, fit_load, read_files, restore_dips
 from tractexp.api.survey import survey
 from tractexp.api.surveying import FEWEST_DIPS, complete_entries, keys, name_load
 from tractexp.api.task import Task, call
@@ -29,6 +29,7 @@ from tractexp.exchange.format import choose_format
 from tractexp.identification.result import Result
 from tractexp.outcome import Written
 from tractexp.process.workers import Workers, backends
+from tractexp.record import Record
 from tractexp.report import station as shown
 from tractexp.storage import files
 from tractexp.text import quoting
@@ -260,7 +261,7 @@ def _read_dips(
     def read(fresh: Sequence[str]) -> Iterator[tuple[str, Any]]:
         return read_files(folder, {file: wanted[file] for file in fresh}, workers)
 
-    by_file, _ = complete_entries(DIPS, keep, own, read, "files with dips", progress)
+    by_file, _ = complete_entries(DIPS, keep, own, read, "files with dips", progress, restore_dips)
     return {
         name: {**one, "key": own[file]}
         for file, names in wanted.items()
@@ -275,7 +276,7 @@ def _group(
     folder: Path,
 ) -> tuple[list[LoadJob], list[dict[str, Any]]]:
     """A job for each load with dips enough, and the entries of the loads with too few."""
-    groups = defaultdict[tuple[str, str], list[tuple[str, str | None, Mapping[str, Any]]]](list)
+    groups = defaultdict[tuple[str, str], list[tuple[str, str | None, Record]]](list)
     stamps = defaultdict[tuple[str, str], list[str]](list)
     for row in rows:
         one = read[row["event"]]

@@ -219,6 +219,7 @@ def complete_entries(
     compute: Callable[[list[str]], Iterable[tuple[str, Any]]],
     what: str,
     progress: Progress,
+    restore: Callable[[Any], Any] | None = None,
 ) -> tuple[dict[str, Any], int]:
     """The entry of each file, stored as it is computed, and how many were computed: those that
     `keep` has are read.
@@ -237,6 +238,8 @@ def complete_entries(
         Is counted while they are.
     progress : None, False or callable
         None shows how many are done, False does not.
+    restore : callable
+        What is held in memory of an entry, which is plain data; None: the entry.
 
     Returns
     -------
@@ -244,13 +247,17 @@ def complete_entries(
     """
     store = Store(kind, folder=keep or Path())
     names = own if keep else dict.fromkeys(own, "")
-    entries = {file: store.read_json(name) for file, name in names.items()}
-    found = {file: entry for file, entry in entries.items() if entry is not None}
+    hold = restore or (lambda entry: entry)
+    found = dict[str, Any]()
+    for file, name in names.items():
+        if (entry := store.read_json(name)) is not None:
+            found[file] = hold(entry)
     fresh = [file for file in own if file not in found]
     with counter(what, progress)(len(fresh)) as count:
-        for file, entry in compute(fresh):
-            found[file] = files.plain(entry)
-            store.write_json(names[file], found[file])
+        for file, computed in compute(fresh):
+            entry = files.plain(computed)
+            store.write_json(names[file], entry)
+            found[file] = hold(entry)
             count()
     return {file: found[file] for file in own}, len(fresh)
 
