@@ -385,6 +385,8 @@ def identification(task: Task, data: Data) -> tuple[Any, float, float]:
         validate=data.validate,
         domain=data.domain,
         optimizer="multistart_least_squares",
+        frequency_swing=0.0,  # the generator's voltages turn evenly,
+        unbalance=0.0,  # as a positive sequence alone
         progress=False,
     )
     return fit, time.perf_counter() - wall, time.process_time() - cpu

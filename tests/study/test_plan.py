@@ -113,7 +113,13 @@ def test_a_plan_stands_on_the_numbers_of_the_identification():
     said to tell.
     """
     fit = public.identify(
-        recorded(0.4), model="third_order_exponential", optimizer="pso", budget=2000, progress=False
+        recorded(0.4),
+        model="third_order_exponential",
+        optimizer="pso",
+        budget=2000,
+        frequency_swing=0.0,
+        unbalance=0.0,
+        progress=False,
     )
     planned = public.plan(recorded(0.4), model="third_order_exponential", parameter="M")
     assert fit.grade == "adequate"

@@ -42,6 +42,7 @@ def fit(end, drift=0.0):
         fixed={"C": TRUTH["C"]},
         optimizer="multistart_least_squares",
         check_intervals=False,
+        unbalance=0.0,  # of a positive sequence that is all there is
         progress=False,
     )
 
@@ -100,6 +101,7 @@ def test_a_dip_while_machines_still_accelerate_is_fitted_with_the_one_before(tmp
         fixed={"C": TRUTH["C"]},
         optimizer="multistart_least_squares",
         check_intervals=False,
+        unbalance=0.0,  # of a positive sequence that is all there is
         progress=False,
     )
     for name in ("T_prime", "X_prime", "M", "T_m"):
@@ -123,6 +125,7 @@ def test_a_held_out_dip_without_steady_state_makes_a_wrong_model_and_no_refusal(
         fixed={"C": 0.9, "X_prime": 0.45, "T_m": 0.9, "M": 0.006, "p_v": 1.2},
         optimizer="multistart_least_squares",
         check_intervals=False,
+        unbalance=0.0,  # of a positive sequence that is all there is
         progress=False,
     )
     assert found.grade == "wrong_model"
