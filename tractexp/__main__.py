@@ -112,9 +112,17 @@ def _print_refusal(sentence: str, code: int = 2) -> int:
     return code
 
 
+def _refuse_command_as_task(arguments: Sequence[str]) -> None:
+    """Raise `UserError` for a task that is a command of its own."""
+    for name in COMMANDS:
+        if f"task={name}" in arguments:
+            raise UserError(f"task={name}: {name} is no task but a command: tractexp {name}")
+
+
 def _dispatch_command(arguments: list[str]) -> int:
     """Run a command beside the tasks, or a task; the exit code."""
     _refuse_credentials(arguments)
+    _refuse_command_as_task(arguments)
     if arguments and arguments[0] in COMMANDS:
         return _command(COMMANDS[arguments[0]], arguments[1:])
     if arguments and _is_file(arguments[0]):

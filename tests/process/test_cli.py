@@ -281,6 +281,7 @@ def test_a_budget_is_spent_to_the_last_simulation(tmp_path):
         (["data=csv", "data.train=[nowhere.csv]"], "nowhere.csv"),
         (["data=csv", f"data.train=[{SHIPPED}]", "data.validate=[nowhere.csv]"], "nowhere.csv"),
         (["task=identfy"], "task=identfy: there is no such choice; did you mean 'identify'?"),
+        (["task=look"], "task=look: look is no task but a command: tractexp look"),
     ],
 )
 def test_bad_input_gets_one_sentence_and_leaves_nothing_behind(arguments, sentence, tmp_path):
