@@ -431,7 +431,7 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
         return [Refit(names, unit, ways[names[0]][len(turns) - 1], 0) for names, unit in wanted]
 
     monkeypatch.setattr(wide_fit, "run_descents", descended)
-    monkeypatch.setattr(wide_fit, "_begun", descended)
+    monkeypatch.setattr(wide_fit, "_begin_fits", descended)
     monkeypatch.setattr(wide_fit, "moved_across", lambda bench, noise, fit, faults: fit.unit)
     ended = wide_fit._in_turns(
         at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None

@@ -72,7 +72,7 @@ def _in_turns(
     """The best of these starts, each moved and descended in turn as long as it gains more than it
     is behind the best; the best first.
     """
-    turning = _begun(context, noise, wanted, faults)
+    turning = _begin_fits(context, noise, wanted, faults)
     ended: list[Refit] = []
     for _ in range(fit_effort.MOST_TURNS):
         moved = [(f.names, moved_across(context, noise, f, faults)) for f in turning]
@@ -165,7 +165,7 @@ def wide_refits(
 
     begun = near(
         each_apart(
-            lambda starts: _begun(context, noise, starts, None), list(wanted), context.effort
+            lambda starts: _begin_fits(context, noise, starts, None), list(wanted), context.effort
         )
     )
     begun = sorted(begun, key=lambda fits: fits[0].cost)[:most]
@@ -182,7 +182,7 @@ def wide_refits(
     )
 
 
-def _begun(
+def _begin_fits(
     context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None
 ) -> list[Refit]:
     """The best starts of one set after a few iterations, of those that promise most by one

@@ -150,7 +150,7 @@ class Noise:
         with np.errstate(over="ignore", invalid="ignore"):
             mixed = self._mix_channels(residuals)
             for e, part in enumerate(drive.parts):
-                self._fast(mixed[:, :, part], valid[:, part], e, rows[:, :, part])
+                self._whiten_fast_noise(mixed[:, :, part], valid[:, part], e, rows[:, :, part])
                 self._shrink(rows[:, :, part], valid[:, part], part, e)
         return rows.reshape(len(rows), math.prod(rows.shape[1:]))  # of no rows, too
 
@@ -310,7 +310,7 @@ class Noise:
         is_plain = self.mix is None or np.array_equal(self.mix, np.eye(self.channels))
         return None if is_plain else self.mix
 
-    def _fast(
+    def _whiten_fast_noise(
         self, mixed: np.ndarray, valid: np.ndarray, event: int, out: np.ndarray
     ) -> np.ndarray:
         """Mixed channels (n, C, samples) of one event without the color of the fast noise, in
@@ -344,7 +344,9 @@ class Noise:
             return None
         if event not in self._shrunk:
             shapes = self._shapes(part, event)
-            self._shrunk[event] = _shrunk(self._fast(shapes, valid, event, np.empty_like(shapes)))
+            self._shrunk[event] = _shrunk(
+                self._whiten_fast_noise(shapes, valid, event, np.empty_like(shapes))
+            )
         return self._shrunk[event]
 
     def _shapes(self, part: slice, event: int) -> np.ndarray:

@@ -110,7 +110,9 @@ def falls(
         below = part < (1 - margin) * reference
         if not below.any():
             level = measure_median(part)
-            if level > (1 + margin) * reference and (swell := _swell(t, U, k, reference, margin)):
+            if level > (1 + margin) * reference and (
+                swell := _find_swell(t, U, k, reference, margin)
+            ):
                 swells.append(swell)
                 k = swell[1]
                 continue
@@ -237,7 +239,7 @@ def sample_noise(x: np.ndarray) -> np.ndarray:
     return np.median(np.abs(np.diff(x)), axis=-1) / 0.6745 / np.sqrt(2)
 
 
-def _swell(
+def _find_swell(
     t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float
 ) -> tuple[int, int] | None:
     """The swell in the block from k on; None where the voltage stays at its new level, or falls

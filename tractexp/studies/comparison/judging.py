@@ -22,9 +22,9 @@ from tractexp.studies.comparison.load import nest_keys
 from tractexp.studies.comparison.overall import (
     Overall,
     Several,
+    describe_limit,
     merge_records,
     rank_on_functions,
-    terms_of,
 )
 from tractexp.studies.comparison.runs import Gathered, SearchRun, gather
 from tractexp.text.progress import count_parts
@@ -63,7 +63,7 @@ def judge_problems(
     comparisons: dict[str, Comparison] = {}
     by_terms: dict[str, dict[str, Comparison]] = {}
     for (data, *_), runs in groups.items():
-        terms = terms_of(runs)
+        terms = describe_limit(runs)
         label = f"{data}, {terms}" if terms else data
         gathered = gather(runs, f"{source} on {label}")
         comparisons[label] = compare_runs(gathered, progress, judging, problem)

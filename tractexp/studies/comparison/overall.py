@@ -50,7 +50,7 @@ class Several:
     notes: tuple[str, ...]
 
 
-def terms_of(runs: Sequence[SearchRun]) -> str:
+def describe_limit(runs: Sequence[SearchRun]) -> str:
     """The limit that ended the searches: "15,000 simulations", "300 iterations", or "" where they
     had none in common.
     """
