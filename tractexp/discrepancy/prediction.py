@@ -253,9 +253,11 @@ def predict(there: Context, fit: Refit) -> PredictedError:
     response = []
     for one, sums in zip(played, block_sums(played, SHARING), strict=True):
         own = noise_variance(one.event) * (one.event.record.samples - one.event.start) / len(sums)
-        # without a steady state all is left, too
-        known = np.nan_to_num(sums[:, 0] + own, nan=np.inf)
-        left.append(np.full(len(sums), np.inf) if one.stalls else known)
+        known = sums[:, 0] + own
+        with np.errstate(over="ignore"):
+            # without a steady state, and of a load that diverges, all is left, too
+            lost = one.stalls or not np.isfinite(known.sum())
+        left.append(np.full(len(sums), np.inf) if lost else known)
         noise.append(np.full(len(sums), own))
         response.append(sums[:, 1])
     stalls = tuple(one.event.record.name for one in played if one.stalls)
