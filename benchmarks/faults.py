@@ -856,6 +856,7 @@ def ready() -> None:
     with light_import():
         import mlflow.pyfunc  # noqa: F401
     import hydra  # noqa: F401
+    import plotly.graph_objects  # noqa: F401
     import scipy.optimize
     import scipy.stats  # noqa: F401
 

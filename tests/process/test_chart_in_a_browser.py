@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from browser import BROWSER, Worked, drawn
 
-from tractexp.blocks import Report
+from tractexp.blocks import Report, plotly
 from tractexp.blocks.block import Markup
 from tractexp.blocks.chart import Chart
+from tractexp.blocks.chart_script import script
 
 BLUE = "#0072B2"
 
@@ -58,7 +59,7 @@ def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no browser")
-def test_lines_a_band_and_bars_are_drawn(tmp_path):
+def test_a_chart_is_drawn_by_the_parts_of_the_library_as_by_the_whole(tmp_path, monkeypatch):
     x = np.linspace(0, 1, 50)
     chart = (
         Chart("t [s]", ["U", "P"])
@@ -67,12 +68,18 @@ def test_lines_a_band_and_bars_are_drawn(tmp_path):
         .edge(0.2)
     )
     bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE)
-    dom, complaints = drawn(Report("charts").charts([chart, bars], "two"), tmp_path)
-    shown = re.sub(r"(?s)<script>.*?</script>", "", dom)
-    assert complaints == []
-    assert len(re.findall(r'class="trace scatter', shown)) == 3  # one line, two sides
-    assert len(re.findall(r'class="js-fill"', shown)) == 2  # the band and its mark in the legend
-    assert len(re.findall(r'<g class="point">', shown)) == 2
+    page, drawings = Report("charts").charts([chart, bars], "two"), []
+    whole = plotly.library().read_text(encoding="utf-8")
+    for code in (plotly.code(), whole):
+        monkeypatch.setattr(plotly, "code", lambda code=code: code)
+        monkeypatch.setattr(plotly, "digest", lambda code=code: f"{len(code)} letters")
+        script.cache_clear()
+        dom, complaints = drawn(page, tmp_path)
+        assert complaints == []
+        drawings.append(re.findall(r' d="([^"]+)"', re.sub(r"(?s)<script>.*?</script>", "", dom)))
+    script.cache_clear()
+    assert len(drawings[0]) > 20
+    assert drawings[0] == drawings[1]
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no browser")

@@ -19,7 +19,7 @@ if not (ROOT / "setup.py").is_file():
 
 TOP = ("pyproject.toml", "setup.py", "README.md", "LICENSE")
 FOLDERS = ("tractexp", "conf", "plugins")
-KINDS = {".py", ".yaml", ".csv", ".json", ".cfg", ".dat", ".css", ".js", ".typed", ".LICENSE"}
+KINDS = {".py", ".yaml", ".csv", ".json", ".cfg", ".dat", ".css", ".js", ".typed"}
 
 
 def tree(folder: Path, mode: int, seconds: float) -> Path:

@@ -332,6 +332,10 @@ READ = {
         "read_text": "installed files",
         "yaml.safe_load": "installed files",
     },
+    "tractexp/blocks/plotly.py": {
+        "read_text": "an installed file",
+        "read_bytes": "installed files",
+    },
     "tractexp/cache/texts.py": {"read_bytes": "code"},
     "tractexp/cache/provenance.py": {"read_bytes": "code"},
     "tractexp/model/model.py": {"json.loads": "the store, whose entries are its own"},

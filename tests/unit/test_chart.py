@@ -8,20 +8,9 @@ import numpy as np
 import pytest
 from pages import charts, unpacked
 
-from tractexp.blocks import Report
 from tractexp.blocks.chart import MOST_LINE_POINTS, Chart
 
 BLUE = "#0072B2"
-
-
-def test_a_page_with_charts_is_small_and_one_without_carries_no_library(tmp_path):
-    chart = Chart("t", ["y"]).line("y", np.arange(3), np.arange(3), BLUE)
-    with_chart = Report("charts").chart(chart, "one").save(tmp_path / "charts.html")
-    without = Report("words").text("none").save(tmp_path / "words.html")
-    assert with_chart.stat().st_size < 6e5
-    assert without.stat().st_size < 2e4
-    assert "Plotly, Inc., MIT license" in with_chart.read_text(encoding="utf-8")
-    assert "Plotly" not in without.read_text(encoding="utf-8")
 
 
 def test_a_curve_keeps_every_value_and_its_gaps():

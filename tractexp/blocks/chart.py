@@ -1,9 +1,9 @@
 """Charts that let one look: zoomed by dragging, told by hovering, saved as SVG from their corner,
 printed as drawn.
 
-A `Chart` is data and layout for Plotly.js (MIT), whose published bundle of the basic kinds a page
-that has a chart takes along; `chart.js` draws it. Nothing is drawn here, so that a page costs
-milliseconds.
+A `Chart` is data and layout for Plotly.js (MIT), which the package plotly carries and a page that
+has a chart takes along; `chart.js` draws it. Nothing is drawn here and that package is not
+imported, so that a page costs milliseconds.
 """
 
 from collections.abc import Sequence

@@ -5,6 +5,7 @@ import functools
 import gzip
 import json
 
+from tractexp.blocks import plotly
 from tractexp.cache import store
 from tractexp.storage import files
 
@@ -24,15 +25,13 @@ MOST_DRAWN_POINTS = 2000
 
 @functools.cache
 def script() -> str:
-    """The JavaScript that a page with charts holds once: a license line, and Plotly.js (the
-    bundle that its makers publish of lines, bars and pies) and our `chart.js`, compressed, with
-    what unpacks and runs them.
+    """The JavaScript that a page with charts holds once: a license line, and Plotly.js and our
+    `chart.js`, compressed, with what unpacks and runs them.
     """
-    library = files.read_packaged_text("blocks/plotly-basic.min.js")
     drawing = files.read_packaged_text("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
     drawing = drawing.replace("PAPER", str(PAPER)).replace("SHOWN", str(MOST_DRAWN_POINTS))
     program = store.TEXTS.get(
-        store.key("charts", library, drawing), lambda: pack_program(library + drawing)
+        store.key("charts", plotly.digest(), drawing), lambda: pack_program(plotly.code() + drawing)
     )
     return "\n".join(
         [files.read_packaged_text("blocks/unpack.js"), LICENSE, f'run("{program.decode()}");']
