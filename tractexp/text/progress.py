@@ -10,7 +10,7 @@ import itertools
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
@@ -150,31 +150,31 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
         with _live(columns, total) as update:
             yield lambda: update(advance=1)
         return
-    pace, moments = Pace(), list[float]()
+    pace, done, first = Pace(), 0, 0.0
 
     def count() -> None:
-        moments.append(time.perf_counter())
-        done = len(moments)
+        nonlocal done, first
+        done, first = done + 1, first or time.perf_counter()
         if pace() and done < total:
-            log(f"  {done} of {total} {what}{describe_rate(moments, total)}")
+            # by what came after the first one, before which workers start
+            rate = describe_rate(time.perf_counter() - first, done - 1, total - 1)
+            log(f"  {done} of {total} {what}{rate}")
 
     yield count
 
 
-def describe_rate(moments: Sequence[float], total: int) -> str:
-    """The end of a progress line: how fast parts end and the time that the rest of `total` takes,
-    by the moments [s] when parts ended; "" after the first one, before which workers start.
+def describe_rate(spent: float, done: int, total: int) -> str:
+    """The end of a progress line: how fast parts end, of which so many of `total` took `spent` [s],
+    and the time that the rest takes; "" before the first one.
 
     Examples
     --------
-    >>> describe_rate([12.0, 13.0, 14.0], 5)
+    >>> describe_rate(2.0, 2, 4)
     ', 1 a second, about 2 s left'
     """
-    spent = moments[-1] - moments[0]
-    if spent <= 0:
+    if not done or spent <= 0:
         return ""
-    rate = (len(moments) - 1) / spent
-    return f", {rate:.2g} a second, about {(total - len(moments)) / rate:.0f} s left"
+    return f", {done / spent:.2g} a second{describe_remaining_time(spent, done / total)}"
 
 
 def counter(what: str, progress: Progress = None) -> Callable[[int], Counting]:
