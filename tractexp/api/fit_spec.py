@@ -13,9 +13,8 @@ from tractexp.identification.search import SearchResult
 from tractexp.identification.unrecorded_input import (
     FREQUENCY_SWING,
     UNBALANCE,
-    UnrecordedFrequency,
     UnrecordedInput,
-    UnrecordedUnbalance,
+    list_unrecorded_inputs,
 )
 from tractexp.text.progress import Progress, tell
 
@@ -32,7 +31,7 @@ class FitSpec(Setup):
     @property
     def unrecorded_inputs(self) -> list[UnrecordedInput]:
         """What records may lack, and how far it may have strayed."""
-        return [UnrecordedFrequency(self.frequency_swing), UnrecordedUnbalance(self.unbalance)]
+        return list_unrecorded_inputs(self.frequency_swing, self.unbalance)
 
     def search_end(self, progress: Progress) -> SearchResult:
         """Where the search ends; raises `UserError` where the input is wrong, before anything is

@@ -96,8 +96,7 @@ def _put_options_first(arguments: Iterable[str]) -> list[str]:
         else:
             raise UserError(
                 f"{option:.80}: there is no such option"
-                f"{list_allowed(option, (*TAKING, *INFO, *FLAGS))};"
-                " settings are KEY=VALUE"
+                f"{list_allowed(option, (*TAKING, *INFO, *FLAGS))}; settings are KEY=VALUE"
             )
     return [*options, *settings]
 

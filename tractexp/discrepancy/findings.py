@@ -35,7 +35,7 @@ from tractexp.discrepancy.rest import Rest, find_shapes, share_of
 from tractexp.identification.conclude import at_bound
 from tractexp.identification.grade import GradedModel
 from tractexp.identification.unrecorded_course import find_course
-from tractexp.identification.unrecorded_input import UnrecordedFrequency, UnrecordedUnbalance
+from tractexp.identification.unrecorded_input import list_unrecorded_inputs
 from tractexp.identification.verdict import UNIDENTIFIED, size
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.catalogue import Catalogue
@@ -327,7 +327,7 @@ class Findings:
         if self.verdict.word != UNEXPLAINED:
             return {}
         uncertainty, courses = self.base_grade.uncertainty, list[dict[str, Any]]()
-        for missing in (UnrecordedFrequency(), UnrecordedUnbalance()):
+        for missing in list_unrecorded_inputs():
             if missing.is_unknown(uncertainty.likelihood.problem):
                 course = find_course(uncertainty, missing)
                 courses += [course | {"remedy": missing.remedy}] if course else []

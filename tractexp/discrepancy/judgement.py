@@ -70,8 +70,8 @@ def assessment(candidate: Candidate, score: Score, critical: float) -> tuple[str
     if score.p < critical:
         return (
             "relevant",
-            f"its score stands out: chance gives as much with a probability of "
-            f"{format_probability(score.p)}",
+            "its score stands out: chance gives as much with a probability of"
+            f" {format_probability(score.p)}",
         )
     if not np.isfinite(deviation):
         return "not testable", "these events cannot show it"

@@ -42,8 +42,7 @@ def check_window(window: object, domain: str) -> None:
     if isinstance(window, str):
         raise UserError(
             f"{MODEL.window}={window}: there is no such window"
-            f"{list_allowed(window, names)}; or give"
-            " seconds"
+            f"{list_allowed(window, names)}; or give seconds"
         )
     if (
         isinstance(window, bool)

@@ -69,8 +69,7 @@ def spell_key(name: str) -> str:
     if plain not in spellings:
         raise UserError(
             f"{DATA.columns} names '{name}'"
-            f"{list_allowed(str(name), CONTRACT, 'Keys')}, or ua, ub, uc, ia,"
-            " ib, ic"
+            f"{list_allowed(str(name), CONTRACT, 'Keys')}, or ua, ub, uc, ia, ib, ic"
         )
     return spellings[plain]
 

@@ -166,5 +166,12 @@ class UnrecordedUnbalance(UnrecordedInput):
         return self.size * fall[None]
 
 
+def list_unrecorded_inputs(
+    frequency_swing: float = FREQUENCY_SWING, unbalance: float = UNBALANCE
+) -> list[UnrecordedInput]:
+    """All inputs that records may lack, straying so far."""
+    return [UnrecordedFrequency(frequency_swing), UnrecordedUnbalance(unbalance)]
+
+
 def _since_dip(event: Event) -> np.ndarray:
     return np.maximum(event.record.t - event.t_start, 0.0)

@@ -21,10 +21,9 @@ def places(page: Report, findings: Findings) -> None:
         best, alpha = first.scores[0], findings.context.criteria.naming_false_alarms
         text += (
             f" The effect that promises most in one linear step, {best.name}, would lower the"
-            f" deviance by {best.drop:.1f}, with a probability of "
-            f"{format_probability(best.p)} by chance;"
-            f" chance gives less than "
-            f"{format_probability(first.chance.critical_p(alpha))} to the best of all"
+            f" deviance by {best.drop:.1f}, with a probability of"
+            f" {format_probability(best.p)} by chance; chance gives less than"
+            f" {format_probability(first.chance.critical_p(alpha))} to the best of all"
             f" candidates in {alpha:.0%} of cases."
         )
     page.text(text)

@@ -34,8 +34,8 @@ def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> li
 def chance(p: float) -> str:
     """How often noise gives as much, as a clause."""
     return (
-        f"noise gives the best of the whole library as much with a probability of "
-        f"{format_probability(p)}"
+        "noise gives the best of the whole library as much with a probability of"
+        f" {format_probability(p)}"
     )
 
 
