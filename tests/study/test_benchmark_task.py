@@ -12,9 +12,8 @@ import pytest
 from command_line import run_command
 from pages import read
 
-from tractexp.configuration.plugin import build
-from tractexp.errors import UserError
-from tractexp.identification.search import Limits, search
+from tractexp.extend import UserError, build
+from tractexp.extend.search import Limits, search
 from tractexp.studies.api.benchmark import BenchmarkResult
 from tractexp.studies.bbob import page as report
 from tractexp.studies.bbob import runs as bbob

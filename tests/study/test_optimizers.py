@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import tractexp_plugins.optimizers as folder
-from tractexp.configuration.plugin import build, discover, make_schema
-from tractexp.errors import UserError
-from tractexp.identification.optimizer import REFUSED, Box
-from tractexp.identification.search import Limits, search
+from tractexp.configuration.plugin import discover, make_schema
+from tractexp.extend import REFUSED, Box, UserError, build
+from tractexp.extend.search import Limits, search
 
 CONF = Path(__file__).parents[2] / "conf"
 NAMES = sorted(

@@ -10,18 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tractexp.configuration.plugin import build
-from tractexp.errors import UserError
-from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identification.polish import (
+from tractexp.extend import REFUSED, Box, Evaluate, Optimizer, UserError, build
+from tractexp.extend.search import (
     LEAST_START_DISTANCE,
-    Elite,
-    _Residuals,
-    least_squares_from,
+    History,
+    Limits,
+    best_distinct,
     race,
+    search,
 )
-from tractexp.identification.search import Limits, search
-from tractexp.parameter import best_distinct
+from tractexp.identification.polish import Elite, _Residuals, least_squares_from
+from tractexp.identification.result import parse_history, write_history
 from tractexp.text import progress
 
 LOWER, UPPER = np.array([-2.0, 0.5, 100.0]), np.array([3.0, 0.75, 900.0])
@@ -368,3 +367,15 @@ def test_polish_of_a_problem_without_residuals_says_so():
             build("optimizer", {"name": "random_search", "iterations": 1, "polish": True}),
             0,
         )
+
+
+def test_a_history_is_read_as_it_was_written_and_one_without_rows_is_none(tmp_path):
+    """Without a warning: it is read in a thread, whose filters are those of all threads."""
+    history = History(np.array([10, 20]), np.array([0.5, 0.25]), np.zeros((2, 1)), np.ones(2))
+    text = write_history(tmp_path / "history.csv", history).read_text()
+    simulations, seconds, objective = parse_history(text)
+    assert (simulations.tolist(), seconds.tolist()) == ([10, 20], [1, 1])
+    assert objective.tolist() == [0.5, 0.25]
+    for without_rows in ("", text.partition("\n")[0] + "\n\n"):
+        with pytest.raises(ValueError, match="no row"):
+            parse_history(without_rows)

@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tractexp.configuration.plugin import build
-from tractexp.identification.optimizer import Box
-from tractexp.identification.search import Limits, search
+from tractexp.extend import Box, build
+from tractexp.extend.search import Limits, search
 from tractexp_plugins.optimizers import _sparrow as sparrow
 from tractexp_plugins.optimizers import covariant_sparrow as covariant
 from tractexp_plugins.optimizers import issa

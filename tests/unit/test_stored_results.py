@@ -11,8 +11,6 @@ import pytest
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.identification.result import load, parse_history, write_history
-from tractexp.identification.search import History
 from tractexp.tracking.model import Predictor, _load_pyfunc
 
 SENTENCES = {
@@ -44,7 +42,7 @@ SENTENCES = {
 @pytest.mark.parametrize("name", SENTENCES)
 def test_a_result_that_is_none_is_a_sentence(name, tmp_path):
     path = hostile.INPUTS[name](tmp_path / name)
-    for read in (tractexp.load, load, lambda p: _load_pyfunc(str(p))):
+    for read in (tractexp.load, lambda p: _load_pyfunc(str(p))):
         with pytest.raises(UserError) as caught:
             read(path)
         assert "\n" not in str(caught.value)
@@ -60,7 +58,7 @@ def sound(tmp_path):
 
 
 def test_a_sound_one_is_read_without_a_word(sound):
-    assert tractexp.load(sound).result.parameters == load(sound).parameters == hostile.MOTOR
+    assert tractexp.load(sound).result.parameters == hostile.MOTOR
 
 
 def test_values_outside_their_bounds_are_said(tmp_path):
@@ -78,7 +76,7 @@ def test_nulls_that_stand_for_numbers_of_no_model_are_read(tmp_path):
         hostile.result(epsilon_q=None, standard_errors={"C": None}, intervals={"C": [None, 1.0]})
     )
     path.write_text(json.dumps(content))
-    assert np.isnan(load(path).epsilon_q)
+    assert np.isnan(tractexp.load(path).result.epsilon_q)
 
 
 T = np.arange(100) / 100
@@ -109,7 +107,7 @@ def test_what_is_no_signal_is_a_sentence(sentence, sound):
 
 def test_a_column_that_is_missing_is_named(sound):
     with pytest.raises(UserError, match="the data lack a column U"):
-        Predictor(load(sound)).predict(pd.DataFrame({"t": T}))
+        Predictor(tractexp.load(sound).result).predict(pd.DataFrame({"t": T}))
 
 
 @pytest.mark.parametrize("power", [{"P0": float("nan")}, {"Q0": float("inf")}])
@@ -119,19 +117,7 @@ def test_a_power_that_is_no_number_is_a_sentence(power, sound):
 
 
 def test_a_prediction_is_finite_and_as_before(sound):
-    answer = Predictor(load(sound)).predict(pd.DataFrame(DIP))
+    answer = Predictor(tractexp.load(sound).result).predict(pd.DataFrame(DIP))
     assert np.isfinite(answer.to_numpy()).all()
     assert answer["P"][0] == pytest.approx(0.8)
     assert np.array_equal(answer["P"], tractexp.load(sound).predict(**DIP).P)
-
-
-def test_a_history_is_read_as_it_was_written_and_one_without_rows_is_none(tmp_path):
-    """Without a warning: it is read in a thread, whose filters are those of all threads."""
-    history = History(np.array([10, 20]), np.array([0.5, 0.25]), np.zeros((2, 1)), np.ones(2))
-    text = write_history(tmp_path / "history.csv", history).read_text()
-    simulations, seconds, objective = parse_history(text)
-    assert (simulations.tolist(), seconds.tolist()) == ([10, 20], [1, 1])
-    assert objective.tolist() == [0.5, 0.25]
-    for without_rows in ("", text.partition("\n")[0] + "\n\n"):
-        with pytest.raises(ValueError, match="no row"):
-            parse_history(without_rows)
