@@ -1,20 +1,18 @@
-"""What no load is, is said of an estimate wherever it is graded: its division, and swings that
-count as noise.
+"""What no load is, is said of an estimate: its division, by `doubt_division`, and swings that count
+as noise.
 """
 
 import numpy as np
 import pytest
 
 import tractexp
-from tractexp.identification.division import doubt_division, doubt_estimate
-from tractexp.identification.grade import grade_model
-from tractexp.inference.problem import Problem
+from tractexp.identification.division import doubt_division
 
 TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3}
 
 
-def problem(swing=0.0, **truth):
-    """A dip of a load whose P swings at 18.5 Hz, with noise of 0.1 %; all but T_m is fixed."""
+def fit(swing=0.0, **truth):
+    """The fit of a load whose P swings at 18.5 Hz, with noise of 0.1 %; all but T_m is fixed."""
     values = TRUTH | truth
     made = tractexp.simulate(
         tractexp.compose(), values, depth=0.3, duration=0.2, rate=400.0, length=2.0
@@ -22,9 +20,14 @@ def problem(swing=0.0, **truth):
     r = made.responses[0]
     draws = 1e-3 * np.random.default_rng(0).standard_normal((2, len(r.t)))
     P = r.P * (1 + swing * np.sin(2 * np.pi * 18.5 * r.t)) + draws[0]
-    [event] = tractexp.read({"t": r.t, "U": r.U, "P": P, "Q": r.Q + draws[1]})
-    fixed = {name: value for name, value in values.items() if name != "T_m"}
-    return Problem(tractexp.compose().model, [event], fixed=fixed)
+    return tractexp.identify(
+        {"t": r.t, "U": r.U, "P": P, "Q": r.Q + draws[1]},
+        fixed={name: value for name, value in values.items() if name != "T_m"},
+        bounds={"T_m": (0.3, 2.0)},
+        optimizer={"name": "multistart_least_squares", "starts": 2},
+        check_intervals=False,
+        progress=False,
+    )
 
 
 @pytest.mark.parametrize(
@@ -44,13 +47,14 @@ def test_a_division_that_no_load_has_is_doubted(motor, said):
 
 
 def test_an_estimate_is_doubted_by_its_own_steady_state():
-    made = problem(X_prime=0.1)
-    assert doubt_estimate(made, np.array([0.55])) == ""
-    assert "the motor draws 1.9 pu of a load of" in doubt_estimate(made, np.array([1.9]))
+    drawing = fit(X_prime=0.1, T_m=1.9)
+    assert "the motor draws 1.9 pu of a load of" in drawing.operating_point.doubt
+    assert "physical=True" in drawing.advice[-1]
 
 
 def test_the_grade_says_that_a_swing_counts_as_noise():
-    sentence = grade_model(problem(swing=0.03), searched=np.array([0.5])).adequacy.sentence
+    swinging, quiet = fit(swing=0.03), fit()
+    sentence = swinging.result.adequacy["sentence"]
     assert "what counts as noise is a swing of the load as well: P swings at 18.5 Hz by" in sentence
-    quiet = grade_model(problem(), searched=np.array([0.5])).adequacy.sentence
-    assert "swing" not in quiet
+    assert "swing" not in quiet.result.adequacy["sentence"]
+    assert quiet.operating_point.doubt == ""

@@ -1,8 +1,9 @@
-"""Weak priors: what machines usually are holds what records do not tell, and moves nothing that
-they do.
+"""Weak priors, by `departures` and `held_to_usual`: what machines usually are holds what records do
+not tell, and moves nothing that they do.
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +12,17 @@ import tractexp
 from tractexp.configuration.plugin import get
 from tractexp.identification.estimate import held_to_usual
 from tractexp.inference.blocks import blocks_of
+from tractexp.inference.catalogue import catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
+from tractexp.inference.effort import Effort
 from tractexp.inference.least_squares import descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.prior import departures, held_in_words
 from tractexp.inference.problem import Problem
+from tractexp.inference.records import Records
 from tractexp.inference.sandwich import scatter
+from tractexp.noise import Noise
 
 # R_s, X_s, X_m, R_r, X_r, H, load factor of the seven types of the source
 TYPES = (
@@ -124,3 +131,46 @@ def test_a_block_of_samples_counts_as_one_row_of_the_prior(problem):
         held.of_records.rows(np.full((1, 5), 0.4)).tolist()
         == squares.rows(np.full((1, 5), 0.4)).tolist()
     )
+
+
+def read_contactors():
+    """Two dips that the plain model misses by far, and the model that is asked of them."""
+    folder = Path(tractexp.__file__).parent / "data"
+    dips = [tractexp.read(folder / f"contactors_{depth}pct.csv")[0] for depth in (50, 30, 65)]
+    return dips, tractexp.compose().with_(priors=True)
+
+
+def test_an_investigation_holds_the_motor_by_the_rows_of_an_identification():
+    """Eq. (8) with what machines usually are: the same rows at the same parameters."""
+    dips, model = read_contactors()
+    lacks = catalogue(model.model, dips, ["stator_resistance"])
+    records = Records.from_events(dips)
+    context = Context.from_records(
+        model.model, lacks, records, {}, {}, Criteria(), Effort(), None, priors=True
+    ).with_measured_power.held_to_usual
+    squares = held_to_usual(Likelihood.of_squares(context.kernels.bare, 0.02))
+    at, free = context.coordinates, np.linspace(0.3, 0.6, squares.free)[None]
+    unit = at.null[None].copy()
+    unit[:, at.base] = free
+    level = Noise(Noise.white(0.02, 0.02).pairs, np.eye(2))
+    ours, theirs = context.rows(unit, level, (), [()]), squares.rows(free)
+    assert context.prior > 1
+    assert ours.shape == theirs.shape
+    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+    held = squares.prior_rows(free)
+    np.testing.assert_allclose(ours[:, -held.shape[1] :], held)
+
+
+def test_an_investigation_without_priors_or_motor_has_no_such_rows():
+    dips, model = read_contactors()
+    context = Context.from_records(
+        model.model,
+        catalogue(model.model, dips, ["stator_resistance"]),
+        Records.from_events(dips),
+        {},
+        {},
+        Criteria(),
+        Effort(),
+    )
+    assert context.held_to_usual is context
+    assert context.prior == 0.0

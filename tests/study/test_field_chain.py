@@ -10,10 +10,7 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.api.compose import model_of
 from tractexp.filetypes import comtrade
-from tractexp.identification.fit import respond
-from tractexp.inference.problem import Problem
 from tractexp.record.window import average, sharpen_voltage
 
 DATA = Path(tractexp.__file__).parent / "data"
@@ -21,17 +18,13 @@ NAMES = ("tibet_30pct", "tibet_50pct", "tibet_65pct")
 
 
 def test_a_model_is_looked_at_through_the_window_where_it_follows_what_happens_within():
-    """Simulate, a problem and its least squares alike; the third order and a record without window
-    are left alone.
-    """
+    """The third order and a record without window are left alone."""
     [event] = tractexp.read("tibet_50pct_comtrade")
     bare = replace(event, record=replace(event.record, window=None))
     for name, looked in (("third_order_exponential", False), ("fifth_order_stator_flux", True)):
-        model = model_of(name).model
-        values = np.array([p.default for p in model.parameters])
-        seen, plain = (respond(model, values, e, "train").P for e in (event, bare))
-        assert bool(Problem(model, [event], substeps=4).drive.windows) == looked
-        assert not Problem(model, [bare], substeps=4).drive.windows
+        load = tractexp.compose(model=name)
+        values = {p.name: p.default for p in load.model.parameters}
+        seen, plain = (tractexp.simulate(load, values, records=[e]).P for e in (event, bare))
         assert (np.abs(seen - plain).max() > 1e-3) == looked
 
 

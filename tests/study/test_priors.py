@@ -4,19 +4,10 @@ moves.
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 import wave_records as waves
 
 import tractexp
-from tractexp.identification.estimate import held_to_usual
-from tractexp.inference.catalogue import catalogue
-from tractexp.inference.context import Context
-from tractexp.inference.criteria import Criteria
-from tractexp.inference.effort import Effort
-from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.records import Records
-from tractexp.noise import Noise
 
 STATION = Path(__file__).parents[3] / "shared" / "data" / "dfr220kv-shandong" / "xtz.cfg"
 LOADS = {
@@ -78,42 +69,6 @@ def contactors(**known):
     folder = Path(tractexp.__file__).parent / "data"
     dips = [tractexp.read(folder / f"contactors_{depth}pct.csv")[0] for depth in (50, 30, 65)]
     return dips, tractexp.compose().with_(priors=True, **known)
-
-
-def test_an_investigation_holds_the_motor_by_the_rows_of_an_identification():
-    """Eq. (8) with what machines usually are: the same rows at the same parameters."""
-    dips, model = contactors()
-    lacks = catalogue(model.model, dips, ["stator_resistance"])
-    records = Records.from_events(dips)
-    context = Context.from_records(
-        model.model, lacks, records, {}, {}, Criteria(), Effort(), None, priors=True
-    ).with_measured_power.held_to_usual
-    squares = held_to_usual(Likelihood.of_squares(context.kernels.bare, 0.02))
-    at, free = context.coordinates, np.linspace(0.3, 0.6, squares.free)[None]
-    unit = at.null[None].copy()
-    unit[:, at.base] = free
-    level = Noise(Noise.white(0.02, 0.02).pairs, np.eye(2))
-    ours, theirs = context.rows(unit, level, (), [()]), squares.rows(free)
-    assert context.prior > 1
-    assert ours.shape == theirs.shape
-    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
-    held = squares.prior_rows(free)
-    np.testing.assert_allclose(ours[:, -held.shape[1] :], held)
-
-
-def test_an_investigation_without_priors_or_motor_has_no_such_rows():
-    dips, model = contactors()
-    context = Context.from_records(
-        model.model,
-        catalogue(model.model, dips, ["stator_resistance"]),
-        Records.from_events(dips),
-        {},
-        {},
-        Criteria(),
-        Effort(),
-    )
-    assert context.held_to_usual is context
-    assert context.prior == 0.0
 
 
 @pytest.mark.long
