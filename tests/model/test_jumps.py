@@ -1,5 +1,5 @@
-"""What a recorder's filter makes of a jump lies within what is left open there; nothing is where
-nothing jumps.
+"""What a recorder's filter makes of a jump lies within what `_at_jumps` leaves open there; nothing
+is where nothing jumps.
 """
 
 import numpy as np

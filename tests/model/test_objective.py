@@ -1,4 +1,4 @@
-"""Losses, weights, gaps and parameters per event: what the search minimizes."""
+"""What a search minimizes, by `Problem`: losses, weights, gaps and parameters per event."""
 
 from dataclasses import replace
 from pathlib import Path

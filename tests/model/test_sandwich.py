@@ -1,5 +1,5 @@
-"""The scatter of least squares where what is left is no noise: by its formula, by refits, and by
-how often it holds.
+"""The scatter of least squares where what is left is no noise, by `scatter` and `conclude`: against
+its formula, refits, and how often its intervals hold.
 """
 
 import numpy as np

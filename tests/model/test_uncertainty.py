@@ -1,4 +1,6 @@
-"""Noise, information, verdicts: analytic cases, known symmetries, planted noise, planted faults."""
+"""Noise, information and verdicts, by `conclude`, `judge` and `compare_events`: analytic cases,
+known symmetries, planted noise, planted faults.
+"""
 
 import json
 from dataclasses import replace

@@ -1,5 +1,5 @@
-"""Every decision threshold decides: each has a case that its default settles one way and a looser
-one the other.
+"""Every threshold of `Criteria` decides: each has a case that its default settles one way and a
+looser one the other.
 """
 
 import dataclasses

@@ -1,5 +1,5 @@
-"""The decision by itself: numbers in, a word out, as docs/missing-effects.md has it for a reader
-with a pencil.
+"""The decision by itself, `decide`: numbers in, a word out, as docs/missing-effects.md has it for a
+reader with a pencil.
 """
 
 import re

@@ -1,5 +1,5 @@
-"""The investigation: what is planted is named, what is not there is not, and the linear algebra
-behind it is right.
+"""The investigation, `investigate`: what is planted is named, what is not there is not, and the
+linear algebra behind it is right.
 
 Records come from the independent generator of `tests/oracle/hidden_effects`; only a few effects are
 tested against each other here, so that the tests stay short. The study over the whole catalogue is

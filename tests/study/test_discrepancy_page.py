@@ -1,5 +1,5 @@
-"""The page of an investigation: what one sees first, what explains it, and no sentence against
-another.
+"""The page of what `investigate` found: what one sees first, what explains it, and no sentence
+against another.
 """
 
 import html

@@ -1,5 +1,5 @@
-"""The estimate and its grade: one answer whatever was searched with, silent on noise, outspoken on
-what is missing.
+"""The estimate and its grade, `estimate` and `grade_errors`: one answer whatever was searched with,
+silent on noise, outspoken on what is missing.
 """
 
 import json

@@ -1,5 +1,5 @@
-"""Families of effects: another place or another law is named where the catalogue's leaves
-something, and only there.
+"""Families of effects, as `investigate` names them: another place or another law where the
+catalogue's leaves something, and only there.
 """
 
 import dataclasses

@@ -1,5 +1,5 @@
-"""The judgement set: seeds that nobody chose, tables that hold what is stored, and what others
-would pick.
+"""The judgement set: seeds that nobody chose, tables that hold what is stored, what others would
+pick, and the levels of `Criteria`.
 """
 
 import itertools

@@ -1,5 +1,5 @@
-"""The size of a model's error: known answers, noise and drift told from it, the headline,
-`result.json` and MLflow.
+"""The size of a model's error, `model_error`: known answers, noise and drift told from it, the
+headline, `result.json` and MLflow.
 """
 
 import functools

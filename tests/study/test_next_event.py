@@ -1,5 +1,5 @@
-"""What to record next: the chances are those of the product's own decision, and what is recommended
-ends a tie.
+"""What to record next, `next_event`: the chances are those of the product's own decision, and what
+is recommended ends a tie.
 
 The events come from the independent generator of `tests/oracle/hidden_effects`. The study over many
 ties, which counts how often the predicted chances come true, is `benchmarks/next_event.py`.

@@ -1,5 +1,5 @@
-"""The paper's experiments: numbers by hand, planted verdicts, every experiment and
-part, refusals.
+"""The paper's experiments: numbers by hand (`mean_residual`, `by_depth`), planted verdicts, every
+experiment and part, refusals.
 """
 
 import json
@@ -551,19 +551,14 @@ def test_a_reading_is_the_optimizer_of_its_name(name):
 
 
 def _recipe(motor="electromechanical", shift=0.0, integration="classical", **known):
-    from tractexp.configuration.plugin import build
-    from tractexp.identification.result import parts
-    from tractexp.inference.problem import Problem
-    from tractexp.model.model import compose
+    import tractexp
+    from tractexp.api.setup import Setup
     from tractexp.record import detect
 
-    node = {"motor": {"name": motor}, "static": {"name": "exponential"}, "integration": integration}
-    (record,) = (
-        build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_50pct.csv"]})
-        .read()
-        .train
-    )
-    return Problem(compose(*parts(node)), [detect(replace(record, P=record.P + shift))], **known)
+    (event,) = tractexp.read("tibet_50pct")
+    moved = detect(replace(event.record, P=event.record.P + shift))
+    load = tractexp.compose(motor=motor, static="exponential", integration=integration)
+    return Setup.from_arguments([moved], load, **known).problem
 
 
 def planted(seeds, levels):

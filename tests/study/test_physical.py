@@ -1,4 +1,6 @@
-"""Machines of records from the field are held to what machines are, and what that costs is told."""
+"""Machines of records from the field are held to what machines are, and `say_ranges` tells what
+that costs.
+"""
 
 import functools
 from dataclasses import replace

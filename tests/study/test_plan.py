@@ -1,5 +1,5 @@
-"""Plans: a forecast is what the record then gives, deeper tells more, and the best events are the
-best.
+"""Plans: what `forecast` says is what the record then gives, deeper tells more, and `best_events`
+are the best.
 """
 
 import itertools

@@ -1,5 +1,5 @@
-"""Names by what they predict of held-out events: the rule by itself, and where a model is never
-exact.
+"""Names by what they predict of held-out events: `find_predicting` by itself, and where a model is
+never exact.
 """
 
 import json

@@ -1,5 +1,5 @@
-"""Profiles: a parabola where theory says so, open sides, two minima, better optima, and the
-posterior beside them.
+"""Likelihood along one parameter, `profiles`: a parabola where theory says so, open sides, two
+minima, better optima, and the posterior beside them.
 """
 
 import re

@@ -1,4 +1,6 @@
-"""Starts ranked by one simulation each, as a descent from every one of them would."""
+"""Starts ranked by one simulation each, `select_promising_starts`, as a descent from every one of
+them would.
+"""
 
 import numpy as np
 import pytest

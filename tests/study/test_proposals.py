@@ -1,5 +1,5 @@
-"""A term for what no effect of the catalogue explains: columns, screen, refit, gate, plugin and
-what machines read.
+"""A term for what no effect of the catalogue explains, `propose`: columns, screen, refit, gate,
+plugin and what machines read.
 """
 
 import importlib.util

@@ -1,5 +1,5 @@
-"""Recorders that average phasors over whole cycles: the average, the voltage reckoned back, and
-what is said of it.
+"""Recorders that average phasors over whole cycles, `RecorderWindow`: the average, the voltage
+reckoned back, and what is said of it.
 """
 
 from dataclasses import replace

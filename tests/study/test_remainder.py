@@ -1,4 +1,6 @@
-"""What is left is told by its shape: what is planted comes back, and noise is nothing."""
+"""What is left is told by its shape, `remainders`: what is planted comes back, and noise is
+nothing.
+"""
 
 import numpy as np
 import pytest

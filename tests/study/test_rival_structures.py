@@ -1,5 +1,5 @@
-"""Rival structures: what a stator resistance that is there, or is not, does to the parameters of a
-model without it.
+"""Rival structures, `with_rivals`: what a stator resistance that is there, or is not, does to the
+parameters of a model without it.
 """
 
 from dataclasses import replace
@@ -12,7 +12,13 @@ from hidden_effects import Case, Noise
 from hidden_effects.generator import make, truth
 from tractexp.configuration.plugin import get
 from tractexp.identification.estimate import estimate_without_search
-from tractexp.identification.rivals import RivalStructure, _structures, with_rivals
+from tractexp.identification.rivals import (
+    IDENTIFIED_SHARE,
+    RivalStructure,
+    _find_moved_parameters,
+    _structures,
+    with_rivals,
+)
 from tractexp.identification.verdict import IDENTIFIED, WEAK
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
@@ -97,13 +103,11 @@ def rival(name, T_m, known):
 
 
 def test_a_parameter_that_a_rival_moves_far_is_not_called_identified(missing):
-    from tractexp.identification import rivals as module
-
     known, _ = missing
     known = replace(known, rivals=())
     j = known.names.index("T_m")
     far = rival("other", float(1.5 * known.values[j]), known)
-    told = dict(module._find_moved_parameters(known, replace(known, rivals=(far,))))
+    told = dict(_find_moved_parameters(known, replace(known, rivals=(far,))))
     assert list(told) == ["T_m"]
     assert known.verdicts["T_m"].word == IDENTIFIED
     assert told["T_m"].word == WEAK
@@ -114,16 +118,14 @@ def test_a_parameter_whose_interval_rivals_make_wide_is_not_called_identified(mi
     """Each moves it by a tenth only, but one up and one down: with its scatter that is more than a
     fifth each way.
     """
-    from tractexp.identification import rivals as module
-
     known, _ = missing
     known = replace(known, rivals=())
     j = known.names.index("T_m")
     value = float(known.values[j])
     known = replace(known, profiled=dict(known.profiled) | {"T_m": (0.88 * value, 1.12 * value)})
     rivals = tuple(rival(f"by {share}", share * value, known) for share in (0.9, 1.1))
-    assert dict(module._find_moved_parameters(known, replace(known, rivals=rivals[:1]))) == {}
-    assert module.IDENTIFIED_SHARE == 0.2
-    both = dict(module._find_moved_parameters(known, replace(known, rivals=rivals)))
+    assert dict(_find_moved_parameters(known, replace(known, rivals=rivals[:1]))) == {}
+    assert IDENTIFIED_SHARE == 0.2
+    both = dict(_find_moved_parameters(known, replace(known, rivals=rivals)))
     assert both["T_m"].word == WEAK
     assert known.verdicts["T_m"].word == IDENTIFIED

@@ -1,5 +1,5 @@
-"""The one search loop: clipping, counting, budgets, the best, the history, and the polish it ends
-with.
+"""The one search loop: clipping, counting, budgets, the best, the history of `write_history`, and
+the polish by `least_squares_from` that it ends with.
 """
 
 from collections.abc import Iterator

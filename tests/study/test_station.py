@@ -1,5 +1,5 @@
-"""All loads of a recorder by all dips of its years: constants that all dips share, the share of the
-motors in each, and each dip predicted by those before it.
+"""All loads of a recorder by all dips of its years: constants that all dips share (`fit_dips`), the
+share of the motors in each, and each dip predicted by those before it (`predict_in_turn`).
 """
 
 import copy

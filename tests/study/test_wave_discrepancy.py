@@ -1,5 +1,5 @@
 """An investigation of waveforms: what is planted is named and closes the gap held out, what is not
-there is not.
+there is not; what `next_event` and `propose` make of waveforms.
 
 Records come from the independent generator of `tests/oracle/independent`: other equations, another
 solver, noise of the voltage and of the currents, offsets, quantization.

@@ -1,4 +1,4 @@
-"""A run in waveforms from a shipped record to its page, and what else is done with
+"""A run in waveforms from a shipped record to its page, and what `forecast` and `advise` make of
 what it finds.
 """
 

@@ -1,5 +1,5 @@
 """Waveforms of known truth through the product: a short run of benchmarks/waves.py and
-benchmarks/waves_hidden.py.
+benchmarks/waves_hidden.py, and their noise by `of_waves`.
 
 The generator's equations, frame and solver are its own; it is judged first.
 """

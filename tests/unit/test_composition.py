@@ -1,5 +1,5 @@
-"""How a quantity differs by hour, weekday, season and year: planted differences are found, and
-nothing is found where there is none.
+"""How a quantity differs by hour, weekday, season and year, `estimate_composition`: planted
+differences are found, and nothing is found where there is none.
 """
 
 from datetime import datetime, timedelta

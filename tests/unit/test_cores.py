@@ -1,5 +1,5 @@
-"""Independent items on all cores: forked processes that know all of this one, and tell what they
-spent.
+"""Independent items on all cores, `each_apart`: forked processes that know all of this one, and
+tell what they spent.
 """
 
 import multiprocessing

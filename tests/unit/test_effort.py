@@ -1,4 +1,4 @@
-"""What an investigation says while it works: each step, and that a long one goes on."""
+"""What an investigation says while it works, `Effort`: each step, and that a long one goes on."""
 
 import re
 import time

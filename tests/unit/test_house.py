@@ -150,6 +150,47 @@ def test_one_module_quotes():
     assert imports == set()
 
 
+ENGINE = ("noise", "inference", "identification", "discrepancy")
+
+
+def engine_imports(path: Path) -> dict[str, set[str]]:
+    """{module of the engine: the names that a file imports from it}; a module that is imported as a
+    whole is a name of its room.
+    """
+    found: dict[str, set[str]] = {}
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            pairs = [alias.name.rpartition(".")[::2] for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            pairs = [(node.module or "", alias.name) for alias in node.names]
+        else:
+            continue
+        for module, name in pairs:
+            if f"{module}.{name}.".startswith(tuple(f"tractexp.{room}." for room in ENGINE)):
+                found.setdefault(module, set()).add(name)
+    return found
+
+
+def test_a_test_that_knows_the_engine_says_what_of_it_it_tests():
+    """All else goes through what a user calls, what a plugin imports, or the command line."""
+    silent = set()
+    for path in (ROOT / "tests").rglob("test_*.py"):
+        known = set().union(*engine_imports(path).values())
+        about = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        if known and not known & {*re.findall(r"`(\w+)`", about)}:
+            silent.add(path.name)
+    assert silent == set()
+
+
+def test_no_more_tests_reach_all_over_the_engine():
+    """The analytic test of a function needs few modules. May only fall: move what a test shows of
+    more behind a call of the front door.
+    """
+    files = (ROOT / "tests").rglob("test_*.py")
+    wide = {path.name for path in files if len(engine_imports(path)) > 4}
+    assert len(wide) <= 16, wide
+
+
 @pytest.mark.parametrize(("command", "place"), COMMANDS.items())
 def test_a_command_beside_the_tasks_is_where_the_program_looks_for_it(command, place):
     module, _, function = place.partition(":")

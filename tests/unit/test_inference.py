@@ -1,5 +1,5 @@
-"""The arithmetic that identifications and investigations share: intervals, errors of what is free,
-goodness of fit.
+"""The arithmetic that identifications and investigations share: intervals (`interval_factor`),
+errors of what is free (`free_standard_errors`), goodness of fit (`compare_with_draws`).
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
-"""The best linear network of few poles: planted networks come back, and what is no network is a
-sentence.
+"""The best linear network of few poles, `black_boxes`: planted networks come back, and what is no
+network is a sentence.
 """
 
 from dataclasses import replace

@@ -1,4 +1,6 @@
-"""The band for the next dip: known answers, noise, stalls, and the scatter of parameters."""
+"""The band for the next dip, `measure_band`: known answers, noise, stalls, and the scatter of
+parameters.
+"""
 
 import numpy as np
 import pytest

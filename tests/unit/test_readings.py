@@ -1,4 +1,4 @@
-"""What a shape that is left may be physically: a known shape has its known reading."""
+"""What a shape that is left may be physically, `read_shapes`: a known shape has a known reading."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
-"""Each event left out in turn: the least share of what is expected, of events that noise does not
-hide.
+"""Each event left out in turn, `find_least_share`: the least share of what is expected, of events
+that noise does not hide.
 """
 
 import numpy as np

@@ -1,4 +1,6 @@
-"""Columns that fall apart by event, against the same with every entry written out."""
+"""Columns that fall apart by event, `SeparableColumns`, against the same with every entry written
+out.
+"""
 
 from types import SimpleNamespace
 

@@ -1,5 +1,5 @@
-"""Samples of waveforms by themselves: what is cut out, what is periodic, per unit of what, and
-blocks of residuals.
+"""Samples of waveforms by themselves: what is cut out, what is periodic, per unit of what, and the
+blocks of residuals that `blocks_of` makes.
 """
 
 from types import SimpleNamespace
