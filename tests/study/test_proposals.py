@@ -103,7 +103,8 @@ def searched(made, held, among=FEW, seed=0):
     bare = refit(
         fit.context, first.noise, [((), at.without_faults(first.fit.unit, ()))], faults=()
     )[0]
-    return propose(fit, first, bare, first.noise, held, among)
+    graded = grade_model(Problem(base(), made))
+    return propose(fit, first, bare, first.noise, held, graded, among)
 
 
 @pytest.fixture(scope="module")
@@ -310,7 +311,10 @@ def test_nothing_is_proposed_where_nothing_is_missing():
 
 
 def test_without_a_held_out_event_nothing_is_proposed():
-    assert "none was held out" in propose(SimpleNamespace(context=None), None, None, None, ()).why
+    assert (
+        "none was held out"
+        in propose(SimpleNamespace(context=None), None, None, None, (), None).why
+    )
     assert proposed_in_words(None, "why not") == ["no term is proposed: why not"]
     assert proposed_in_words(None, None) == []
 

@@ -129,7 +129,15 @@ def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_
         ("torque:slip", "torque:slip_squared", "motor:slip", "power:washout", "angle:slip"),
     )
     among = [term(f"answer:{name}") for name in few]
-    proposed = propose(steps.base, steps.first, steps.bare, steps.last.noise, steps.withheld, among)
+    proposed = propose(
+        steps.base,
+        steps.first,
+        steps.bare,
+        steps.last.noise,
+        steps.withheld,
+        steps.base_grade,
+        among,
+    )
     proposal = proposed.proposal
     assert proposal.term.name == "answer:torque:slip"  # the torque falls with the speed
     assert proposal.values["size"] < 0

@@ -227,8 +227,7 @@ class Findings:
     @property
     def window(self) -> float | str | None:
         """The recorder's window that was taken into account, as `model.window` names it."""
-        found = self.context.records.window
-        return self.context.load.window if found is None else found.setting
+        return self.context.window
 
     @property
     def base_grade(self) -> GradedModel:

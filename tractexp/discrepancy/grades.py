@@ -12,9 +12,23 @@ import numpy as np
 
 from tractexp.identification.grade import GradedModel, grade_model
 from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
+from tractexp.noise import Noise
 from tractexp.record import Event
+
+
+def fit_as_graded(context: Context, noise: Noise, graded: GradedModel) -> Refit:
+    """The base model as it is graded, as a fit of a context whose powers before events are those
+    measured: so it has one error, whoever asks.
+    """
+    at = context.coordinates
+    values = dict(zip(graded.problem.space.names, graded.values.tolist(), strict=True))
+    unit = at.place_values(at.null, values)
+    rows = context.rows(unit[None], noise, (), [()])
+    return Refit((), unit, float(np.sum(rows**2)), 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -157,7 +157,7 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grade
     verdict = decide(evidence, criteria)
     is_open = evidence.is_mild or shows_more(evidence, criteria)
     if verdict.word == UNEXPLAINED and validate and not is_open:
-        evidence = predict_held_out(explained, validate, seed) or by_likelihood
+        evidence = predict_held_out(explained, grader, seed) or by_likelihood
     findings = _conclude(explained, by_likelihood, evidence, validate, grader)
     if len(findings.verdict.kept) != 1:
         return findings
@@ -225,7 +225,12 @@ def _proposal(findings: Findings) -> ProposalResult:
     if evidence.is_mild:
         return ProposalResult(why="the held-out events are too mild to show a term")
     return propose(
-        base, explained.steps[0], evidence.base.fit, explained.last.noise, findings.withheld
+        base,
+        explained.steps[0],
+        evidence.base.fit,
+        explained.last.noise,
+        findings.withheld,
+        findings.grader.grade((), base.context.window),
     )
 
 

@@ -8,18 +8,15 @@ they are noise.
 Source: White 1982; Bell and McCaffrey 2002 (CR3), as in `tractexp.inference.sandwich`.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.inference.base_fit import minima_of
 from tractexp.inference.blocks import blocks_of
 from tractexp.inference.chance import chance_at
 from tractexp.inference.context import Context
-from tractexp.inference.fitting import Refit, refit
-from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.fitting import Refit
 from tractexp.inference.linearization import rich_residuals, tangent
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.sandwich import moves_without_blocks, robust_root
@@ -35,36 +32,6 @@ def residual_noise(context: Context, fit: Refit) -> Noise:
     residual = context.residual(fit.unit, fit.names)
     level = float(np.sqrt(np.mean(residual[context.valid] ** 2)))
     return Noise(Noise.white(*[level] * len(residual)).pairs, np.eye(len(residual)))
-
-
-def fit_base(
-    context: Context,
-    noise: Noise,
-    known: Sequence[np.ndarray],
-    faults: Sequence[str] | None = None,
-) -> Refit:
-    """The base model by least squares, from all over its box: an identification ends at the best
-    minimum of Eq. (8), too, which may be another than that of the likelihood.
-
-    Parameters
-    ----------
-    context : Context
-        Whose powers before events are those measured.
-    noise : Noise
-        As of `residual_noise`.
-    known : sequence of (D,) arrays
-        Where other fits ended, from which descents begin, too.
-    faults : names or None
-        Faults of the measurement that are free; None: all.
-
-    Returns
-    -------
-    Refit
-    """
-    squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0])
-    squares = replace(squares, prior=context.prior)
-    units = [*map(context.coordinates.at_measured_power, known), *minima_of(context, squares)]
-    return refit(context, noise, [((), unit) for unit in units], faults)[0]
 
 
 def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:

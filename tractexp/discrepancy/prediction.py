@@ -29,7 +29,8 @@ from tractexp.discrepancy.explanations import (
     wide_starts,
 )
 from tractexp.discrepancy.families import member_fits
-from tractexp.discrepancy.least_squares import fit_base, least_squares_tests, residual_noise
+from tractexp.discrepancy.grades import Grader, fit_as_graded
+from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms
 from tractexp.discrepancy.proposal.library import terms
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, term_fits
@@ -38,11 +39,10 @@ from tractexp.discrepancy.ranking import MOST_NAMED, find_nearest, rank_sets
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Refit, best_of, key_by_names, refit, refit_from
+from tractexp.inference.fitting import Refit, best_of, key_by_names, refit
 from tractexp.inference.model_error import block_sums, noise_variance
 from tractexp.inference.wide_fit import wide_refits
 from tractexp.noise import Noise
-from tractexp.record import Event
 
 MOST_TRIED_FAMILIES = 2  # single effects whose families are tried, and to which a second is added
 CARRIED = 12  # sets of the search by likelihood that are fitted again
@@ -50,15 +50,13 @@ CARRIED = 12  # sets of the search by likelihood that are fitted again
 SHARING = 10.0
 
 
-def predict_held_out(
-    explained: Explanations, events: Sequence[Event], seed: int
-) -> Evidence | None:
+def predict_held_out(explained: Explanations, grader: Grader, seed: int) -> Evidence | None:
     """The table of all sets by what they predict: those kept first, or else the nearest, with their
     tests, then the others. None where noise hides so much of the base model's error there that no
     set could divide it by as much as a name must.
     """
     explained.base.context.effort.say("judging what leaves something on the held-out events")
-    table = predict_errors(explained, events)
+    table = predict_errors(explained, grader)
     if table is None:
         return None
     criteria = explained.last.criteria
@@ -80,21 +78,21 @@ def predict_held_out(
     return replace(table, base=base, rows=rows, others=tuple(others), last=first.tests)
 
 
-def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence | None:
+def predict_errors(explained: Explanations, grader: Grader) -> Evidence | None:
     """The table of single effects, of sets of two, of a third beside the best two, and of what the
     search by likelihood ended with, by the model's error on the held-out events. The powers before
-    events are those measured, as in an identification. Of the base model alone where it leaves less
-    than matters. None as of `predict_held_out`.
+    events are those measured, as in an identification, and the base model is as that estimates it.
+    Of the base model alone where it leaves less than matters. None as of `predict_held_out`.
     """
     plain = explained.base.context.with_measured_power
     context = plain.held_to_usual
     noise = residual_noise(plain, explained.chosen)
     criteria = context.criteria
     family = context.catalogue.textbook
+    bare = fit_as_graded(context, noise, grader.grade((), context.window))
     if context.prior:  # its rows stand beside what the base model leaves, as in an identification
-        start = plain.coordinates.at_measured_power(explained.steps[0].fit.unit)
-        noise = residual_noise(plain, refit_from(plain, noise, (), start, faults=()))
-    there = context.move_to_events(events)
+        noise = residual_noise(plain, bare)
+    there = context.move_to_events(grader.validate)
 
     def fill(fits: Sequence[Refit]) -> list[SetEvidence]:
         predicted = each_apart(functools.partial(predict, there), fits, context.effort)
@@ -108,20 +106,16 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
         fits = refit(context, noise, missing, faults=()) if missing else []
         return replace(table, rows=(*table.rows, *fill(fits)))
 
-    known = explained.steps[0].fit.unit, *explained.base.local_minima
-    bare = fit_base(context, noise, known)
-    (alone,) = fill(_fit_without_faults(context, noise, [bare]))
-    alone = replace(alone, fitted_error=predict(context, alone.fit))
+    (alone,) = fill([bare])
+    alone = replace(alone, fitted_error=predict(context, bare))
     if alone.is_slight:
         return Evidence(alone, (), noise=noise, there=there)
     if alone.held_out_prediction.largest_factor <= criteria.divides:
         return None
     ground, refits = _search_all_sets(context, explained, noise, bare)
-    base, *rows = sorted(
-        fill(_fit_without_faults(context, noise, refits.values())),
-        key=lambda row: bool(row.fit.names),
-    )
-    table = Evidence(base, tuple(rows), noise=noise, there=there)
+    sets = [fit for fit in refits.values() if fit.names]
+    rows = fill(_fit_without_faults(context, noise, sets))
+    table = Evidence(alone, tuple(rows), noise=noise, there=there)
     best = rank_sets(table, criteria)[:1]
     table = complete(table, best)
     if further := search_third(ground, refits, best):
@@ -203,10 +197,13 @@ def _search_all_sets(
     context: Context, explained: Explanations, noise: Noise, bare: Refit
 ) -> tuple[Disagreement, dict[Names, Refit]]:
     """The tests of the base model by least squares, and the best fits of it and of sets of effects,
-    with the faults of the measurement free.
+    with the faults of the measurement free: from where it fits without them, too.
     """
     at = context.coordinates
     say = _say(context)
+    known = explained.steps[0].fit.unit, *explained.base.local_minima
+    starts = [bare.unit, *map(at.at_measured_power, known)]
+    bare = refit(context, noise, [((), start) for start in starts])[0]
     ground = explained.steps[0].score_fit(context, bare, noise)
     refits: dict[Names, Refit] = {(): bare}
 

@@ -70,30 +70,11 @@ def base_fit(context: Context) -> BaseFit:
     BaseFit
     """
     # the first may not stay the best: faults are free
-    minima = minima_of(context, Likelihood.from_problem(context.kernels.bare))
-    return fitted_from(context, minima, minima)
-
-
-def minima_of(context: Context, bare: Likelihood) -> list[np.ndarray]:
-    """The local minima of the base model alone.
-
-    Parameters
-    ----------
-    context : Context
-        Whose coordinates are returned.
-    bare : Likelihood
-        That of the base model, by which the minima are looked for.
-
-    Returns
-    -------
-    list of (D,) arrays
-        The best first, every effect at its null.
-    """
     at = context.coordinates
-    ends = valleys(bare)
+    ends = valleys(Likelihood.from_problem(context.kernels.bare))
     minima = np.tile(at.null, (len(ends), 1))
     minima[:, [*at.base, *at.before]] = ends
-    return list(minima)
+    return fitted_from(context, list(minima), list(minima))
 
 
 def fitted_from(

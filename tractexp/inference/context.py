@@ -172,6 +172,12 @@ class Context:
         """The base model, behind the recorder's window."""
         return self.kernels.family.model
 
+    @property
+    def window(self) -> float | str | None:
+        """The recorder's window that the model is seen through, as `model.window` names it."""
+        found = self.records.window
+        return self.load.window if found is None else found.setting
+
     @functools.cached_property
     def digest(self) -> str:
         """SHA-256 of all that a fit here depends on beside noise and starts; "" where that is not

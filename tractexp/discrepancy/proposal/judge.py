@@ -6,7 +6,7 @@ estimated, and that and chance move it by more than what is missing may do.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,10 +19,12 @@ from tractexp.discrepancy.gap import (
     gap,
     share_gone,
 )
+from tractexp.discrepancy.grades import fit_as_graded
 from tractexp.discrepancy.held_out import carry_fits
-from tractexp.discrepancy.least_squares import fit_base, residual_noise
+from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.proposal.bed import carried_over
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, TermFits
+from tractexp.identification.grade import GradedModel
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit, refit
@@ -121,19 +123,19 @@ def _assess_models(
 
 
 def measure_changes(
-    result: TermFits, fit: Refit, events: Sequence[Event]
+    result: TermFits, fit: Refit, events: Sequence[Event], graded: GradedModel
 ) -> tuple[Change[Curves], Change[Curves]]:
-    """What the base model and that with a term leave of the fitted and of held-out events, both
-    fitted by least squares, as a model is graded.
+    """What the base model, as it is graded, and that with a term leave of the fitted and of
+    held-out events, the latter fitted by least squares.
 
     The term was looked for by the likelihood of the noise, which may give up some of the error in S
     for what is told more surely: by those fits a term that is there may seem to make it worse.
     """
     context = result.context.with_measured_power.held_to_usual
     at = context.coordinates
-    bare, found = (at.without_faults(one.unit, ()) for one in (result.bare, fit))
-    noise = residual_noise(context, replace(result.bare, unit=bare))
-    base = fit_base(context, noise, [bare, at.remove_effects(found, fit.names)], faults=())
+    found = at.without_faults(fit.unit, ())
+    base = fit_as_graded(context, result.noise, graded)
+    noise = residual_noise(context, base)
     nested = found.copy()  # from the base model's, so that the term leaves no more
     nested[at.base] = base.unit[at.base]
     nested[at.sizes(fit.names)] = at.null[at.sizes(fit.names)]

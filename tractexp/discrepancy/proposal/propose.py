@@ -22,6 +22,7 @@ from tractexp.discrepancy.proposal.judge import (
 from tractexp.discrepancy.proposal.library import Term, terms
 from tractexp.discrepancy.proposal.refit import TermFits, standard_errors, term_fits
 from tractexp.discrepancy.proposal.screen import Ground, compute_library_p, screen
+from tractexp.identification.grade import GradedModel
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
@@ -75,10 +76,11 @@ def propose(
     bare: Refit,
     noise: Noise,
     validate: Sequence[Event],
+    graded: GradedModel,
     among: Sequence[Term] = (),
 ) -> ProposalResult:
     """Search a term for what the model lacks; `bare` is the base model's fit, `noise` that of the
-    last tests.
+    last tests, `graded` the base model as it is graded.
 
     `among` are the terms that are tried, by default the whole library.
     """
@@ -110,11 +112,15 @@ def propose(
             f"of the terms tried the best is {result.term(ranked[0].fit).words}, but {objections}",
             tried,
         )
-    return ProposalResult(_proposal(result, first, standing, validate), "", tried)
+    return ProposalResult(_proposal(result, first, standing, validate, graded), "", tried)
 
 
 def _proposal(
-    result: TermFits, first: Disagreement, standing: Sequence[TermAssessment], held: Sequence[Event]
+    result: TermFits,
+    first: Disagreement,
+    standing: Sequence[TermAssessment],
+    held: Sequence[Event],
+    graded: GradedModel,
 ) -> Proposal:
     """The proposal of the best term that stands, with those that it cannot be told from."""
     chosen, *others = standing
@@ -130,7 +136,7 @@ def _proposal(
         term=term,
         estimates=estimates,
         judged=chosen,
-        changes=measure_changes(result, chosen.fit, held),
+        changes=measure_changes(result, chosen.fit, held, graded),
         acting=tuple(_find_acting_places(result, chosen.fit)),
         ties=tuple(
             (result.term(o.fit), o.train.explained_share, o.validate.explained_share)
