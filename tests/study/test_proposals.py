@@ -40,12 +40,14 @@ from tractexp.discrepancy.proposal.propose import propose, to_dict
 from tractexp.discrepancy.proposal.refit import term_fits
 from tractexp.discrepancy.proposal.screen import Ground, compute_library_p, scores, screen
 from tractexp.discrepancy.proposal.wording import proposed_in_words
+from tractexp.identification.grade import grade_model
 from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import refit
+from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records
 from tractexp.model.model import compose
 from tractexp.record import Record, detect
@@ -311,10 +313,8 @@ def test_nothing_is_proposed_where_nothing_is_missing():
 
 
 def test_without_a_held_out_event_nothing_is_proposed():
-    assert (
-        "none was held out"
-        in propose(SimpleNamespace(context=None), None, None, None, (), None).why
-    )
+    given = SimpleNamespace(context=None), None, None, None, (), None
+    assert "none was held out" in propose(*given).why
     assert proposed_in_words(None, "why not") == ["no term is proposed: why not"]
     assert proposed_in_words(None, None) == []
 
