@@ -9,8 +9,8 @@ A set is *kept* by one of two rules.
    best set must divide the error of the base model by `divides`. What all sets share that it does
    not beat is kept if it needs each of its members and has no rival, and if a set of no more
    effects than are named divides so, but not what it leaves by as much again; else the smallest of
-   these sets that needs each of its members, and its rivals. None is kept where a term of the
-   library beats it.
+   these sets that needs each of its members (without one the best leaves `ahead` times less), and
+   its rivals. None is kept where a term of the library beats it.
 
 Several sets kept are tied. One is *named* where an event confirms it that took no part in choosing
 it, or each of several that was left out in turn, where it has one or two effects, whose sizes are

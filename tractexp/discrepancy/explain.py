@@ -300,7 +300,7 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
     labels = join_words(label_effects(near.names, context))
     why = f"a name must divide that by {criteria.divides:g}"
     if compute_factor(near, evidence.base) > criteria.divides:
-        needed = needs_all(near, evidence, criteria)
+        needed = needs_all(near, near, evidence, criteria)
         why = (
             "that may be chance in so few blocks"
             if needed

@@ -25,14 +25,16 @@ def find_leading(evidence: Evidence, criteria: Criteria, factor: float) -> list[
     dividing = [row for row in ahead if compute_factor(row, evidence.base) > factor]
     if not dividing:
         return []
-    alike = [row for row in ahead if not beats(dividing[0], row, criteria)]
+    best = dividing[0]
+    alike = [row for row in ahead if not beats(best, row, criteria)]
     common = frozenset.intersection(*(frozenset(row.family) for row in alike))
     shared = [row for row in ahead if frozenset(row.family) == common][:1]
-    shared = [row for row in shared if needs_all(row, evidence, criteria)]
+    shared = [row for row in shared if needs_all(row, best, evidence, criteria)]
     shared = [row for row in shared if stands_alone(row, dividing, criteria, factor)]
     if shared and not find_rivals(shared[0], ahead, criteria):
         return shared
-    needed = [row for row in dividing if row in alike and needs_all(row, evidence, criteria)]
+    among = [row for row in dividing if row in alike]
+    needed = [row for row in among if needs_all(row, best, evidence, criteria)]
     if not needed:
         return []
     chosen = min(needed, key=lambda row: len(row.fit.names))
@@ -96,13 +98,13 @@ def find_rivals(
     return [row for row in rivals if not any({*r.fit.names} < {*row.fit.names} for r in rivals)]
 
 
-def needs_all(one: SetEvidence, evidence: Evidence, criteria: Criteria) -> bool:
-    """Whether more is left without any of the members of a set, by the factor of a lead, chance
-    aside.
+def needs_all(one: SetEvidence, best: SetEvidence, evidence: Evidence, criteria: Criteria) -> bool:
+    """Whether without any of the members of a set more is left than by the best, by the factor of a
+    lead, chance aside.
     """
     subsets = itertools.combinations(one.fit.names, len(one.fit.names) - 1)
     fewer = [row for row in map(evidence.row_of, subsets) if row is not None]
-    return all(compute_factor(one, row) > criteria.ahead for row in fewer)
+    return all(compute_factor(best, row) > criteria.ahead for row in fewer)
 
 
 def beats(one: SetEvidence, other: SetEvidence, criteria: Criteria) -> bool:
