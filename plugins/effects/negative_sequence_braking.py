@@ -13,7 +13,7 @@ class NegativeSequenceBraking(Effect):
     """Negative-sequence voltage drives a current whose field turns backwards: a torque against, and
     power drawn.
 
-    The rotor slips by nearly 2 against it, so Z_2 = Z' + R_2/2, with R_2 = c X'/(omega_n tau') the
+    The rotor slips by nearly 2 against it, so Z_2 = Z_- + R_2/2, with R_2 = c X'/(omega_n tau') the
     rotor resistance behind the transient reactance:
 
         T_e -> T_e - k_2 dU2^2 R_2/2/|Z_2|^2,   P + j Q -> P + j Q + k_2 dU2^2 Z_2/|Z_2|^2,
@@ -40,12 +40,9 @@ class NegativeSequenceBraking(Effect):
     confused_with = ("second_motor_group", "shunt_capacitor")
 
     def edit(self, eq, negative_sequence):
-        from sympy import I, diff, im, re
+        from sympy import im, re
 
-        if sites.stator_impedance in eq:
-            Z = eq[sites.stator_impedance]
-        else:  # a stator whose flux has dynamics: what its current meets at once
-            Z = eq["R_s"] + I / diff(eq.expression(sites.stator_current), eq["psi"])
+        Z = eq[sites.backward_impedance]
         R_2 = eq[sites.coupling] * im(Z) / (eq.omega_n * eq[sites.time_constant])
         R, X = re(Z) + R_2 / 2, im(Z)  # Z_2, in which R_2/s at slip 2
         current_squared = negative_sequence * (eq.U2**2 - eq.U20**2) / (R**2 + X**2)

@@ -97,6 +97,7 @@ def single_cage(eq, T_prime, X_prime, C, T_m):
     E, omega = eq.flux("E", "E"), eq.speed(r"\omega")
     V = eq.V
     Z = eq.place(sites.stator_impedance, I * X_prime)
+    eq.place(sites.backward_impedance, Z)
     current = eq.place(sites.stator_current, eq.branch("psi", r"\psi", V, Z, behind=E))
     flux, excess = rotor(eq, E, E, omega, current, T_prime, X_prime, C, T_m)
     E_0, slower = at_rest(eq, T_prime, X_prime, C, T_m)

@@ -50,6 +50,7 @@ class DoubleCage(Motor):
 
         V = eq.V
         Z = eq.place(sites.stator_impedance, I * X_second, "Z''")
+        eq.place(sites.backward_impedance, Z)
         return _machine.two_cages(
             eq,
             lambda E_second: eq.branch("psi", r"\psi", V, Z, behind=E_second),

@@ -1,6 +1,6 @@
 """Seventh-order induction motor: two rotor cages and stator transients."""
 
-from tractexp.extend import Motor, plugin
+from tractexp.extend import Motor, plugin, sites
 
 from . import _machine
 
@@ -48,6 +48,7 @@ class DoubleCageStatorFlux(Motor):
         from sympy import I
 
         V, Z = eq.V, R_s + I * X_second
+        eq.place(sites.backward_impedance, Z)
         return _machine.two_cages(
             eq,
             lambda E_second: eq.branch("psi", r"\psi", V, Z, behind=E_second, flux_moves=True),

@@ -54,6 +54,7 @@ class Mechanical(Motor):
 
         omega, V = eq.speed(r"\omega"), eq.V
         Z = eq.place(sites.stator_impedance, I * X_prime)
+        eq.place(sites.backward_impedance, Z)
         coupling = eq.place(sites.coupling, C)
         time_constant = eq.place(sites.time_constant, T_prime)
         source = I * X_prime * coupling

@@ -50,6 +50,7 @@ class StatorFlux(Motor):
 
         psi, E, omega = eq.flux("psi", r"\psi"), eq.flux("E", "E"), eq.speed(r"\omega")
         V = eq.V
+        eq.place(sites.backward_impedance, R_s + I * X_prime)
         current = eq.place(sites.stator_current, (psi + I * E) / X_prime)
         flux, excess = _machine.rotor(eq, E, E, omega, current, T_prime, X_prime, C, T_m)
         E_0, I_0, y = self._at_rest(eq, X_prime, C, R_s, T_m)

@@ -180,6 +180,7 @@ REFUSED = {
     "electromechanical": {"rotor_flux", "rotor_speed"},
     "double_cage": {"rotor_flux", "rotor_speed", "second_cage"},
     "stator_flux": {"stator_resistance", "saturation_curve", *ORDERS},
+    "double_cage_stator_flux": {"stator_resistance", "saturation_curve", *ORDERS},
 }
 
 

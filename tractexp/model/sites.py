@@ -32,6 +32,14 @@ motor_voltage = Site(
 stator_impedance = Site(
     "stator_impedance", "Z'", "phasor", "pu", "motor", "impedance from the terminals to the flux"
 )
+backward_impedance = Site(
+    "backward_impedance",
+    "Z_-",
+    "phasor",
+    "pu",
+    "motor",
+    "impedance that meets a field turning backwards, but for the rotor's resistance",
+)
 internal_voltage = Site(
     "internal_voltage",
     "E",
