@@ -1,4 +1,6 @@
-"""What a frequency or an unbalance that nobody recorded does to parameters, and what is told."""
+"""What a frequency, an unbalance or a recorder's window that nobody told does to parameters, and
+what is said of it.
+"""
 
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import tractexp
 from tractexp.configuration.plugin import get
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
+from tractexp.record.window import average, mean_weights
 
 TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55}
 STEP = 5e-3
@@ -246,3 +249,66 @@ def test_behind_a_stator_flux_negative_sequence_acts_as_on_a_motor_without(stiff
     there = answer_to_U2(moving, R_s=1e-5)
     assert np.abs(there).min() > 1e-3
     assert there == pytest.approx(answer_to_U2(stiff), rel=0.02)
+
+
+FAST = {"T_prime": 0.03, "X_prime": 0.23, "C": 0.94, "M": 0.0022, "T_m": 0.54, "R_s": 0.035}
+
+
+def record_through_a_window(depth, rng):
+    """A motor with a stator flux, as one-cycle values every 10 ms show it."""
+    fine, every = 5e-4, slice(0, None, 20)
+    t = np.arange(4000) * fine
+    U = 1 - depth * (np.clip((t - 0.5) / 0.0015, 0, 1) - np.clip((t - 0.65) / 0.0015, 0, 1))
+    still, weights = np.ones(len(t)), mean_weights(0.02 / fine)
+    event = Excitation(fine, U, still, still, 1.0, 1.0, 0.6, omega_s=0 * t, window=weights)
+    load = compose(get("model/motor", "stator_flux")(), get("model/static", "constant_impedance")())
+    values = np.array([[FAST[name] for name in load.names]])
+    power = load.simulate(Drive.from_events([event]), values, 4).outputs[:, 0, every]
+    P, Q = power + 3e-3 * rng.standard_normal(power.shape)
+    columns = {"t": t[every], "U": average(U, weights)[every], "P": P, "Q": Q}
+    return columns | {"f": 50 * still[every], "U2": 0 * t[every]}
+
+
+@pytest.fixture(scope="module")
+def fit_through_a_window():
+    rng = np.random.default_rng(5)
+    dips = [tractexp.read(record_through_a_window(depth, rng))[0] for depth in (0.3, 0.5)]
+
+    def identify(window=None, **settings):
+        return tractexp.identify(
+            dips,
+            tractexp.compose("fifth_order_stator_flux", window=window),
+            optimizer="multistart_least_squares",
+            check_intervals=False,
+            progress=False,
+            **settings,
+        )
+
+    return identify
+
+
+def test_a_window_that_nobody_told_widens_what_it_moves(fit_through_a_window):
+    """Without it R_s is 0.05 where 0.035 is true, and the interval knows nothing of that."""
+    blind = fit_through_a_window(averaged_cycles=0.0).parameters["R_s"]
+    assert blind.interval[0] > 1.2 * FAST["R_s"]
+    assert blind.verdict == "identified"
+    found = fit_through_a_window()
+    for name, truth in FAST.items():
+        low, high = found.parameters[name].interval
+        assert low <= truth <= high, name
+    why = "weakly identified: window was not recorded, and a 1-cycle window moves it by"
+    assert found.parameters["R_s"].verdict.startswith(why)
+    assert found.table().columns[-1] == "a 1-cycle window moves"
+
+
+def test_its_length_is_a_candidate_of_the_measurement(fit_through_a_window):
+    found = fit_through_a_window()
+    course = found.result.unrecorded["window"]["course"]
+    assert course["strays"] == pytest.approx(0.02, rel=0.2)
+    assert course["error"] < 0.5 * course["error_without"]
+    (told,) = (line for line in found.advice if line.startswith("say the recorder's window"))
+    assert "a recorder's window that nobody told, 18 ms long, would leave" in told
+
+
+def test_a_window_that_the_model_is_looked_at_through_is_known(fit_through_a_window):
+    assert "window" not in fit_through_a_window(0.02).result.unrecorded

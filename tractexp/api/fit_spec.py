@@ -11,6 +11,7 @@ from tractexp.identification.fit import Fit
 from tractexp.identification.result import Result
 from tractexp.identification.search import SearchResult
 from tractexp.identification.unrecorded_input import (
+    AVERAGED_CYCLES,
     FREQUENCY_SWING,
     UNBALANCE,
     UnrecordedInput,
@@ -27,11 +28,12 @@ class FitSpec(Setup):
     check_intervals: bool = True
     frequency_swing: float = FREQUENCY_SWING
     unbalance: float = UNBALANCE
+    averaged_cycles: float = AVERAGED_CYCLES
 
     @property
     def unrecorded_inputs(self) -> list[UnrecordedInput]:
         """What records may lack, and how far it may have strayed."""
-        return list_unrecorded_inputs(self.frequency_swing, self.unbalance)
+        return list_unrecorded_inputs(self.frequency_swing, self.unbalance, self.averaged_cycles)
 
     def search_end(self, progress: Progress) -> SearchResult:
         """Where the search ends; raises `UserError` where the input is wrong, before anything is

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import Choice, public
-from tractexp.api.fit_spec import FREQUENCY_SWING, UNBALANCE, FitSpec
+from tractexp.api.fit_spec import AVERAGED_CYCLES, FREQUENCY_SWING, UNBALANCE, FitSpec
 from tractexp.api.identification import Identification
 from tractexp.api.job import Job
 from tractexp.api.task import Task
@@ -42,6 +42,7 @@ def identify(
     check_intervals: bool = True,
     frequency_swing: float = FREQUENCY_SWING,
     unbalance: float = UNBALANCE,
+    averaged_cycles: float = AVERAGED_CYCLES,
     progress: Progress = None,
 ) -> Identification:
     """Fit the free parameters of a load model to recorded dips, and judge the fit on these and on
@@ -89,6 +90,9 @@ def identify(
     unbalance : float
         As much where they have no U2, of one that is so much of what the voltage falls by; 0: the
         dips were balanced.
+    averaged_cycles : float
+        As much where they have no window and the model would be looked at through it, of a mean
+        over so many cycles; 0: their values are of one instant.
     progress : None, False or callable
         None shows how far the search is, False does not; a callable is told what is read and done,
         a sentence at a time.
@@ -141,6 +145,7 @@ def identify(
         check_intervals=check_intervals,
         frequency_swing=frequency_swing,
         unbalance=unbalance,
+        averaged_cycles=averaged_cycles,
     )
     end = None
     try:

@@ -81,7 +81,8 @@ def _find_moves(uncertainty: Uncertainty, missing: UnrecordedInput) -> np.ndarra
     for courses in zip(*map(missing.list_courses, problem.events), strict=True):
         other = replace(likelihood, problem=missing.drive(acted_on, courses))
         driven.append(other.rows(unit[None])[0])
-    changes = np.array([rows for rows in driven if np.isfinite(rows).all()]) - left
+    # a course that nothing can be simulated with was none
+    changes = np.array([rows - left for rows in driven if np.isfinite(rows).all()])
     if not len(changes):
         return np.zeros((1, len(uncertainty.names)))
     taken_up = sensitivities.times(sensitivities.fit(-changes))

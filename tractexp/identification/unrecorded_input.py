@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,11 +12,13 @@ from tractexp.inference.problem import Problem
 from tractexp.model.model import Model
 from tractexp.model.parts import Effect
 from tractexp.record import Event
+from tractexp.record.window import make_mean_window
 
 # Hz: how far the frequency of a network strays around a fault
 FREQUENCY_SWING = 0.2
 # of what U falls by: faults of one phase and of two have as much negative sequence
 UNBALANCE = 1.0
+AVERAGED_CYCLES = 1.0  # over which most recorders form a phasor
 # Hz: swings of one machine against others, and of areas against each other (Kundur 1994, ch. 12)
 SWINGS = (0.3, 0.7, 1.5)
 FALL = 1.0  # s: within which the frequency follows a lost balance of power
@@ -88,13 +90,17 @@ class UnrecordedInput(ABC):
         """The problem of `act_on` whose events have had such courses (N,), apart from rest."""
         return acted_on.driven_by(self._set_courses(acted_on.events, courses))
 
+    def write_course(self, event: Event, course: np.ndarray) -> dict[str, Any]:
+        """What the record has, by name, where the course (N,) is that, apart from rest."""
+        return {self.channel: self.find_rest(event) + course + np.zeros(event.record.samples)}
+
     def _set_courses(
         self, events: Sequence[Event], courses: Sequence[np.ndarray]
     ) -> tuple[Event, ...]:
         driven = []
         for event, course in zip(events, courses, strict=True):
-            values = self.find_rest(event) + course + np.zeros(event.record.samples)
-            driven.append(replace(event, record=replace(event.record, **{self.channel: values})))
+            written = self.write_course(event, course)
+            driven.append(replace(event, record=replace(event.record, **written)))
         return tuple(driven)
 
     def _find_effects(self, model: Model) -> list[Effect]:
@@ -166,11 +172,54 @@ class UnrecordedUnbalance(UnrecordedInput):
         return self.size * fall[None]
 
 
+@dataclass(frozen=True)
+class UnrecordedWindow(UnrecordedInput):
+    """The recorder's window, through which a model of what happens within a cycle is looked at. Its
+    course is its length [s] in each event.
+    """
+
+    size: float = AVERAGED_CYCLES
+    channel, setting = "window", "averaged_cycles"
+    remedy = "say the recorder's window by data.estimator or model.window"
+    known = "where the values are of one instant"
+    least = 0.0
+
+    @property
+    def words(self) -> str:
+        """In cycles."""
+        return f"a {self.size:g}-cycle window"
+
+    def describe_course(self, strays: float) -> str:
+        """In ms."""
+        return f"a recorder's window that nobody told, {1000 * strays:.2g} ms long,"
+
+    def list_courses(self, event: Event) -> np.ndarray:
+        """Its length throughout, (1, N) [s]."""
+        return np.full((1, event.record.samples), self.size / event.record.base.frequency)
+
+    def write_course(self, event: Event, course: np.ndarray) -> dict[str, Any]:
+        """A plain mean of that length; none at rest."""
+        length = float(course[0])
+        return {self.channel: make_mean_window(length) if length > 0 else None}
+
+    def is_unknown(self, problem: Problem) -> bool:
+        """Whether the model would be looked at through the window of a record, and it says none."""
+        shipped = any(event.record.is_shipped for event in problem.events)
+        looked_through = problem.domain.windowed and problem.model.motor.within_a_cycle
+        return looked_through and not problem.drive.windows and not shipped
+
+
 def list_unrecorded_inputs(
-    frequency_swing: float = FREQUENCY_SWING, unbalance: float = UNBALANCE
+    frequency_swing: float = FREQUENCY_SWING,
+    unbalance: float = UNBALANCE,
+    averaged_cycles: float = AVERAGED_CYCLES,
 ) -> list[UnrecordedInput]:
     """All inputs that records may lack, straying so far."""
-    return [UnrecordedFrequency(frequency_swing), UnrecordedUnbalance(unbalance)]
+    return [
+        UnrecordedFrequency(frequency_swing),
+        UnrecordedUnbalance(unbalance),
+        UnrecordedWindow(averaged_cycles),
+    ]
 
 
 def _since_dip(event: Event) -> np.ndarray:

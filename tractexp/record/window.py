@@ -23,6 +23,7 @@ from tractexp.record.angle import integrate, measure_frequency
 if TYPE_CHECKING:
     from tractexp.record.event import Event
 
+MEAN_POINTS = 200  # of a plain mean
 LONGEST_WINDOW = 2.0  # s about a time stamp: far more than any recorder averages over
 BEND_SECONDS = 0.05  # s on either side of a window around an edge, in which the voltage may bend
 BENT, CALM = 0.01, 3e-4  # pu: second differences of the voltage there, and elsewhere
@@ -91,6 +92,18 @@ class Window:
         if not (np.abs(at) <= LONGEST_WINDOW).all() or not (np.diff(at) > 0).all():
             raise ValueError("times increase")
         return cls(str(content["name"]), at, weights)
+
+
+def make_mean_window(length: float) -> Window:
+    """The plain mean over a length [s].
+
+    Examples
+    --------
+    >>> make_mean_window(0.02).compute_weights(0.01).round(3).tolist()
+    [0.25, 0.5, 0.25]
+    """
+    at = length * ((np.arange(MEAN_POINTS) + 0.5) / MEAN_POINTS - 0.5)
+    return Window("mean", at, np.full(MEAN_POINTS, 1 / MEAN_POINTS))
 
 
 def mean_weights(samples: float) -> np.ndarray:
