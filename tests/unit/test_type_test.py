@@ -5,7 +5,7 @@ and silence for everything else.
 import numpy as np
 import pytest
 from field_waves import KA, KV, dip, load, noise, phases, recording, wave
-from made_motor import X_PRIME, solve_motor
+from made_motor import R_S, X_LEAK, X_M, X_PRIME, solve_motor
 from test_cev import BITS, names, row
 
 import tractexp
@@ -108,6 +108,39 @@ def test_the_intervals_hold_the_truth_of_a_motor_solved_from_standstill(
     low, high = test["bounds"]["X_prime"]
     assert low < X_PRIME * base < high
     assert ("X_2" in found) == (unbalance > 0)
+
+
+@pytest.mark.parametrize(("R_r", "unbalance"), [(0.015, 0.0), (0.05, 0.03)])
+def test_a_motor_that_is_tripped_before_it_runs_up_tells_its_impedance_in_ohm(
+    R_r, unbalance, tmp_path
+):
+    """Its inertia is that of a rotor that is stuck; what it would draw running nobody knows."""
+    V, I, _ = solve_motor(RATE, R_r, 1e3, 1.8, 2.4, unbalance)
+    turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
+    waves = np.sqrt(2) * np.concatenate([KV * (V * turn).real, KA * (I * turn).real])
+    waves += noise(waves.shape, 5e-4) * np.repeat([KV, KA], 3)[:, None]
+    write(recording(waves, RATE), tmp_path / "motor.cfg", "BINARY", 1999)
+    (feeder,) = tractexp.look(tmp_path / "motor.cfg").content["files"][0]["feeders"]
+    test = feeder["type_test"]
+    found = {row["name"]: row for row in test["values"]}
+    rotor = 1 / (1 / (1j * X_M) + 1 / (R_r + 1j * X_LEAK))
+    locked = abs(R_S + 1j * X_LEAK + rotor) * KV / KA
+    assert found.keys() == ({"Z_locked", "X_2"} if unbalance else {"Z_locked"})
+    assert found["Z_locked"]["low"] < locked < found["Z_locked"]["high"]
+    assert found["Z_locked"]["unit"] == "ohm"
+    assert test["bounds"] == {}
+    assert "a start that failed, if it is a motor: Z_locked" in test["sentence"]
+
+
+@pytest.mark.parametrize("angle", [0.5, 1.57])
+def test_a_heater_or_a_reactor_that_is_switched_on_and_off_is_no_failed_start(angle):
+    t = np.arange(round(2.4 * RATE)) / RATE
+    V = KV * np.exp(2j * np.pi * 50 * t)
+    flows = (t > 0.5) & (t < 1.8)
+    I = KA * np.exp(-1j * angle) * V / KV * flows
+    waves = np.concatenate([wave(t, phases(V, 0 * V), 0.0), wave(t, phases(I, 0 * I), 0.0)])
+    waves += noise(waves.shape, 5e-4) * np.repeat([KV, KA], 3)[:, None]
+    assert measure(recording(waves, RATE)) is None
 
 
 def test_a_motor_that_coasts_for_70_ms_tells_time_constant_and_inertia(tmp_path):

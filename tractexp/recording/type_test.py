@@ -7,7 +7,8 @@ coasting after it are a type test.
                         torque of a power k of the speed: f^(1 - k) falls on a straight line
 
 Impedances and H are per unit of the voltage before the trip (or the start) and of the apparent
-power that the motor drew running. Source: Kundur 1994, ch. 7; IEEE 112-2017, tests of locked rotor
+power that the motor drew running. Of one that is tripped before it runs up impedances are in ohm:
+what it draws running is not known. Source: Kundur 1994, ch. 7; IEEE 112-2017, tests of locked rotor
 and retardation.
 """
 
@@ -27,6 +28,8 @@ SWITCHING_CYCLES = 2.0  # cycles about a switching that windows blur
 SHORTEST_PART = 3.0  # cycles that are measured at least
 LONGEST_STANDSTILL = 0.2  # s after closing in which a motor hardly turns
 LEAST_STARTING_CURRENT = 2.0  # times the current of running, that of a start
+# of the power of a motor that stands still, the reactive share: a heater has less, a reactor more
+LOCKED_SHARE = (0.75, 0.99)
 # of the positive sequence, what the negative one has of current and of voltage
 LEAST_SECOND_CURRENT, LEAST_SECOND_VOLTAGE = 0.03, 0.006
 LEAST_DECAY = 0.9  # of the voltage at the opening, at the end of coasting
@@ -102,6 +105,25 @@ class TypeTest:
         return found
 
 
+@dataclass(frozen=True)
+class FailedStart(TypeTest):
+    """What a report tells of a motor that was tripped before it ran up: impedances in ohm, at the
+    `voltage` [kV] and `power` [MVA] of the start; its rating is not known.
+    """
+
+    def __str__(self) -> str:
+        told = ", ".join(map(str, self.values))
+        return (
+            f"a start that failed, if it is a motor: {told}; it drew {self.power:.3g} MVA at"
+            f" {self.voltage:.4g} kV"
+        )
+
+    @property
+    def bounds(self) -> dict[str, list[float]]:
+        """None: they would be per unit of what it draws running."""
+        return {}
+
+
 @dataclass(frozen=True, eq=False)
 class Course:
     """A motor over time: t (N,) [s], voltage U and its negative sequence U2 [kV, line to line],
@@ -172,6 +194,9 @@ def find_type_test(course: Course, nominal: float) -> TypeTest | None:
         return None
     voltage = float(np.median(course.U[running]))
     power = float(np.median(np.abs(course.S[running])))
+    if report.is_locked(running):
+        seen = (report.measure_locked(running), report.measure_unbalance(1.0, "ohm"))
+        return FailedStart(tuple(filter(None, seen)), voltage, power, nominal)
     ohm = voltage**2 / power
     values = [
         report.measure_start(running, ohm),
@@ -217,16 +242,41 @@ class _Report:
             return None
         return part
 
-    def measure_start(self, running: slice, ohm: float) -> TypeValue | None:
-        """The impedance at standstill; None where no start is recorded."""
+    @property
+    def has_start(self) -> bool:
+        """Whether the breaker closes within the record, onto a voltage."""
         assert self.closed is not None
         first = self.closed.start
-        if first < self.least or self.voltage[first] < ALIVE_SHARE * self.voltage.max():
-            return None
+        alive = self.voltage[first] >= ALIVE_SHARE * self.voltage.max()
+        return first >= self.least and bool(alive)
+
+    def is_locked(self, running: slice) -> bool:
+        """Whether the current of a start has not fallen when the breaker opens, and is that of a
+        motor that stands still.
+        """
+        assert self.closed is not None
+        opens = self.closed.stop < len(self.current) - self.edge
+        current = self.current[self.start_part]
+        if not (opens and self.has_start and len(current)):
+            return False
+        usual = float(np.median(self.current[running]))
+        drawn = self.course.S[running]
+        share = float(np.median(np.sin(np.angle(drawn))))
+        least, most = LOCKED_SHARE
+        return bool(np.ptp([*current, usual]) < STEADY_CURRENT * usual) and least < share < most
+
+    def measure_locked(self, running: slice) -> TypeValue:
+        """The impedance [ohm] of a motor that never turns, until its breaker opens."""
+        impedance = self.voltage[running] / (np.sqrt(3) * self.current[running])
+        return _measure("Z_locked", impedance, "U/I before the trip", "ohm")
+
+    def measure_start(self, running: slice, ohm: float) -> TypeValue | None:
+        """The impedance at standstill; None where no start is recorded."""
         part = self.start_part
         current = self.current[part]
         usual = float(np.median(self.current[running]))
-        if not len(current) or current.min() < LEAST_STARTING_CURRENT * usual:
+        falls = len(current) and current.min() >= LEAST_STARTING_CURRENT * usual
+        if not (self.has_start and falls):
             return None
         impedance = self.voltage[part] / (np.sqrt(3) * current)
         return _measure("X_locked", impedance / ohm, "U/I at the start")
@@ -243,7 +293,7 @@ class _Report:
         drawn = self.course.S[self.start_part]
         return float(np.median(np.abs(np.sin(np.angle(drawn)))))
 
-    def measure_unbalance(self, ohm: float) -> TypeValue | None:
+    def measure_unbalance(self, ohm: float, unit: str = "pu") -> TypeValue | None:
         """The impedance of the negative sequence; None where there is hardly any."""
         assert self.closed is not None
         part = slice(self.closed.start + self.edge, self.closed.stop - self.edge)
@@ -256,7 +306,7 @@ class _Report:
         if np.count_nonzero(seen) < self.least:
             return None
         impedance = voltage[seen] / (np.sqrt(3) * current[seen])
-        return _measure("X_2", impedance / ohm, "U2/I2")
+        return _measure("X_2", impedance / ohm, "U2/I2", unit)
 
     def measure_coasting(self, running: slice, power: float) -> list[TypeValue | None]:
         """T0' and H of what follows the opening of the breaker; nothing where the voltage stays, or
@@ -286,8 +336,8 @@ class _Report:
         return [constant, inertia]
 
 
-def _measure(name: str, samples: np.ndarray, how: str) -> TypeValue:
-    """The mean of samples (n,), per unit, and how far it moves where blocks are left out."""
+def _measure(name: str, samples: np.ndarray, how: str, unit: str = "pu") -> TypeValue:
+    """The mean of samples (n,) and how far it moves where blocks are left out."""
     level = np.ones((len(samples), 1))
     (value,), (error,) = fit_line(level, samples)
     half = max(TWO_ERRORS * float(error), LEAST_ERROR * float(value))
@@ -297,7 +347,7 @@ def _measure(name: str, samples: np.ndarray, how: str) -> TypeValue:
         middle,
         middle - half,
         middle + half,
-        "pu",
+        unit,
         how,
     )
 
