@@ -70,12 +70,14 @@ def test_what_fits_worse_than_the_best_predicts_is_not_asked_to_predict():
     assert "static_exponential" in lost
 
 
-def test_what_is_known_of_parameters_goes_with_the_winner():
+def test_what_is_known_of_parameters_goes_with_the_winner_and_all_that_race():
+    """What is fixed is none of the parameters by which ties are decided."""
     model = auto("static_exponential", "third_order_exponential")
-    model = model.with_(bounds={"q_v": [2.5, 3.5], "M": [0.001, 0.02]}, fixed={"p_v": 1.2})
-    won = model.fit_for([dip("electromechanical")])
-    assert won.bounds == {"q_v": [2.5, 3.5], "M": [0.001, 0.02]}
-    assert won.fixed == {"p_v": 1.2}
+    known = {"bounds": {"q_v": [2.5, 3.5], "M": [0.001, 0.02]}, "fixed": {"p_v": 1.2}}
+    free, won = (one.fit_for([dip("electromechanical")]) for one in (model, model.with_(**known)))
+    assert {"bounds": won.bounds, "fixed": won.fixed} == known
+    count = {entry["name"]: entry["parameters"] for entry in free.race}
+    assert {entry["name"]: entry["parameters"] + 1 for entry in won.race} == count
 
 
 def test_a_structure_that_does_not_go_with_the_records_loses_and_says_why():
