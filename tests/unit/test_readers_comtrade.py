@@ -203,6 +203,18 @@ def test_time_stamps_are_used_where_the_file_gives_no_rate(tmp_path):
     assert (event.depth, event.f0) == (pytest.approx(0.4, abs=1e-3), pytest.approx(50, abs=1e-3))
 
 
+def test_stamps_beside_two_dates_in_nanoseconds_are_in_nanoseconds(tmp_path):
+    """And in microseconds where one of the dates is."""
+    t = np.arange(6000) / 4000
+    path = write(tmp_path, waveforms(t, 50.0, []), [(0, 6000)], stamps=t)
+    text = path.read_text()
+    for dates, rate in ((2, 4e6), (1, 4e3)):
+        path.write_text(
+            text.replace(".000000", ".000000000").replace(".100000", ".100000000", dates - 1)
+        )
+        assert [one.rate for one in comtrade.load(path).segments] == [pytest.approx(rate)]
+
+
 def test_a_gap_between_time_stamps_begins_a_segment(tmp_path):
     t = np.arange(6000) / 4000
     path = write(tmp_path, waveforms(t, 50.0, []), [(0, 6000)], stamps=np.where(t > 1, t + 0.01, t))

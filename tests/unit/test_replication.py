@@ -5,8 +5,9 @@ that noise does not hide.
 import numpy as np
 import pytest
 
+import tractexp
 from tractexp.discrepancy.explain import explain_replication
-from tractexp.discrepancy.replication import find_least_share
+from tractexp.discrepancy.replication import find_hidden, find_least_share
 
 
 @pytest.mark.parametrize(
@@ -21,6 +22,19 @@ from tractexp.discrepancy.replication import find_least_share
 )
 def test_the_least_share_counts(expected, gained, share):
     assert find_least_share(expected, gained, (0.1, 0.1, 0.1)) == share
+
+
+@pytest.mark.parametrize(("samples", "level"), [(400, 1e-3), (1600, 1e-3), (400, 1e-2)])
+def test_noise_hides_what_its_squares_scatter_by(samples, level):
+    """At least as much as in 95 of 100 draws, and not twice that of 999 in 1,000."""
+    rng = np.random.default_rng(5)
+    t = np.arange(400 + samples) * 2.5e-3
+    U = np.where((t >= 1.0) & (t < 1.25), 0.7, 1.0)
+    P, Q = 0.6 + level * rng.standard_normal((2, len(t)))
+    event = tractexp.read({"t": t, "U": U, "P": P, "Q": Q, "f": np.full(len(t), 50.0)})[0]
+    squares = np.sum((level * rng.standard_normal((2000, 2, samples))) ** 2, axis=(1, 2))
+    usual, rare = np.quantile(np.abs(squares - squares.mean()), (0.95, 0.999))
+    assert usual < find_hidden(event) < 2 * rare
 
 
 def test_events_that_noise_hides_confirm_nothing():
