@@ -25,6 +25,7 @@ from tractexp.discrepancy.precision import estimates, standard_errors
 from tractexp.discrepancy.prediction import (
     SHARING,
     predict_held_out,
+    search_best_pairs,
     search_third,
     select_grounds,
 )
@@ -606,6 +607,19 @@ def test_the_files_say_what_is_left(investigation, tmp_path):
     page = (tmp_path / "run" / "discrepancy.html").read_text()
     assert "What is left" in page
     assert "undervoltage_trip" in str(investigation)
+
+
+def test_pairs_of_the_singles_that_predict_best_are_tried_whatever_fits_best(inexact):
+    """Of station xtz T1's waveforms the pair that predicts best has no member that fits best."""
+    context = inexact.explanations.base.context.with_measured_power.held_to_usual
+    ground = inexact.first.score_fit(context, inexact.bare, inexact.evidence.noise)
+    names = ("dc_link_lag", "stator_resistance", "undervoltage_trip")
+    rows = [inexact.evidence.row_of((name,)) for name in names]
+    known = inexact.evidence.row_of(names[1:])
+    refits = {row.fit.names: row.fit for row in (*rows, known)}
+    pairs = search_best_pairs(ground, refits, [known, *rows])
+    assert {fit.names for fit in pairs} == {names[:2], names[::2]}
+    assert all(fit.deviance < refits[fit.names[:1]].deviance for fit in pairs)
 
 
 @pytest.mark.parametrize(("error", "asked"), [(0.02, True), (0.009, False)])

@@ -25,7 +25,9 @@ from tractexp.discrepancy.explanations import (
     WIDELY,
     Explanations,
     Names,
+    refit_sets,
     search_effect_sets,
+    starts,
     wide_starts,
 )
 from tractexp.discrepancy.families import member_fits
@@ -45,6 +47,7 @@ from tractexp.inference.wide_fit import wide_refits
 from tractexp.noise import Noise
 
 MOST_TRIED_FAMILIES = 2  # single effects whose families are tried, and to which a second is added
+BEST_SINGLES = 4  # single effects that predict best, of which all pairs are tried
 CARRIED = 12  # sets of the search by likelihood that are fitted again
 # blocks that share the response: where two or three hold all of it, nothing is clear of chance
 SHARING = 10.0
@@ -116,6 +119,9 @@ def predict_errors(explained: Explanations, grader: Grader) -> Evidence | None:
     sets = [fit for fit in refits.values() if fit.names]
     rows = fill(_fit_without_faults(context, noise, sets))
     table = Evidence(alone, tuple(rows), noise=noise, there=there)
+    pairs = search_best_pairs(ground, refits, rank_sets(table, criteria))
+    refits |= key_by_names(pairs)
+    table = replace(table, rows=(*rows, *fill(_fit_without_faults(context, noise, pairs))))
     best = rank_sets(table, criteria)[:1]
     table = complete(table, best)
     if further := search_third(ground, refits, best):
@@ -124,6 +130,25 @@ def predict_errors(explained: Explanations, grader: Grader) -> Evidence | None:
     if not find_predicting(table, criteria):
         return table
     return replace(table, term=_find_best_term(context, table))
+
+
+def search_best_pairs(
+    ground: Disagreement, refits: dict[Names, Refit], ranked: Sequence[SetEvidence]
+) -> list[Refit]:
+    """All pairs of the single effects of the load that predict best: a search by what fits best may
+    pass them over.
+    """
+    context = ground.context
+    of_load = context.catalogue.of_load
+    singles = [row for row in ranked if len(row.family) == 1 and row.family[0] in of_load]
+    names = [name for row in singles[:BEST_SINGLES] for name in row.fit.names]
+    pairs = [tuple(sorted(pair)) for pair in itertools.combinations(names, 2)]
+    wanted = [pair for pair in pairs if pair not in refits]
+    begin = [start for pair in wanted for start in starts([ground], refits, pair)]
+    if not begin:
+        return []
+    _say(context)("refitting sets of the effects that predict best")
+    return refit_sets(context, ground.noise, begin)
 
 
 def _find_missing_subsets(
@@ -185,7 +210,7 @@ def _fit_without_faults(context: Context, noise: Noise, fits: Iterable[Refit]) -
     """
     at = context.coordinates
     wanted = [(fit.names, at.without_faults(fit.unit, ())) for fit in fits]
-    return refit(context, noise, wanted, faults=())
+    return refit(context, noise, wanted, faults=()) if wanted else []
 
 
 def _say(context: Context) -> Callable[[str], None]:
