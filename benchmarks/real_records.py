@@ -25,6 +25,7 @@ FIRST, LAST = "all but the last", "all but the first"  # dips that are fitted
 STORED = Path(__file__).with_suffix(".json")
 DOCS = Path(__file__).parents[1] / "docs" / "judgement.md"
 MARK = "benchmarks/real_records.py --docs"
+MOST_SETS = 3  # of a tie that the table has
 ASKED = ("xtz T1 phasors", "xtz T2 phasors", "xtz T1 waves", "xtz T2 waves", "andes a")
 
 
@@ -70,7 +71,7 @@ def table(rows: list[dict[str, Any]]) -> str:
     ]
     lines = []
     for one in rows:
-        names, gaps = "; ".join(joined(names) for names in one["sets"]), one["gap"]
+        names, gaps = list_sets(one["sets"]), one["gap"]
         whole = ", complete" if one["complete"] else ", incomplete"
         if not one["names"]:
             names, gaps, whole = f"nearest: {joined(one['nearest'])}", one["near_gap"], ""
@@ -78,6 +79,12 @@ def table(rows: list[dict[str, Any]]) -> str:
         errors = [f"{percent(g['before'])}, {percent(g['after'])}" if g else "-" for g in both]
         lines.append([one["record"], one["fitted"], one["verdict"] + whole, names, *errors])
     return marked.table(head, lines)
+
+
+def list_sets(sets: list[list[str]]) -> str:
+    """Sets as code: the first of them, and how many more there are."""
+    more = len(sets) - MOST_SETS
+    return "; ".join([*map(joined, sets[:MOST_SETS]), *([f"{more} more"] if more > 0 else [])])
 
 
 def joined(names: list[str]) -> str:
