@@ -98,7 +98,7 @@ def main() -> None:
     rows = Parallel(n_jobs=chosen.jobs, verbose=5)(
         delayed(ranked)(noise, one) for noise, one in planned
     )
-    files.write(RESULTS, json.dumps(files.plain(rows), indent=0) + "\n")
+    files.write(RESULTS, json.dumps(files.make_plain(rows), indent=0) + "\n")
     for level, share in shares(rows).items():
         print(f"level {level:<5g} share {share:.3f}")
 

@@ -472,7 +472,7 @@ def main() -> None:
         for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered", pre_dispatch=4)(
             jobs
         ):
-            rows.append(files.plain(row | {"frozen": frozen}))
+            rows.append(files.make_plain(row | {"frozen": frozen}))
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
             told = row.get("failed") or f"{row['verdict']} {' '.join(row['names'])}"

@@ -261,7 +261,7 @@ def perform(name: str, processes: int, only: Sequence[str] = ()) -> dict[str, An
     """All runs of a series."""
     from joblib import Parallel, delayed
 
-    series, commit, started = SERIES[name], provenance.commit(), time.time()
+    series, commit, started = SERIES[name], provenance.find_commit(), time.time()
     done: Any = Parallel(n_jobs=processes, verbose=5)(
         delayed(run)(series, problem)
         for problem in series.problems()
@@ -281,7 +281,7 @@ def perform(name: str, processes: int, only: Sequence[str] = ()) -> dict[str, An
 def store(name: str, result: Mapping[str, Any], path: Path = STORED) -> None:
     """Put a series into the stored result, a problem on each line."""
     kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    kept[name] = files.plain(result)
+    kept[name] = files.make_plain(result)
     files.write(path, _text(kept))
 
 

@@ -71,13 +71,13 @@ def as_it_was(environment):
     surroundings = mock.patch.dict(os.environ, COLUMNS | environment)
     hydra = GlobalHydra.instance().hydra
     GlobalHydra.instance().clear()
-    progress.console.cache_clear()  # a process of its own would have one of its own width
+    progress.build_console.cache_clear()  # a process of its own would have one of its own width
     try:
         with surroundings, mock.patch.object(sys, "argv", ["tractexp"]), warnings.catch_warnings():
             yield
     finally:
         process._end_ahead()
-        progress.console.cache_clear()
+        progress.build_console.cache_clear()
         GlobalHydra.instance().hydra = hydra
         HydraConfig.instance().cfg = None
         run_command.remember_command([])

@@ -28,7 +28,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 from tractexp.errors import Stopped, UserError  # noqa: E402
 from tractexp.process import interpreter  # noqa: E402
 from tractexp.storage import credentials  # noqa: E402
-from tractexp.text.output import outlet  # noqa: E402
+from tractexp.text.output import open_outlet  # noqa: E402
 from tractexp.text.progress import ask_for  # noqa: E402
 from tractexp.text.wording import write_on_one_line  # noqa: E402
 
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if argv is None else [*argv]
     gc.set_threshold(*SELDOM)
     try:
-        with outlet() as out, interpreter.safe_path():
+        with open_outlet() as out, interpreter.safe_path():
             code = _run_with_refusals(arguments)
         if out and out.lost:
             return _print_refusal(

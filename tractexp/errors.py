@@ -15,7 +15,7 @@ LEAST_LIKENESS = 0.5  # of a name that an error proposes
 _spelling: ContextVar[Callable[[str], str]] = ContextVar("spelling", default=str)
 
 
-def setting(key: str) -> str:
+def name_setting(key: str) -> str:
     """A key of the configuration, "model.bounds.C", as the user writes it: in Python the argument,
     "bounds.C".
     """
@@ -23,7 +23,7 @@ def setting(key: str) -> str:
 
 
 @contextmanager
-def settings_as(call: str, arguments: Callable[[], Collection[str]]) -> Iterator[None]:
+def name_settings_as(call: str, arguments: Callable[[], Collection[str]]) -> Iterator[None]:
     """Within it, keys of task, model and data that are among the arguments of a call are spelled as
     those.
 
@@ -59,7 +59,7 @@ class Section:
         """The setting of that name in this section, as the user writes it."""
         if key.startswith("_"):
             raise AttributeError(key)
-        return setting(f"{self.name}.{key}")
+        return name_setting(f"{self.name}.{key}")
 
 
 DATA, MODEL, TASK = Section("data"), Section("model"), Section("task")
@@ -98,7 +98,7 @@ class Unknown(UserError, AttributeError):
     """A plugin reads or assigns a word that the equations do not offer."""
 
 
-def nearest(name: str, allowed: Iterable[str]) -> str:
+def suggest_nearest(name: str, allowed: Iterable[str]) -> str:
     """Return "; did you mean 'x'?" for the closest allowed name, or "" when nothing is close.
 
     Names are compared letter by letter, and with their words in order.
@@ -138,7 +138,7 @@ def list_allowed(name: object, allowed: Iterable[str], label: str = "Available")
     "; did you mean 'zip'? Loads: none, zip"
     """
     allowed = sorted(map(str, allowed))
-    return f"{nearest(str(name), allowed) or '.'} {label}: {', '.join(allowed) or 'none'}"
+    return f"{suggest_nearest(str(name), allowed) or '.'} {label}: {', '.join(allowed) or 'none'}"
 
 
 def check_choice(where: str, value: object, allowed: Iterable[object]) -> None:
@@ -164,9 +164,8 @@ def check_choice(where: str, value: object, allowed: Iterable[object]) -> None:
     if value not in allowed:
         names = tuple(map(str, allowed))
         text = " ".join(str(value).split())
-        raise UserError(
-            f"{setting(where)}={text} is not one of {', '.join(names)}{nearest(str(value), names)}"
-        )
+        meant = suggest_nearest(str(value), names)
+        raise UserError(f"{name_setting(where)}={text} is not one of {', '.join(names)}{meant}")
 
 
 def check_distinct(where: str, values: Iterable[object]) -> None:
@@ -181,10 +180,10 @@ def check_distinct(where: str, values: Iterable[object]) -> None:
     """
     values = list(values)
     if not values:
-        raise UserError(f"{setting(where)} is empty; give at least one")
+        raise UserError(f"{name_setting(where)} is empty; give at least one")
     for value in values:
         if values.count(value) > 1:
-            raise UserError(f"{setting(where)} names {value} twice; name each once")
+            raise UserError(f"{name_setting(where)} names {value} twice; name each once")
 
 
 def check_range(
@@ -213,6 +212,6 @@ def check_range(
         if high < float("inf"):
             limits.append(f"at most {high:g}")
         raise UserError(
-            f"{setting(where)}={value} is out of range: it must be"
+            f"{name_setting(where)}={value} is out of range: it must be"
             f" {' and '.join(limits) or 'finite'}"
         )

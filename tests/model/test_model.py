@@ -413,9 +413,9 @@ def test_a_text_is_remembered_until_code_or_settings_change(tmp_path, monkeypatc
         made.append(1)
         return f"text {len(made)}"
 
-    assert texts.text_of((motor, static), generate, "text") == "text 1"
-    assert texts.text_of((motor, static), generate, "text") == "text 1"
-    assert texts.text_of((static, motor), generate, "text") == "text 2"
+    assert texts.get_text_of_parts((motor, static), generate, "text") == "text 1"
+    assert texts.get_text_of_parts((motor, static), generate, "text") == "text 1"
+    assert texts.get_text_of_parts((static, motor), generate, "text") == "text 2"
 
 
 @pytest.mark.parametrize("name", ["lambda", "two words", "_c0", "U"])
@@ -558,7 +558,7 @@ def test_two_plugins_of_one_class_name_in_one_folder_have_sources_of_their_own(
             {"__name__": f"load_{name}"},
             namespace := {},
         )
-        made.append(texts.text_of((namespace["Load"](),), lambda name=name: name, "text"))
+        made.append(texts.get_text_of_parts((namespace["Load"](),), lambda name=name: name, "text"))
     assert made == ["one", "two"]
 
 

@@ -27,7 +27,7 @@ WITHOUT_OWNERS = pytest.mark.skipif(
 def folder(tmp_path, monkeypatch):
     """An empty folder chosen for the store."""
     monkeypatch.setenv(store.CHOICE, str(tmp_path / "cache"))
-    return store.cache_folder()
+    return store.find_cache_folder()
 
 
 @pytest.fixture
@@ -242,7 +242,7 @@ def test_a_changed_digit_in_a_text_is_not_compiled(folder):
     made = []
     for _ in range(2):
         assert (
-            texts.text_of((Part(),), lambda: made.append(1) or "TORQUE = 0.55", "text")
+            texts.get_text_of_parts((Part(),), lambda: made.append(1) or "TORQUE = 0.55", "text")
             == "TORQUE = 0.55"
         )
         (text,) = folder.glob("texts/*.entry")
@@ -255,7 +255,7 @@ def test_nothing_is_stored_of_a_part_known_by_its_address(folder, parts):
     """Another part at the same address once got the equations of the first."""
     made = []
     for _ in range(2):
-        texts.text_of(parts, lambda: made.append(1) or "text", "text")
+        texts.get_text_of_parts(parts, lambda: made.append(1) or "text", "text")
     assert len(made) == 2
     assert not list(folder.glob("texts/*"))
 
@@ -267,7 +267,7 @@ def test_nothing_is_stored_of_a_part_known_by_its_address(folder, parts):
 def test_a_new_folder_is_closed_to_others_whatever_the_umask(home):
     before = os.umask(0)
     try:
-        assert store.cache_folder() == home
+        assert store.find_cache_folder() == home
     finally:
         os.umask(before)
     assert stat.S_IMODE(home.stat().st_mode) == 0o700
@@ -277,7 +277,7 @@ def test_a_new_folder_is_closed_to_others_whatever_the_umask(home):
 def test_a_folder_of_an_older_version_is_closed_to_others(home):
     home.mkdir(parents=True)
     home.chmod(0o755)
-    assert store.cache_folder() == home
+    assert store.find_cache_folder() == home
     assert stat.S_IMODE(home.stat().st_mode) == 0o700
 
 
@@ -380,7 +380,7 @@ FAULTS = [
 def test_a_folder_of_ones_own_is_used_where_all_share_and_none_can_move_it(folder):
     """As in /tmp: in a folder with the sticky bit only the owner of an entry moves it."""
     folder.parent.chmod(0o1777)
-    assert store.cache_folder() == folder
+    assert store.find_cache_folder() == folder
 
 
 @WITHOUT_OWNERS
@@ -389,7 +389,7 @@ def test_a_chosen_folder_that_is_not_the_users_own_is_refused(folder, monkeypatc
     folder.parent.chmod(0o700)
     reason = fault(folder, monkeypatch)
     with pytest.raises(UserError) as refused:
-        store.cache_folder()
+        store.find_cache_folder()
     assert f"TRACTEXP_CACHE_DIR={folder} cannot keep kernels: {reason}" in str(refused.value)
     assert "choose a folder of your own" in str(refused.value)
 
@@ -399,14 +399,14 @@ def test_a_chosen_folder_that_is_not_the_users_own_is_refused(folder, monkeypatc
 def test_in_the_place_of_a_usual_folder_that_is_not_the_users_own_comes_a_new_one(
     home, monkeypatch, capsys, fault
 ):
-    reason = fault(store.cache_folder(), monkeypatch)
+    reason = fault(store.find_cache_folder(), monkeypatch)
     undone: list = []
     monkeypatch.setattr(store.atexit, "register", undone.append)
-    made = store.cache_folder()
+    made = store.find_cache_folder()
     assert f"({home}: {reason}" in capsys.readouterr().err
     assert stat.S_IMODE(made.stat().st_mode) == 0o700
     # the same one next time, and in the processes that this one starts
-    assert store.cache_folder() == made
+    assert store.find_cache_folder() == made
     assert not capsys.readouterr().err
     undone[0]()
     assert not made.exists()
@@ -416,11 +416,11 @@ def test_in_the_place_of_a_usual_folder_that_is_not_the_users_own_comes_a_new_on
 def test_without_a_home_a_command_stores_kernels_until_it_ends(home):
     program = (
         "import os, sys; from pathlib import Path\n"
-        "from tractexp.cache.store import CODE, cache_folder\n"
+        "from tractexp.cache.store import CODE, find_cache_folder\n"
         "if not sys.argv[1]:\n"
         "    def unknown(*_): raise RuntimeError\n"
         "    Path.home = unknown\n"  # as for a user that the system does not know
-        "CODE.write('x', b'1'); assert CODE.read('x') == b'1'; print(cache_folder())"
+        "CODE.write('x', b'1'); assert CODE.read('x') == b'1'; print(find_cache_folder())"
     )
     there = {
         k: v

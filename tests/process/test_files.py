@@ -156,7 +156,7 @@ files.write(sys.argv[1], 'new')"""
     assert subprocess.run([sys.executable, "-c", script, str(path)]).returncode == 9
     assert path.read_text() == "old"
     (half,) = [p for p in tmp_path.iterdir() if p != path]
-    assert files.leftovers(tmp_path) == []  # it may be one that is being written
+    assert files.find_leftovers(tmp_path) == []  # it may be one that is being written
     os.utime(half, (0, 0))
     for name in (
         "movie.mkv.part",
@@ -167,7 +167,7 @@ files.write(sys.argv[1], 'new')"""
     ):
         os.utime(files.write(tmp_path / name, "somebody's"), (0, 0))
     (tmp_path / ".a.txt.12345678.tractexp.part").symlink_to(path)
-    assert files.leftovers(tmp_path) == [half]
+    assert files.find_leftovers(tmp_path) == [half]
 
 
 def test_what_must_last_is_on_the_disk_before_it_has_its_name(tmp_path, monkeypatch):

@@ -301,7 +301,7 @@ def test_of_a_received_folder_only_its_own_files_are_sent(
 ):
     from tractexp.cli import doctor
 
-    monkeypatch.setattr(doctor, "cores", lambda: iter(()))
+    monkeypatch.setattr(doctor, "check_cores", lambda: iter(()))
     key, folder = tmp_path / "home" / "id_rsa", tmp_path / "given" / "run"
     (folder / "figures").mkdir(parents=True)
     key.parent.mkdir()
@@ -355,7 +355,7 @@ def test_the_page_of_a_received_sweep_may_be_a_link_to_anything(tmp_path, uri):
 def test_no_store_is_used_that_only_a_folder_names(command, tmp_path, capsys, monkeypatch):
     from tractexp.cli import doctor
 
-    monkeypatch.setattr(doctor, "cores", lambda: iter(()))
+    monkeypatch.setattr(doctor, "check_cores", lambda: iter(()))
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     foreign = f"sqlite:///{tmp_path / 'foreign' / 'mlflow.db'}"
@@ -497,7 +497,7 @@ def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_an
 def test_the_doctor_touches_nothing_that_is_not_ours(content, tmp_path, capsys, monkeypatch):
     from tractexp.cli import doctor as module
 
-    monkeypatch.setattr(module, "cores", lambda: iter(()))
+    monkeypatch.setattr(module, "check_cores", lambda: iter(()))
     mine, database = tmp_path / "runs" / "film.part", tmp_path / "runs" / "mine.db"
     mine.parent.mkdir()
     mine.write_text("half a download")
@@ -517,7 +517,7 @@ def test_the_doctor_touches_nothing_that_is_not_ours(content, tmp_path, capsys, 
 def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch):
     from tractexp.cli import doctor as module
 
-    monkeypatch.setattr(module, "cores", lambda: iter(()))
+    monkeypatch.setattr(module, "check_cores", lambda: iter(()))
     monkeypatch.setattr(module, "BUSY", 0.1)
     far = tracking.start_parent(TrackedRun("e", "far"), uri)
     open_store(uri).set_tag(far, owner.TAG, "elsewhere/0123 boot pid:[1] 4711 99")

@@ -226,8 +226,9 @@ def test_a_survey_that_was_killed_goes_on_where_it_was(tmp_path):
     """Killed between two files, with the entry of one cut short."""
     folder, keep = fill(tmp_path / "a", 6), tmp_path / "kept"
     script = (
-        "import sys, time, tractexp\nfrom tractexp.api import surveying\nmade = surveying.rows_of\n"
-        "def slow(*given):\n    time.sleep(0.3)\n    return made(*given)\nsurveying.rows_of ="
+        "import sys, time, tractexp\nfrom tractexp.api import surveying\n"
+        "made = surveying.build_rows\n"
+        "def slow(*given):\n    time.sleep(0.3)\n    return made(*given)\nsurveying.build_rows ="
         " slow\n"
         f"tractexp.survey({str(folder)!r}, keep={str(keep)!r}, cores=1)\n"
     )
@@ -259,7 +260,7 @@ def test_a_mistake_of_ours_is_a_row_and_no_end(field, monkeypatch):
         raise ZeroDivisionError("of nothing")
 
     monkeypatch.setattr(archive, "look_at_file", fails)
-    (row,) = surveying.rows_of(str(field), "quiet.cfg")
+    (row,) = surveying.build_rows(str(field), "quiet.cfg")
     assert row["kind"] == "not read"
     assert "ZeroDivisionError: of nothing" in row["why"]
 
@@ -270,10 +271,10 @@ def test_a_file_that_kills_its_process_is_a_row_and_the_others_are_read(field):
     """
     script = (
         "import os, sys\nfrom pathlib import Path\nfrom tractexp.api import surveying\n"
-        "made = surveying.rows_of\n"
+        "made = surveying.build_rows\n"
         "def deadly(folder, file):\n    if file.endswith('e3.cfg'): os.kill(os.getpid(), 9)\n"
         "    return made(folder, file)\n"
-        "surveying.rows_of = deadly\n"
+        "surveying.build_rows = deadly\n"
         "if __name__ == '__main__':\n"
         "    names = [f'day {k % 2}/e{k}.cfg' for k in range(6)]\n"
         "    found = dict(surveying.look_at_files(Path(sys.argv[1]), names, 2))\n"

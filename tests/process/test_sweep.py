@@ -730,9 +730,9 @@ def test_settings_of_one_optimizer_are_not_pooled_under_its_name(tmp_path):
     ],
 )
 def test_a_variant_is_named_after_what_was_chosen_but_the_seed(chosen, name):
-    from tractexp.api.job import variant
+    from tractexp.api.job import name_variant
 
-    assert variant("issa", chosen) == name
+    assert name_variant("issa", chosen) == name
 
 
 def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp_path):

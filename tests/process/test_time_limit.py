@@ -12,7 +12,7 @@ from command_line import run_command
 import tractexp
 import tractexp.data
 from tractexp.api.job import read_events
-from tractexp.api.surveying import rows_of
+from tractexp.api.surveying import build_rows
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.storage import files, time_limit
@@ -64,7 +64,7 @@ def test_a_reader_that_never_ends_is_ended_in_a_sentence(endless, door):
 
 
 def test_a_survey_goes_on_behind_such_a_file(endless):
-    (row,) = rows_of(str(endless.parent), endless.name)
+    (row,) = build_rows(str(endless.parent), endless.name)
     assert row["kind"] == "not read"
     assert SAID in row["why"]
 

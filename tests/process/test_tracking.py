@@ -297,8 +297,8 @@ def test_curves_of_runs_meet_at_common_steps():
 
 
 def test_the_commit_is_that_of_the_folder_and_says_when_files_were_changed(tmp_path):
-    assert provenance.commit(tmp_path / "nowhere") == ""
-    if provenance.commit(tmp_path):
+    assert provenance.find_commit(tmp_path / "nowhere") == ""
+    if provenance.find_commit(tmp_path):
         pytest.skip("the temporary folder lies inside a repository")
 
     def git(*arguments: str) -> str:
@@ -314,11 +314,11 @@ def test_the_commit_is_that_of_the_folder_and_says_when_files_were_changed(tmp_p
     git("commit", "-q", "-m", "first")
     git("tag", "-a", "v1", "-m", "a tag must not hide the commit")
     commit = git("rev-parse", "HEAD")
-    provenance.commit.cache_clear()
-    assert provenance.commit(tmp_path) == commit
+    provenance.find_commit.cache_clear()
+    assert provenance.find_commit(tmp_path) == commit
     (tmp_path / "a").write_text("2")
-    provenance.commit.cache_clear()
-    assert provenance.commit(tmp_path) == f"{commit}-dirty"
+    provenance.find_commit.cache_clear()
+    assert provenance.find_commit(tmp_path) == f"{commit}-dirty"
 
 
 def test_what_a_run_has_read_is_listed_by_its_digest(uri):

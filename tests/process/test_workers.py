@@ -165,4 +165,4 @@ def test_an_import_changes_nothing_of_its_process():
         "import tractexp\n"
         "assert state() == before\n"
     )
-    subprocess.run(interpreter.command("-c", code), check=True, timeout=60)
+    subprocess.run(interpreter.build_command("-c", code), check=True, timeout=60)

@@ -450,7 +450,7 @@ def test_type_checkers_see_the_names_that_a_program_gets():
 def test_every_call_has_the_door_and_every_result_a_picture():
     """All that is in a module of `api`, found rather than listed."""
     from tractexp import PUBLIC
-    from tractexp.api.load import result_kinds
+    from tractexp.api.load import list_result_kinds
     from tractexp.outcome import Outcome
 
     for name in (name for name, module in PUBLIC.items() if ".api." in module):
@@ -460,8 +460,8 @@ def test_every_call_has_the_door_and_every_result_a_picture():
             r" required",
         ):
             getattr(tractexp, name)(nonsense=1)
-    assert len(result_kinds()) == 17
-    for cls in result_kinds().values():
+    assert len(list_result_kinds()) == 17
+    for cls in list_result_kinds().values():
         assert issubclass(cls, Outcome)
         assert cls._repr_html_
         assert cls.write

@@ -14,7 +14,7 @@ from made_recordings import constant
 from test_wave_input import columns, table
 
 import tractexp
-from tractexp.cache.provenance import digest
+from tractexp.cache.provenance import hash_record
 from tractexp.errors import UserError
 from tractexp.exchange.format import Identified
 from tractexp.record import Base, OwnBase, WaveEvent, convert_to_waves, detect, rebase_events
@@ -268,8 +268,10 @@ def test_what_is_saved_comes_back_on_its_bases(fits, records, tmp_path):
     again = tractexp.load(fit.save(tmp_path / "fit.json"))
     assert again.result == fit.result
     assert again.setup.train[0].record.original_base == Base()
-    assert again.result.records[0]["sha256"] == digest(scaled(records[0], 5.04))  # as it was read
-    assert digest(again.setup.train[0].record) == again.result.records[0]["sha256"]
+    assert again.result.records[0]["sha256"] == hash_record(
+        scaled(records[0], 5.04)
+    )  # as it was read
+    assert hash_record(again.setup.train[0].record) == again.result.records[0]["sha256"]
     assert again.setup.train[0].record.base == fit.setup.train[0].record.base
     assert np.array_equal(again.predict(held).P, fit.predict(held).P)
     fit.result.write(tmp_path / "result.json")

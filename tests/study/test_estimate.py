@@ -140,23 +140,23 @@ def test_the_end_of_a_search_and_the_estimate_stand_in_one_table_with_a_word_whe
 
 
 def test_equal_numbers_have_equal_digests_and_others_have_not():
-    from tractexp.cache.provenance import digest
+    from tractexp.cache.provenance import hash_record
 
     one, two = recorded().record, recorded(seed=6).record
-    assert digest(one) == digest(replace(one, name="renamed"))
-    assert digest(one) != digest(two)
+    assert hash_record(one) == hash_record(replace(one, name="renamed"))
+    assert hash_record(one) != hash_record(two)
 
 
 def test_a_commit_is_that_of_the_package_not_of_the_folder_one_stands_in(tmp_path, monkeypatch):
     import subprocess
 
-    from tractexp.cache.provenance import commit
+    from tractexp.cache.provenance import find_commit
 
     subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
-    assert commit(tmp_path) == ""  # a repository that does not keep these files
+    assert find_commit(tmp_path) == ""  # a repository that does not keep these files
     monkeypatch.chdir(tmp_path)
-    commit.cache_clear()
-    here = commit()
+    find_commit.cache_clear()
+    here = find_commit()
     assert here == "" or len(here.removesuffix("-dirty")) == 40
 
 

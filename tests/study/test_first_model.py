@@ -10,7 +10,7 @@ import wave_records as waves
 
 import tractexp
 from independent.circuit import Earthed, Rectifier
-from tractexp.api.compose import model_of
+from tractexp.api.compose import resolve_model
 
 STATION = Path(__file__).parents[3] / "shared" / "data" / "dfr220kv-shandong" / "xtz.cfg"
 FIRST = {"voltages": [0, 1, 2], "currents": [16, 17, 18]}  # neutral earthed
@@ -25,7 +25,7 @@ QUICK = {
 
 
 def shown(events):
-    return set(model_of(None, "waves").add_shown_effects(events).effects)
+    return set(resolve_model(None, "waves").add_shown_effects(events).effects)
 
 
 def beside(seed, *devices, delta=False):
@@ -65,16 +65,16 @@ def test_the_shipped_records_show_nothing_beside_the_load(data):
 def test_a_model_that_is_asked_for_stays_as_it_is():
     events = beside([2, 7], Earthed(0.2, 1.0))
     for model in (
-        model_of("fifth_order_branch", "waves"),
-        model_of(None, "waves").with_(shown_effects=False),
-        model_of(None),
+        resolve_model("fifth_order_branch", "waves"),
+        resolve_model(None, "waves").with_(shown_effects=False),
+        resolve_model(None),
     ):
         assert model.add_shown_effects(events) is model
 
 
 def test_a_model_that_has_what_its_records_show_stays_as_it_is():
     events = beside([2, 7], Earthed(0.2, 1.0))
-    model = model_of(None, "waves").add_shown_effects(events)
+    model = resolve_model(None, "waves").add_shown_effects(events)
     again = model.add_shown_effects(events)
     assert (again.effects, again.shown) == (model.effects, model.shown)
 

@@ -8,7 +8,7 @@ import pytest
 
 import tractexp
 from tractexp.api.setup import Setup
-from tractexp.cache.provenance import digest
+from tractexp.cache.provenance import hash_record
 from tractexp.configuration.plugin import build
 from tractexp.record import Event, Record, detect
 from tractexp.record.dips import view_dip
@@ -56,7 +56,7 @@ def test_an_event_of_a_long_table_is_the_part_about_its_dip(rows):
         pytest.approx(whole.P0),
         pytest.approx(whole.noise_P, abs=1e-12),
     )
-    assert digest(part.record) == digest(whole.record)
+    assert hash_record(part.record) == hash_record(whole.record)
     assert part.record.notes == (
         f"of {rows / 50:.0f} s those from 90 to 210 s are used, about the first dip",
     )

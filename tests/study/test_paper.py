@@ -393,7 +393,7 @@ def test_a_search_of_anything_else_is_never_read_back(memory, monkeypatch):
     assert searched(monkeypatch, lambda: _recipe(bounds={"C": (0.5, 0.9)}))[1] == 2
     assert searched(monkeypatch, lambda: _recipe(shift=1e-9))[1] == 2
     assert searched(monkeypatch, lambda: _recipe(motor="mechanical"))[1] == 2
-    monkeypatch.setattr(provenance, "code", lambda: "changed")
+    monkeypatch.setattr(provenance, "hash_code", lambda: "changed")
     assert searched(monkeypatch)[1] == 2
 
 

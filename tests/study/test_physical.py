@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.api.compose import model_of
+from tractexp.api.compose import resolve_model
 from tractexp.configuration.plugin import get
 from tractexp.identification.physical import say_ranges
 from tractexp.identification.verdict import (
@@ -63,7 +63,7 @@ def odd():
 
 
 def test_records_in_kV_and_MW_are_held_and_others_are_not():
-    model = model_of("third_order_exponential")
+    model = resolve_model("third_order_exponential")
     field, plain = dips(0.006, **FIELD), dips(0.006)
     held = model.hold_to_machines(field)
     assert held.bounds == {
@@ -78,7 +78,7 @@ def test_records_in_kV_and_MW_are_held_and_others_are_not():
 
 
 def test_what_is_given_goes_before_what_machines_are():
-    model = model_of("third_order_exponential")
+    model = resolve_model("third_order_exponential")
     field = dips(0.006, **FIELD)
     assert model.with_(physical=False).hold_to_machines(field).bounds == {}
     assert model.with_(physical=True).hold_to_machines(dips(0.006)).bounds["C"] == [0.85, 0.99]
@@ -90,7 +90,7 @@ def test_what_is_given_goes_before_what_machines_are():
 def test_a_model_that_was_held_is_held_and_not_given_when_it_is_fitted_again():
     """As the extended model of an investigation is."""
     field = dips(0.006, **FIELD)
-    once = model_of("third_order_exponential").hold_to_machines(field)
+    once = resolve_model("third_order_exponential").hold_to_machines(field)
     assert once.hold_to_machines(field).held == once.held
     given = once.with_(effects=["stator_resistance"], bounds={"C": [0.3, 0.7]})
     assert {*given.hold_to_machines(field).held} == {*once.held} - {"C"}

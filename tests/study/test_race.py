@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.api.compose import model_of
+from tractexp.api.compose import resolve_model
 from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
 from tractexp.model.drive import Drive, Excitation
@@ -38,7 +38,7 @@ def dip(motor, depth=0.35, noise=1e-3):
 
 
 def auto(*names):
-    model = model_of("auto")
+    model = resolve_model("auto")
     return tractexp.compose(model).with_(candidates={"phasors": names})
 
 
@@ -101,7 +101,7 @@ def test_where_none_can_be_fitted_it_is_told():
 
 
 def test_a_model_without_candidates_is_not_raced():
-    model = model_of("third_order_exponential")
+    model = resolve_model("third_order_exponential")
     assert model.fit_for([dip("none")]) is model
 
 
@@ -122,7 +122,7 @@ def test_the_race_is_a_table_and_in_the_result():
 
 
 def test_machines_raced_in_waveforms_stand_beside_no_negative_element():
-    raced = [model_of(name) for name in model_of("auto").candidates["waves"]]
+    raced = [resolve_model(name) for name in resolve_model("auto").candidates["waves"]]
     machines = [one for one in raced if one.motor["name"] != "line_side_converter"]
     assert {one.static["name"] for one in machines} == {"compensated_branch"}
     assert len(machines) > 1

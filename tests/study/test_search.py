@@ -142,7 +142,7 @@ def test_an_end_that_the_search_has_passed_is_none(capsys, monkeypatch):
         "",
     ]
     monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
-    monkeypatch.setattr(progress, "_lively", lambda: False)
+    monkeypatch.setattr(progress, "_can_overwrite", lambda: False)
     with progress.report_search(4, None) as tell:
         tell(5, 0.25, 30)
     assert capsys.readouterr().err == "  iteration 5: 30 simulations, best objective 0.25\n"

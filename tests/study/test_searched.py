@@ -95,7 +95,7 @@ def test_searches_come_back_from_their_file_and_are_compared_alike(dip, plugins,
     asked = {"seeds": 3, "budget": 20, "cores": 1, "progress": False}
     made = tractexp.search(dip, optimizers=["guesses", "stumbles"], **asked)
     back = tractexp.load(made.save(tmp_path / "searches.json"))
-    assert files.plain(back.to_dict()) == files.plain(made.to_dict())
+    assert files.make_plain(back.to_dict()) == files.make_plain(made.to_dict())
     assert repr(back) == repr(made)
     one, other = (tractexp.compare(it, floor=1e-9, progress=False) for it in (made, back))
     assert one.content == other.content

@@ -229,7 +229,7 @@ def test_a_setup_poses_the_same_problem_after_travel(dips, model):
     )
     one = setup.problem
     middle = (one.lower + one.upper)[None] / 2
-    told = json.loads(json.dumps(tractexp.storage.files.plain(setup.to_dict())))
+    told = json.loads(json.dumps(tractexp.storage.files.make_plain(setup.to_dict())))
     packed = pickle.dumps(setup)
     assert len(packed) < 3 * len(pickle.dumps([setup.train, setup.validate]))
     for back in (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.cache.provenance import digest
+from tractexp.cache.provenance import hash_record
 from tractexp.record import Record, detect
 
 BEGIN, END = 1.0, 1.15  # s, of the dip
@@ -35,7 +35,7 @@ def test_a_record_ends_where_its_load_is_switched_after_the_dip(rate, left):
     whole = record(lambda t: np.where(t < 1.6 - 1e-9, 1.0, left), rate)
     event = detect(whole)
     assert 1.5 < event.record.t[-1] < 1.6
-    assert event.record.digest == digest(whole)
+    assert event.record.digest == hash_record(whole)
     assert "while the voltage stays: the record is cut there" in event.record.notes[-1]
     assert ("is switched off" in event.record.notes[-1]) == (left == 0)
     assert detect(event.record).record is event.record

@@ -263,9 +263,9 @@ def test_an_unknown_unit_leaves_a_record_unexamined_and_never_quiet(tmp_path):
     seen, first = look(path)
     assert first.startswith("not examined: ")
     assert "nothing happened" not in str(seen.summary())
-    from tractexp.api.surveying import rows_of
+    from tractexp.api.surveying import build_rows
 
-    assert [row["kind"] for row in rows_of(str(tmp_path), path.name)] == ["not examined"]
+    assert [row["kind"] for row in build_rows(str(tmp_path), path.name)] == ["not examined"]
 
 
 def test_a_bus_tells_the_fault_that_its_circuits_end_at_different_instants(tmp_path):
@@ -322,7 +322,7 @@ def test_a_dip_of_all_phases_names_none(tmp_path):
 
 
 def test_a_phase_that_is_dead_from_first_to_last_is_never_within_the_thresholds(tmp_path):
-    from tractexp.api.surveying import rows_of
+    from tractexp.api.surveying import build_rows
 
     t = np.arange(0, 2, 1 / RATE)
     rows = [(name, unit, x * (1e-6 if name == "UB" else 1.0)) for name, unit, x in station(t, [])]
@@ -330,7 +330,7 @@ def test_a_phase_that_is_dead_from_first_to_last_is_never_within_the_thresholds(
     bus, seen = bus_line(path)
     assert "no voltage in phase b from first to last" in bus
     assert "within the thresholds" not in str(seen.summary())
-    [row] = rows_of(str(tmp_path), path.name)
+    [row] = build_rows(str(tmp_path), path.name)
     assert "no voltage in phase b" in row["why"]
 
 

@@ -270,7 +270,7 @@ def test_a_fall_that_does_not_return_lasts_to_the_end(tmp_path):
 
 
 def test_what_is_too_slow_for_waveforms_is_not_examined(tmp_path):
-    from tractexp.api.surveying import rows_of
+    from tractexp.api.surveying import build_rows
 
     V, I = three()
     fast = 960  # samples; what follows is sampled at 200 Hz and holds the dip
@@ -289,7 +289,7 @@ def test_what_is_too_slow_for_waveforms_is_not_examined(tmp_path):
     path = next(p for p in comtrade.write(made, tmp_path / "a.cfg") if p.suffix == ".cfg")
     first = str(tractexp.look(path, progress=False).summary()).splitlines()[0]
     assert first.startswith("not examined: 1.4 s from 0.600 s on at 200 Hz hold no waveforms")
-    assert [row["kind"] for row in rows_of(str(tmp_path), path.name)] == ["not examined"]
+    assert [row["kind"] for row in build_rows(str(tmp_path), path.name)] == ["not examined"]
 
 
 def write_table(path, header, rows, delimiter=","):

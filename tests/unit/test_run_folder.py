@@ -213,5 +213,5 @@ def test_a_folder_of_others_names_no_other_file_to_go(tmp_path):
 
 
 def test_two_folders_of_one_name_are_two(tmp_path):
-    made = [files.new_folder(tmp_path / "looks" / "a_10-00-00") for _ in range(3)]
+    made = [files.make_new_folder(tmp_path / "looks" / "a_10-00-00") for _ in range(3)]
     assert [path.name for path in made] == ["a_10-00-00", "a_10-00-00_2", "a_10-00-00_3"]

@@ -3,7 +3,7 @@
 import pytest
 
 import tractexp
-from tractexp.errors import DATA, MODEL, UserError, check_range, setting, settings_as
+from tractexp.errors import DATA, MODEL, UserError, check_range, name_setting, name_settings_as
 
 
 def test_a_setting_is_the_key_outside_of_calls() -> None:
@@ -15,11 +15,14 @@ def test_a_setting_is_the_argument_within_a_call() -> None:
     """Only keys that the call takes lose their section; an outer call's arguments hold where the
     inner has none.
     """
-    with settings_as("identify", lambda: {"records", "bounds"}):
-        assert (setting("model.bounds.C"), DATA.train) == ("bounds.C", "records")
-        assert (setting("task=identify"), setting("task=plan")) == ("identify()", "task=plan")
-        assert (DATA.units, setting("optimizer.bounds")) == ("data.units", "optimizer.bounds")
-        with settings_as("read", lambda: {"units"}):
+    with name_settings_as("identify", lambda: {"records", "bounds"}):
+        assert (name_setting("model.bounds.C"), DATA.train) == ("bounds.C", "records")
+        assert (name_setting("task=identify"), name_setting("task=plan")) == (
+            "identify()",
+            "task=plan",
+        )
+        assert (DATA.units, name_setting("optimizer.bounds")) == ("data.units", "optimizer.bounds")
+        with name_settings_as("read", lambda: {"units"}):
             assert (DATA.units, MODEL.bounds) == ("units", "bounds")
         with pytest.raises(UserError, match=r"^bounds\.C=7 is out of range"):
             check_range("model.bounds.C", 7, 0, 1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.cache.provenance import digest
+from tractexp.cache.provenance import hash_record
 from tractexp.errors import UserError
 from tractexp.record import Record, detect
 
@@ -37,7 +37,7 @@ def test_the_steady_state_is_that_after_the_last_step(rate, before):
     assert 1.7 <= event.record.t[event.steady.start] <= 1.74
     np.testing.assert_allclose([event.P0, event.Q0], [0.8, 0.4], atol=2e-3)
     assert event.steady.start == 0  # what was before is not fitted
-    assert event.record.digest == digest(whole)
+    assert event.record.digest == hash_record(whole)
     assert event.record.t[event.start] == pytest.approx(BEGIN)
     [note] = event.record.notes
     assert "while the voltage stays: the steady state before the dip is that of the 0." in note

@@ -124,7 +124,7 @@ def test_a_terminal_shows_each_variant_under_a_bar(jobs, monkeypatch):
     from rich.console import Console
 
     shown = Console(file=StringIO(), force_terminal=True, width=100)
-    monkeypatch.setattr(progress, "console", lambda: shown)
+    monkeypatch.setattr(progress, "build_console", lambda: shown)
     with progress.progress(jobs) as note:
         for one, status in zip(jobs[:3], (FINISHED, FAILED, FINISHED), strict=True):
             note(one, ended(one, status, 2.0 - one.config["seed"]))

@@ -3,9 +3,9 @@
 import pytest
 
 from tractexp.text.wording import (
-    alternatives,
     format_probability,
     format_with_error,
+    join_alternatives,
     join_words,
     list_figures,
     percent,
@@ -61,12 +61,14 @@ def test_a_share_is_never_more_than_all_or_less_than_nothing():
 
 def test_alternatives_that_share_a_name_are_told_by_it():
     pairs = [("b", "a"), ("a", "c"), ("a", "d")]
-    assert alternatives(pairs) == "a beside one more effect (b, c or d)"
-    assert alternatives([*pairs, ("b", "c")]) == "a beside one more effect (b, c or d) or b and c"
-    assert alternatives(pairs[:2]) == "b and a or a and c"
-    assert alternatives([("a",), ("b",), ("c",)]) == "a, b or c"
-    assert alternatives([("a",)]) == "a"
-    assert alternatives([]) == ""
+    assert join_alternatives(pairs) == "a beside one more effect (b, c or d)"
+    assert (
+        join_alternatives([*pairs, ("b", "c")]) == "a beside one more effect (b, c or d) or b and c"
+    )
+    assert join_alternatives(pairs[:2]) == "b and a or a and c"
+    assert join_alternatives([("a",), ("b",), ("c",)]) == "a, b or c"
+    assert join_alternatives([("a",)]) == "a"
+    assert join_alternatives([]) == ""
 
 
 def test_many_figures_are_told_by_their_ends():

@@ -185,11 +185,11 @@ def test_another_way_of_packing_is_named(pack):
 )
 def test_limits_hold(pack, monkeypatch, limit, words):
     monkeypatch.setattr(zip_archive, limit, 40)
-    zip_archive._members.cache_clear()
+    zip_archive._list_members_of_state.cache_clear()
     pack({"a.csv": TABLE})
     with pytest.raises(UserError, match=words):
         tractexp.read("r.zip")
-    zip_archive._members.cache_clear()
+    zip_archive._list_members_of_state.cache_clear()
 
 
 def test_a_zip_that_is_not_there_is_no_archive(pack):

@@ -13,7 +13,7 @@ from tractexp.configuration import plugin
 from tractexp.configuration.choices import read_default_choices
 from tractexp.configuration.composition import read_choice
 from tractexp.configuration.kinds import check_kind
-from tractexp.errors import UserError, check_distinct, list_allowed, settings_as
+from tractexp.errors import UserError, check_distinct, list_allowed, name_settings_as
 from tractexp.outcome import Plain
 from tractexp.process.blas import limit_threads
 
@@ -48,9 +48,9 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
             parameter = signature.parameters[name]
             if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
                 check_kind(name, value, parameter.annotation)
-        names = settings_as(
+        names = name_settings_as(
             function.__name__,
-            lambda: {*named, *keywords, *(_settings("data") if open_ended else ())},
+            lambda: {*named, *keywords, *(_collect_settings("data") if open_ended else ())},
         )
         with names, limit_threads():
             return function(*args, **keywords)
@@ -124,7 +124,7 @@ def complete_settings(group: str, node: Mapping[str, Any]) -> dict[str, Any]:
     return {"name": node["name"], **dataclasses.asdict(plugin.build(group, node))}
 
 
-def _settings(group: str) -> list[str]:
+def _collect_settings(group: str) -> list[str]:
     """The settings of all plugins of a group."""
     classes = plugin.discover().get(group, {}).values()
     return [f.name for cls in classes for f in dataclasses.fields(cls)]  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from tractexp.blocks import Table
 from tractexp.configuration.choices import read_choices, read_default_choices, read_replacements
 from tractexp.configuration.composition import read_choice
 from tractexp.configuration.plugin import discover, get
-from tractexp.errors import UserError, check_choice, list_allowed, setting
+from tractexp.errors import UserError, check_choice, list_allowed, name_setting
 from tractexp.outcome import Plain, Tabulated
 from tractexp.text import quoting
 
@@ -114,7 +114,7 @@ class LoadModel(Portable, Plain, Tabulated):
         """
         if not self.shown_effects:
             return self
-        shown = {**self.shown, **effects_shown(self.model, events)}
+        shown = {**self.shown, **find_shown_effects(self.model, events)}
         return replace(self, effects=sorted({*self.effects, *shown}), shown=shown)
 
     def fit_for(self, events: Sequence["Event"]) -> "LoadModel":
@@ -158,7 +158,7 @@ class LoadModel(Portable, Plain, Tabulated):
     def _prepare_choice(self, name: str) -> "LoadModel":
         """A choice of model by name, in this one's domain, with what is known of its parameters."""
         other = replace(
-            model_of(name),
+            resolve_model(name),
             domain=self.domain,
             physical=self.physical,
             priors=self.priors,
@@ -279,7 +279,7 @@ def compose(
     >>> load.fixed["a_Z"], "T_prime" in load.parameters
     (0.4, True)
     """
-    composed = model_of(model, domain)
+    composed = resolve_model(model, domain)
     chosen_parts = {"motor": motor, "static": static}
     parts = {
         part: Choice.from_argument(f"model/{part}", chosen).node
@@ -306,7 +306,7 @@ def compose(
     return composed
 
 
-def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
+def find_shown_effects(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
     """{effect: how one of the events shows it}, of those that the model takes and does not have."""
     from tractexp.domain import domain_of
     from tractexp.model.parts import Effect
@@ -320,7 +320,7 @@ def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
     return {name: several[0] for name, several in signs.items() if several}
 
 
-def model_of(given: Any, domain: str | None = None) -> LoadModel:
+def resolve_model(given: Any, domain: str | None = None) -> LoadModel:
     """The model that a call was given: a name, a path, a mapping of parts, a `LoadModel` or a
     composed `Model`.
 
@@ -329,20 +329,19 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
     if domain is not None:
         check_choice("domain", domain, sorted(read_choices()[DOMAIN]))
         return replace(
-            model_of(given or read_replacements(DOMAIN, domain).get(GROUP)), domain=domain
+            resolve_model(given or read_replacements(DOMAIN, domain).get(GROUP)), domain=domain
         )
     if isinstance(given, LoadModel):
         return given
     if given is None or isinstance(given, str | Path):
         given = read_choice(GROUP, str(given or read_default_choices()[GROUP]))
     elif not isinstance(given, Mapping):
-        given = _node(given)
+        given = _build_node(given)
     keys = [f.name for f in dataclasses.fields(LoadModel)]
     for key in given:
         if key not in keys:
-            raise UserError(
-                f"{setting(f'model.{key}')}: there is no such key{list_allowed(key, keys, 'Keys')}"
-            )
+            known = list_allowed(key, keys, "Keys")
+            raise UserError(f"{name_setting(f'model.{key}')}: there is no such key{known}")
     if missing := [part for part in PARTS if not given.get(part)]:
         raise UserError(
             f"model lacks {' and '.join(missing)}; name a motor and a static load ('none' for"
@@ -357,7 +356,7 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
     return LoadModel(**composed)
 
 
-def _node(model: Any) -> dict[str, Any]:
+def _build_node(model: Any) -> dict[str, Any]:
     """The parts of a model composed of plugins."""
     try:
         motor, static = (

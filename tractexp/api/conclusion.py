@@ -100,7 +100,7 @@ def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result
     start = find_unsteady_start(uncertainty)
     fields = uncertainty.fields()
     told = fields["uncertainty"]
-    told |= {key: files.plain(agreement[key]) for key in ("gains", "odd_events")}
+    told |= {key: files.make_plain(agreement[key]) for key in ("gains", "odd_events")}
     told["notes"] += [*agreement["notes"], *map(str, filter(None, (free, start)))]
     return replace(
         result,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
 from tractexp.api.job import Job
-from tractexp.api.read import GROUP, node_of
+from tractexp.api.read import GROUP, choose_reader_node
 from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
@@ -20,7 +20,7 @@ from tractexp.recording import Recording, Writer
 from tractexp.recording.cut import cut_recording
 from tractexp.recording.reader import WaveformReader
 from tractexp.storage.time_limit import limit_time
-from tractexp.text.progress import console
+from tractexp.text.progress import build_console
 
 if TYPE_CHECKING:
     from tractexp.api.given import Records, Setting
@@ -98,12 +98,12 @@ def convert(
     """
     if not sources:
         raise UserError("nothing to read: give a file, or events as tractexp.read gives them")
-    writer = writer_of(to)
-    parts = [part for source in sources for part in _parts(source, writer, what, settings)]
+    writer = find_writer(to)
+    parts = [part for source in sources for part in _cut_parts(source, writer, what, settings)]
     return write_parts(parts, writer, Path(folder))
 
 
-def writer_of(to: str | None) -> Writer:
+def find_writer(to: str | None) -> Writer:
     """The writer of that name, or the usual one."""
     writers = discover()["writer"]
     return build(
@@ -112,7 +112,7 @@ def writer_of(to: str | None) -> Writer:
     )
 
 
-def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
+def read_parts(reader: Any, writer: Writer, what: str | None) -> list[Part]:
     """The records or recordings that a reader reads, by the names they are written under."""
     if what is not None:
         check_choice("task.what", what, WHAT)
@@ -156,14 +156,16 @@ def write_parts(parts: Sequence[Part], writer: Writer, folder: Path) -> Converte
     )
 
 
-def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, Any]) -> list[Part]:
+def _cut_parts(
+    source: Any, writer: Writer, what: str | None, settings: dict[str, Any]
+) -> list[Part]:
     """A file, an event, or a list of such, cut into what is written to a file of its own."""
     if isinstance(source, str | Path):
         with limit_time(source):
-            reader: Reader = build(GROUP, node_of(str(source), settings))
-            return parts_of(reader, writer, what)
+            reader: Reader = build(GROUP, choose_reader_node(str(source), settings))
+            return read_parts(reader, writer, what)
     if isinstance(source, Sequence):
-        return [part for one in source for part in _parts(one, writer, what, settings)]
+        return [part for one in source for part in _cut_parts(one, writer, what, settings)]
     if not isinstance(source, Record | Event):
         kind = type(source).__name__
         raise UserError(
@@ -229,6 +231,6 @@ class Convert(Task, call=convert, given=("sources", "folder", "settings")):
 
     def run(self, job: Job) -> None:
         """Write the files into the run's folder, and print what each holds."""
-        writer = writer_of(self.to)
-        parts = parts_of(build("data", job.config["data"]), writer, self.what)
-        show(write_parts(parts, writer, job.folder).summary(), console())
+        writer = find_writer(self.to)
+        parts = read_parts(build("data", job.config["data"]), writer, self.what)
+        show(write_parts(parts, writer, job.folder).summary(), build_console())

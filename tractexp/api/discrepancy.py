@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tractexp.api.arguments import public
-from tractexp.api.compose import model_of
+from tractexp.api.compose import resolve_model
 from tractexp.api.investigation import Investigation
 from tractexp.api.job import Job
 from tractexp.api.next_commands import NEXT, choose_next, list_next_commands
 from tractexp.api.question import Question
-from tractexp.api.read import dips_together
+from tractexp.api.read import read_dips_together
 from tractexp.api.setup import describe_records
 from tractexp.api.task import Task, print_result, print_written
 from tractexp.configuration.plugin import plugin
@@ -95,13 +95,13 @@ def investigate(
 
     check_range("seed", seed, 0)
     thresholds = Criteria.from_choices({"false_alarms": false_alarms, **(criteria or {})})
-    base = model_of(model, domain).with_(bounds=bounds, fixed=fixed, substeps=substeps)
+    base = resolve_model(model, domain).with_(bounds=bounds, fixed=fixed, substeps=substeps)
     if base.per_event:
         raise UserError(
             f"{MODEL.per_event}={list(base.per_event)} has no meaning in an investigation; leave it"
             " out"
         )
-    train, held = dips_together(records, validate)
+    train, held = read_dips_together(records, validate)
     base = base.fit_for(train)
     question = Question(
         train=train,
@@ -120,7 +120,10 @@ def _build_investigation(question: Question, steps: "Steps") -> Investigation:
     from tractexp.discrepancy.discrepancy_json import content
 
     return Investigation(
-        question, files.plain(content(steps)), _estimate_extended_model(question, steps), steps
+        question,
+        files.make_plain(content(steps)),
+        _estimate_extended_model(question, steps),
+        steps,
     )
 
 

@@ -18,7 +18,7 @@ from tractexp.identification.result import load
 from tractexp.outcome import Outcome
 from tractexp.record.identity import describe_identities
 from tractexp.storage import files
-from tractexp.text.progress import console, text_width
+from tractexp.text.progress import build_console, find_text_width
 
 if TYPE_CHECKING:
     from tractexp.exchange.format import Identified
@@ -123,7 +123,7 @@ def export(
     check_range("task.power", power, 1e-6)
     check_range("task.voltage", voltage, 1e-6)
     check_choice("task.base", base, BASES)
-    against = _objections(fit)
+    against = _list_objections(fit)
     if against and not doubtful:
         raise UserError(f"{'; '.join(against)}; {TASK.doubtful}=true exports it all the same")
     own, recorded = (
@@ -145,8 +145,8 @@ def export(
     notes = [
         *against,
         *filter(None, describe_identities(fit.result.identities)),
-        _base_sentence(identified, base, own.ratio, guessed=power is None and not own.in_mva),
-        _powers(identified),
+        _describe_base(identified, base, own.ratio, guessed=power is None and not own.in_mva),
+        _describe_powers(identified),
         *form.notes(identified),
     ]
     agreement, more = play_back_export(form, text, identified) if playback else (None, [])
@@ -167,7 +167,7 @@ def _choose_ratio(fit: Identification, base: str) -> float:
     return 1 / compute_rating(fit.result)
 
 
-def _objections(fit: Identification) -> list[str]:
+def _list_objections(fit: Identification) -> list[str]:
     """Why this model should not be handed on, a sentence each: by its grade, and as a physical
     load.
     """
@@ -183,7 +183,7 @@ def _objections(fit: Identification) -> list[str]:
     return against
 
 
-def _powers(load: "Identified") -> str:
+def _describe_powers(load: "Identified") -> str:
     """The powers that the load and its parts draw before the dip, in a sentence."""
     before, scale = load.steady_state, load.power
     rows = {"load": (load.ratio * load.result.before["P0"], load.ratio * load.result.before["Q0"])}
@@ -196,7 +196,7 @@ def _powers(load: "Identified") -> str:
     return f"before the dip, at {load.result.before['U0'] * load.voltage:.5g} kV: {'; '.join(said)}"
 
 
-def _base_sentence(load: "Identified", base: str, ratio: float, guessed: bool) -> str:
+def _describe_base(load: "Identified", base: str, ratio: float, guessed: bool) -> str:
     """On which base the values of an export are, in a sentence."""
     which = "" if ratio == 1 else f", {NAMES[FILE if base == FILE else OWN]}"
     if base == MACHINE and load.ratio != 1:
@@ -235,4 +235,4 @@ class Export(Task, call=export, given=("fit",)):
         told.text(*(f"note: {note}" for note in exported.notes))
         if not fit.adequate:
             told.text(*(f"next: {sentence}" for sentence in fit.advice[:1]))
-        show(told, console(), text_width())
+        show(told, build_console(), find_text_width())

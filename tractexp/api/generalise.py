@@ -16,7 +16,7 @@ from tractexp.api.task import SEARCH, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import build, plugin
 from tractexp.configuration.run_command import OF_LOAD, build_again_command
-from tractexp.errors import DATA, UserError, check_range, setting
+from tractexp.errors import DATA, UserError, check_range, name_setting
 from tractexp.outcome import Drawing, Written
 from tractexp.storage import files
 from tractexp.text.progress import Progress, tell
@@ -179,7 +179,7 @@ def generalise(
     )
     if not setup.validate:
         raise UserError(
-            f"{setting('task=generalise')} needs dips that are not fitted: name them in"
+            f"{name_setting('task=generalise')} needs dips that are not fitted: name them in"
             f" {DATA.validate}, a milder one to interpolate and a deeper one to extrapolate"
         )
     chosen = Choice.several("optimizer", optimizers)
@@ -216,7 +216,7 @@ def _judge_generalization(
     from tractexp.identification.generalization import by_depth
 
     kinds = by_depth(setup.validate, setup.train)
-    rows = [row for result, fits in searched for row in _residuals(result, fits, kinds)]
+    rows = [row for result, fits in searched for row in _compute_residuals(result, fits, kinds)]
     identified = [
         {
             key: getattr(result, key)
@@ -226,14 +226,14 @@ def _judge_generalization(
     ]
     first = {result.optimizer: (result, fits) for result, fits in reversed(searched)}
     curves = [
-        _curve(*first[name], kinds, k)
+        _build_curve(*first[name], kinds, k)
         for name in dict.fromkeys(r.optimizer for r, _ in searched)
         for k in range(len(kinds))
     ]
     return Generalised(rows, identified, curves)
 
 
-def _residuals(
+def _compute_residuals(
     result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str]
 ) -> Iterable[dict[str, Any]]:
     """Eq. (21) and Eq. (20) of P and Q on each held-out dip."""
@@ -253,7 +253,9 @@ def _residuals(
         } | ({} if fit.epsilon_i is None else {"epsilon_i": fit.epsilon_i})
 
 
-def _curve(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str], k: int) -> dict[str, Any]:
+def _build_curve(
+    result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str], k: int
+) -> dict[str, Any]:
     """Measured and calculated power of one held-out dip, (N,) each, and what its
     figure is called.
     """

@@ -12,7 +12,7 @@ from tractexp.api.compose import LoadModel
 from tractexp.api.conclusion import FitDetails, conclude_identification
 from tractexp.api.estimate import Estimate, Estimates
 from tractexp.api.fit_spec import FitSpec
-from tractexp.api.read import dips_of
+from tractexp.api.read import read_dips
 from tractexp.api.response import Response, respond_to
 from tractexp.blocks import Report, Table
 from tractexp.configuration.run_command import build_folder_command
@@ -273,7 +273,7 @@ class Identification(Written):
         if (event is None) == (t is None or U is None):
             raise UserError("predict() needs either an event, or both t= and U=")
         if event is not None:
-            (one,) = dips_of("event", event, least=1)[:1]
+            (one,) = read_dips("event", event, least=1)[:1]
             return self._predict_event(one)
         P, Q = self.result.predict(t, U, f, P0, Q0)
         band = self.result.find_band(t, U, f, P0, Q0)

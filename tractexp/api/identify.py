@@ -193,7 +193,7 @@ class Identify(Task, call=identify):
         """Estimates, errors and curves for MLflow, and the model as one that predicts where that is
         set.
         """
-        from tractexp.api.logged import logged_fit
+        from tractexp.api.logged import build_logged_fit
 
         predictor = not job.of_many if self.predictor is None else self.predictor
-        return logged_fit(job, result, predictor)
+        return build_logged_fit(job, result, predictor)

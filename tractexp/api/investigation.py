@@ -161,7 +161,7 @@ class Investigation(Written):
         own = [
             p for name in effects for p in get("effect", name)().parameters if p.null is not None
         ]
-        return [_size(p.name, parameters[p.name], p.unit) for p in own]
+        return [_format_size(p.name, parameters[p.name], p.unit) for p in own]
 
     @property
     def sets(self) -> list[Mapping[str, Any]]:
@@ -300,7 +300,7 @@ class Investigation(Written):
         return paths
 
 
-def _size(name: str, at: Mapping[str, Any], unit: str) -> str:
+def _format_size(name: str, at: Mapping[str, Any], unit: str) -> str:
     """ "k_f = 0.12 ± 0.01"."""
     error = float("nan") if at["standard_error"] is None else at["standard_error"]
     return f"{name} = {format_with_error(at['value'], error)}{'' if unit == '1' else f' {unit}'}"

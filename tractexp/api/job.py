@@ -24,7 +24,7 @@ LABEL = "load"  # the tag with station, load and dips
 NAMED = ("optimizer", "data")  # choices that a run is named after anyway
 
 
-def variant(optimizer: str, chosen: Mapping[str, str]) -> str:
+def name_variant(optimizer: str, chosen: Mapping[str, str]) -> str:
     """The name of an optimizer with the settings that were chosen beside it, whatever the seed:
     "issa levy=false".
 
@@ -79,9 +79,9 @@ class Job:
         """The events fitted and those held out as a fit takes them: on the base of the load in the
         first.
         """
-        from tractexp.api.read import dips_together
+        from tractexp.api.read import read_dips_together
 
-        return dips_together(self.events.train, self.events.validate)
+        return read_dips_together(self.events.train, self.events.validate)
 
     def holding_out(self, siblings: Mapping[str, list[str]]) -> "Job":
         """The job with those files held out that belong to its choice of data, where it names none
@@ -176,7 +176,7 @@ class Job:
         """The optimizer and what else was chosen: runs of one variant differ in their
         seeds alone.
         """
-        return variant(self.choices["optimizer"], self.given)
+        return name_variant(self.choices["optimizer"], self.given)
 
     @functools.cached_property
     def identities(self) -> "list[Identity]":
@@ -270,7 +270,7 @@ class Job:
             name=", ".join(filter(None, (self.label, name))),
             parameters={**tracking.flatten(self.config), **(values or {})},
             tags={key: text for key, text in parts.items() if text}
-            | {"git_commit": provenance.commit()},
+            | {"git_commit": provenance.find_commit()},
             parent=self.sweep,
             **content,
         )

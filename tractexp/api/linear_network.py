@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from tractexp.api.arguments import public
 from tractexp.api.compose import DOMAIN
 from tractexp.api.job import Job
-from tractexp.api.read import Dips, dips_of, dips_together
-from tractexp.api.response import Response, response_of
+from tractexp.api.read import Dips, read_dips, read_dips_together
+from tractexp.api.response import Response, build_response
 from tractexp.api.setup import describe_records
 from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
@@ -80,9 +80,9 @@ class NetworkFit(Written):
         `event` is one that `tractexp.read` gave, or what it reads, holding one dip: its voltage and
         the power before it. Raises `UserError` where the event lacks the samples of its domain.
         """
-        (one,) = dips_of("event", event, least=1)[:1]
+        (one,) = read_dips("event", event, least=1)[:1]
         own = OwnBase.from_record(self.train[0].record)
-        return response_of(_play(self.box, own.convert_event(one), "validate"), one, own)
+        return build_response(_play(self.box, own.convert_event(one), "validate"), one, own)
 
     def table(self) -> Table:
         """The poles."""
@@ -147,11 +147,13 @@ def linear_network(
     domain = domain or read_default_choices()[DOMAIN]
     check_choice("domain", domain, sorted(read_choices()[DOMAIN]))
     check_range("task.poles", poles, 0, MOST_ASKED_POLES)
-    train, held_out = dips_together(records, validate)
+    train, held_out = read_dips_together(records, validate)
     request = NetworkFit(train, held_out, domain, poles, {})
     tell(progress, describe_records(train, held_out))
     box, boxes = _fit_networks(request)
-    return NetworkFit(train, held_out, domain, poles, files.plain(_content(request, box, boxes)))
+    return NetworkFit(
+        train, held_out, domain, poles, files.make_plain(_build_content(request, box, boxes))
+    )
 
 
 def _fit_networks(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
@@ -194,7 +196,7 @@ def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
     ]
 
 
-def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[str, Any]:
+def _build_content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[str, Any]:
     """The content of `linear_network.json`."""
     from tractexp.identification.fit import model_errors
     from tractexp.identification.yardstick import network_in_words
@@ -221,8 +223,8 @@ def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[s
             | Identity.from_record(f.event.record).to_dict()
             for f in fits
         ],
-        "tractexp_version": provenance.version(),
-        "commit": provenance.commit(),
+        "tractexp_version": provenance.read_version(),
+        "commit": provenance.find_commit(),
     }
 
 

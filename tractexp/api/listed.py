@@ -29,7 +29,9 @@ class Listed(Tabulated):
         """The rows with a list in one cell as text."""
         columns = list(self.rows[0]) if self.rows else []
         return Table(
-            columns, [[_cell(row[name]) for name in columns] for row in self.rows], self.title
+            columns,
+            [[_format_cell(row[name]) for name in columns] for row in self.rows],
+            self.title,
         )
 
     def to_frame(self) -> "pandas.DataFrame":
@@ -42,6 +44,6 @@ class Listed(Tabulated):
         return frame.astype(dict.fromkeys(unknown, float))
 
 
-def _cell(value: Any) -> Any:
+def _format_cell(value: Any) -> Any:
     """A value as a cell shows it: the items of a list in a line."""
     return "; ".join(map(str, value)) if isinstance(value, list | tuple) else value

@@ -38,7 +38,7 @@ def load(path: str | Path) -> Outcome:
 
         return Identification(read_result(Path(path)))
     content = read_saved_result(path)
-    kinds = result_kinds()
+    kinds = list_result_kinds()
     if content["kind"] not in kinds:
         why = list_allowed(content["kind"], kinds, "Kinds")
         raise UserError(
@@ -56,7 +56,7 @@ def _is_bare_result(path: str | Path) -> bool:
     return isinstance(content, dict) and MARK not in content and "parameters" in content
 
 
-def result_kinds() -> dict[str, type[Outcome]]:
+def list_result_kinds() -> dict[str, type[Outcome]]:
     """The kinds of results, by name; each is known once its module is imported."""
     from tractexp import PUBLIC
 

@@ -26,7 +26,7 @@ ENDED = ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
 GRADES = (Grade.WRONG_MODEL, Grade.EFFECT_MISSING, Grade.ADEQUATE)
 
 
-def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> dict[str, Any]:
+def build_logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> dict[str, Any]:
     """Fields of `tractexp.tracking.TrackedRun`: metrics, curves and, as a predictor, the model."""
     result, of_model = fit.result, measure_model(fit)
     searched = (
@@ -42,7 +42,7 @@ def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> di
         "metrics": _describe_search_end(fit)
         | {key: getattr(result, key) for key in ("simulations", "seconds")}
         | of_model,
-        "curves": _curves(fit),
+        "curves": _build_curves(fit),
         "tags": {"grade": fit.grade},
         "seconds": result.seconds,
         "description": quoting.markdown(fit.headline),
@@ -54,10 +54,10 @@ def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> di
 
 def measure_model(fit: "Identification") -> dict[str, float]:
     """Metrics of a fitted model, whichever task fitted it: grade, errors and estimates, by name."""
-    return _errors(fit) | _estimates(fit)
+    return _collect_errors(fit) | _collect_estimates(fit)
 
 
-def _estimates(fit: "Identification") -> dict[str, float]:
+def _collect_estimates(fit: "Identification") -> dict[str, float]:
     """Each estimate with the ends of its interval, and on the base of the file where
     that differs.
     """
@@ -70,7 +70,7 @@ def _estimates(fit: "Identification") -> dict[str, float]:
     return metrics | {f"given_base.{name}": value for name, value in given.items()}
 
 
-def _errors(fit: "Identification") -> dict[str, float]:
+def _collect_errors(fit: "Identification") -> dict[str, float]:
     """How well the estimate fits, event by event too."""
     result = fit.result
     metrics = {key: getattr(result, key) for key in ("objective", "epsilon_p", "epsilon_q")}
@@ -86,10 +86,10 @@ def _errors(fit: "Identification") -> dict[str, float]:
         metrics["epsilon_i"] = max(e["epsilon_i"] for e in result.events if e["role"] == "train")
     if fit.grade:
         metrics["grade"] = GRADES.index(fit.grade)
-    return metrics | _epsilons(result)
+    return metrics | _collect_epsilons(result)
 
 
-def _epsilons(result: "Result") -> dict[str, float]:
+def _collect_epsilons(result: "Result") -> dict[str, float]:
     """The errors of each event, by its role and number."""
     return {
         f"{event['role']}_{k}_{name}": event[name]
@@ -112,7 +112,7 @@ def _describe_search_end(fit: "Identification") -> dict[str, float]:
     return metrics | {"search_simulations_to_floor": reached}
 
 
-def _curves(fit: "Identification") -> dict[str, Any]:
+def _build_curves(fit: "Identification") -> dict[str, Any]:
     """The best objective by iteration, and by simulations at steps that all runs share."""
     from tractexp.tracking import resample_to_common_steps
 

@@ -14,7 +14,7 @@ from tractexp.api.arguments import public
 from tractexp.api.joint_command import build_joint_command
 from tractexp.api.listed import Listed
 from tractexp.api.look_content import build_content
-from tractexp.api.read import node_of, record_from_dict, record_to_dict, table
+from tractexp.api.read import build_record, choose_reader_node, record_from_dict, record_to_dict
 from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
 from tractexp.outcome import Written
@@ -112,7 +112,7 @@ class Look(Written):
         import pandas
 
         return pandas.DataFrame(
-            series(_pick_item(_pick_item(self.views, file, "file").sights, feeder, "load"))
+            build_series(_pick_item(_pick_item(self.views, file, "file").sights, feeder, "load"))
         )
 
     def waveforms(self, file: int = 0) -> "pandas.DataFrame":
@@ -246,7 +246,7 @@ def look(*sources: "Records", progress: Progress = None, **settings: "Setting") 
     ]
     if not flat:
         raise UserError("nothing to look at: give a file, e.g. look('station.cfg')")
-    distinct = list(dict.fromkeys(map(_source, flat)))
+    distinct = list(dict.fromkeys(map(_find_source, flat)))
     with tell_stages(progress) as stage:
         views, contents = [], []
         if together := _join_given(distinct, settings):
@@ -261,10 +261,10 @@ def look(*sources: "Records", progress: Progress = None, **settings: "Setting") 
                 contents.append(build_content(views[-1]))
     joint = None if settings else build_joint_command(views)
     content = {"files": contents} | ({"joint": joint} if joint else {})
-    return Look(distinct, settings, files.plain(content), views)
+    return Look(distinct, settings, files.make_plain(content), views)
 
 
-def _source(given: Any) -> str | Record:
+def _find_source(given: Any) -> str | Record:
     """A path, or a record; an event of a file that is there stands for the file."""
     if isinstance(given, str | Path):
         return str(given)
@@ -274,7 +274,7 @@ def _source(given: Any) -> str | Record:
         return path if path and files.exists(path) else record
     if isinstance(record, Mapping) or hasattr(record, "columns"):
         names = record if isinstance(record, Mapping) else record.columns
-        return table({str(name): record[name] for name in names}, "frame", {})
+        return build_record({str(name): record[name] for name in names}, "frame", {})
     raise UserError(
         f"a {type(given).__name__} cannot be looked at; give a path, an event, a record or a frame"
     )
@@ -297,9 +297,9 @@ def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
     if isinstance(source, Record):
         return View(source.name, {}, [sight_of(source)])
     if settings.get("join"):
-        return view_of(source, node_of(source, settings))
+        return view_of(source, choose_reader_node(source, settings))
     try:
-        view = view_of(source, node_of(source, settings))
+        view = view_of(source, choose_reader_node(source, settings))
     except UserError as error:
         if proposed := propose_joining(source):
             raise UserError(f"{error}; {proposed}") from None
@@ -309,7 +309,7 @@ def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
     )
 
 
-def series(shown: Sight) -> dict[str, np.ndarray]:
+def build_series(shown: Sight) -> dict[str, np.ndarray]:
     """Columns (M,) of one load: t [s], f [Hz], U, U2 [kV], P [MW], Q [Mvar] and, of channels, I1,
     I2 [kA].
     """

@@ -18,7 +18,7 @@ from tractexp.recording.unrecognized import can_be_named, explain_unrecognized
 NAME_THEM = "name the channels of one load: voltages=[...] currents=[...]"
 
 
-def event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]:
+def build_event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]:
     """An event as plain data: times in s, powers in MW and Mvar, voltages as shares of that before.
 
     `begun` is the moment of t = 0: then `when` is that of the event's start.
@@ -92,12 +92,14 @@ def build_content(view: View) -> dict[str, Any]:
                 *recording.notes,
                 *([f"no load was recognised: {lacks}{remedy}"] if lacks else _tell_direct(view)),
             ],
-            "channels": [_channel(view, number) for number in range(len(recording.channels))],
+            "channels": [
+                _build_channel_row(view, number) for number in range(len(recording.channels))
+            ],
         }
         direct = bool(lacks and direct_voltage(recording))
         content |= {"lacks": lacks, "can_be_named": named, "direct": direct}
     content["measured_frequency"] = view.frequency
-    return content | {"feeders": [_feeder(view, shown) for shown in view.sights]}
+    return content | {"feeders": [_build_feeder_row(view, shown) for shown in view.sights]}
 
 
 def _tell_direct(view: View) -> list[str]:
@@ -111,7 +113,7 @@ def _tell_direct(view: View) -> list[str]:
     return describe_direct_beside(view.recording, steady)
 
 
-def _channel(view: View, number: int) -> dict[str, Any]:
+def _build_channel_row(view: View, number: int) -> dict[str, Any]:
     """A channel's row: name, unit, phase, quality."""
     assert view.recording is not None
     channel, fitness = view.recording.channels[number], view.quality[number]
@@ -131,7 +133,7 @@ def _channel(view: View, number: int) -> dict[str, Any]:
     }
 
 
-def _feeder(view: View, shown: Sight) -> dict[str, Any]:
+def _build_feeder_row(view: View, shown: Sight) -> dict[str, Any]:
     """A load's row: its channels, power and what speaks for it."""
     feeder, powers = shown.feeder, view.powers(shown)
     names = [c.name for c in view.recording.channels] if view.recording else []
@@ -159,7 +161,7 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
         "P": P,
         "Q": Q,
         "units": units,
-        **_sums(shown),
+        **_measure_sums(shown),
         "said": list(shown.said),
         "type_test": shown.type_test and shown.type_test.to_dict(),
         "unexamined": shown.unexamined,
@@ -167,7 +169,9 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
         "secondary": shown.secondary,
         "clipped": _tell_clipped(view, shown),
         "command": build_load_command(view, shown),
-        "events": [hide_secondary(event_row(event, view.begun), shown) for event in shown.events],
+        "events": [
+            hide_secondary(build_event_row(event, view.begun), shown) for event in shown.events
+        ],
     }
 
 
@@ -193,7 +197,7 @@ def _name(connection: Any) -> str:
     return connection["name"] if isinstance(connection, Mapping) else str(connection)
 
 
-def _sums(shown: Sight) -> dict[str, Any]:
+def _measure_sums(shown: Sight) -> dict[str, Any]:
     """Kirchhoff: the sums of the three voltages and of the three currents, as shares of a phase's,
     at the beginning.
     """

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp.api.setup import Setup
 from tractexp.blocks import Report, Table
-from tractexp.errors import MODEL, TASK, UserError, setting
+from tractexp.errors import MODEL, TASK, UserError, name_setting
 from tractexp.outcome import Written
 from tractexp.record.identity import title_of
 from tractexp.storage import files
@@ -43,7 +43,7 @@ class Recommended(Written):
     @functools.cached_property
     def event(self) -> "NextEvent":
         """The chosen event behind the page; of a loaded result it is computed again."""
-        return self.behind or _event(self.setup, self.rivals, False)
+        return self.behind or _choose_event(self.setup, self.rivals, False)
 
     def table(self) -> Table:
         """Every event tried, the surest first."""
@@ -66,12 +66,12 @@ def recommend_event(setup: Setup, rivals: Any, progress: Progress = None) -> Rec
     """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be
     planned for.
     """
-    sets = sets_of(rivals)
-    event = _event(setup, sets, progress)
-    return Recommended(setup, sets, files.plain(event.to_dict()), event)
+    sets = read_sets(rivals)
+    event = _choose_event(setup, sets, progress)
+    return Recommended(setup, sets, files.make_plain(event.to_dict()), event)
 
 
-def sets_of(rivals: Any) -> list[list[str]]:
+def read_sets(rivals: Any) -> list[list[str]]:
     """Sets of effects: from names, `a+b` for two at once, or from the `discrepancy.json` of a tie.
 
     Raises `UserError` for a file that holds no tie.
@@ -79,7 +79,7 @@ def sets_of(rivals: Any) -> list[list[str]]:
     if not isinstance(rivals, str):
         return [name.split("+") if isinstance(name, str) else list(name) for name in rivals]
     path = Path(rivals)
-    if not files.there(path):
+    if not files.is_there(path):
         raise UserError(
             f"{TASK.rivals}={rivals}: there is no such file; give names of effects, [a,b] or"
             " [a,b+c], or the discrepancy.json of an investigation that ended tied"
@@ -98,7 +98,7 @@ def sets_of(rivals: Any) -> list[list[str]]:
     return investigation["name_sets"]
 
 
-def _event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) -> "NextEvent":
+def _choose_event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) -> "NextEvent":
     """The event that tells rivals apart. Raises `UserError` for a model with `per_event`, or sets
     that do not fit it.
     """
@@ -107,7 +107,8 @@ def _event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) ->
     m = setup.model
     if m.per_event:
         raise UserError(
-            f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty"
+            f"{name_setting('task=plan')} plans for shared parameters;"
+            f" leave {MODEL.per_event} empty"
         )
     with tell_stages(progress) as tell:
         return event_for(

@@ -19,7 +19,7 @@ from tractexp.api.task import Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
 from tractexp.configuration.run_command import suggest_run
-from tractexp.errors import MODEL, TASK, UserError, check_range, setting
+from tractexp.errors import MODEL, TASK, UserError, check_range, name_setting
 from tractexp.identification import plan as planning
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.fit import play
@@ -192,7 +192,7 @@ def plan(
         return recommend_event(setup, rivals, progress)
     error = 0.0
     if isinstance(values, Identification):
-        error = _missed_by(values.result)
+        error = _find_missed_share(values.result)
         values = values.result.on_base_of(setup.train[0].record)
     asked = {
         "parameter": parameter,
@@ -209,7 +209,7 @@ def plan(
         "error": error,
     }
     planned = _forecast_plan(setup, **asked)
-    return Forecasts(setup, asked, files.plain(_content(planned)), planned)
+    return Forecasts(setup, asked, files.make_plain(_build_content(planned)), planned)
 
 
 def _forecast_plan(
@@ -227,17 +227,18 @@ def _forecast_plan(
     planning.column(problem.space.names, parameter)
     if problem.per_event:
         raise UserError(
-            f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty"
+            f"{name_setting('task=plan')} plans for shared parameters;"
+            f" leave {MODEL.per_event} empty"
         )
     for name in GRIDS:
         if given[name] is not None and name not in problem.domain.shaped_by:
-            where = f"{setting(f'task.{name}')}={given[name]:g}"
+            where = f"{name_setting(f'task.{name}')}={given[name]:g}"
             raise UserError(f"{where} is of waveforms: add domain=waves, or leave it out")
     deepest = max(problem.events, key=lambda e: e.depth)
     at, origin, noise, missed = _guess(setup, deepest, values)
-    shape = replace(_shape(deepest, seen=noise, **given), error=missed or error)
+    shape = replace(_choose_shape(deepest, seen=noise, **given), error=missed or error)
     shape.check()
-    scans = _scans(problem, at, shape)
+    scans = _scan_properties(problem, at, shape)
     needed = planning.depth_needed(scans[DEPTH][1], parameter, within)
     best = planning.best_events(problem, at, least, events) if len(recorded) > 1 else []
     return Planned(problem, at, origin, _describe_shape(shape), needed, scans, best, least, events)
@@ -264,7 +265,7 @@ def select_events(setup: Setup, values: Any, most: int) -> list[ChosenEvent]:
     return planning.best_of([*informations.values()], [*informations], 0.0, most)
 
 
-def _shape(
+def _choose_shape(
     event: Event, noise: float | None, seen: Noise | None = None, **given: float | None
 ) -> DipShape:
     """The dip to plan for: the recorded one, with the noise `seen` in its fit, and what is given
@@ -308,11 +309,11 @@ def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, No
             " model"
         )
     origin = f"the values of {'an identification' if given else values}"
-    missed = 0.0 if result is None else _missed_by(result)
+    missed = 0.0 if result is None else _find_missed_share(result)
     return np.array([by_parameter[n] for n in problem.space.names]), origin, None, missed
 
 
-def _missed_by(result: Result) -> float:
+def _find_missed_share(result: Result) -> float:
     """The share of a response that an identified model misses beyond the noise, on average; 0 where
     noise alone leaves as much.
     """
@@ -322,7 +323,7 @@ def _missed_by(result: Result) -> float:
     return ModelError.from_content(told.get("held_out") or told).value
 
 
-def _scans(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
+def _scan_properties(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
     """{label: (x, forecasts)}: one property of the dip varied at a time."""
 
     def scan_shapes(key: str, grid: tuple[float, ...]) -> Any:
@@ -362,7 +363,7 @@ def _describe_shape(shape: DipShape) -> str:
     return f"planned: {dip}, noise {first} in {names[0]} and {second} in {names[1]}, of P, {memory}"
 
 
-def _content(planned: Planned) -> dict[str, Any]:
+def _build_content(planned: Planned) -> dict[str, Any]:
     """The content of `plan.json`; half intervals are shares of the value, null where there
     is none.
     """

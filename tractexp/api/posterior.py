@@ -179,7 +179,7 @@ def posterior(
         "converged": drawn.has_converged,
         "seconds": time.perf_counter() - started,
     }
-    return Sampled(fit, settings, files.plain(content), drawn)
+    return Sampled(fit, settings, files.make_plain(content), drawn)
 
 
 @plugin
@@ -190,6 +190,6 @@ class Posterior(Task, call=posterior):
 
     def collect_log(self, job: Job, result: Sampled) -> dict[str, Any]:
         """The fields that an identification logs."""
-        from tractexp.api.logged import logged_fit
+        from tractexp.api.logged import build_logged_fit
 
-        return logged_fit(job, result.fit)
+        return build_logged_fit(job, result.fit)

@@ -152,7 +152,7 @@ def profile(
     uncertainty = fit.details.uncertainty
     started = time.perf_counter()
     scan = profiles(uncertainty, points, parts=counter("points at most on the profiles", progress))
-    content = _content(scan, time.perf_counter() - started)
+    content = _build_content(scan, time.perf_counter() - started)
     verdicts = {name: str(verdict) for name, verdict in scan.verdicts.items()}
     intervals = {p.name: list(p.interval) for p in scan.profiles}
     fields = scan.uncertainty.fields() | {"verdicts": verdicts, "intervals": intervals}
@@ -162,9 +162,9 @@ def profile(
     return Profiled(fit, points, content, replace(fit.result, **fields), curvature, scan)
 
 
-def _content(scan: "Profiles", seconds: float) -> dict[str, Any]:
+def _build_content(scan: "Profiles", seconds: float) -> dict[str, Any]:
     """The content of `profile.json`."""
-    return files.plain(
+    return files.make_plain(
         {
             "threshold": scan.threshold,
             "simulations": scan.simulations,
@@ -194,6 +194,6 @@ class Profile(Task, call=profile):
 
     def collect_log(self, job: Job, result: Profiled) -> dict[str, Any]:
         """The fields that an identification logs, with these intervals."""
-        from tractexp.api.logged import logged_fit
+        from tractexp.api.logged import build_logged_fit
 
-        return logged_fit(job, result.identification)
+        return build_logged_fit(job, result.identification)

@@ -13,7 +13,7 @@ from tractexp.identification.conclude import refuse_failed
 from tractexp.identification.search import search
 from tractexp.inference.problem import Problem
 from tractexp.text.progress import Progress, tell_stages
-from tractexp.text.wording import shown_in_words
+from tractexp.text.wording import describe_shown_effects
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.findings import Findings as Steps
@@ -35,7 +35,7 @@ class Question(Given):
         base = self.model
         with tell_stages(progress) as tell:
             if base.shown:
-                tell(shown_in_words(base.shown))
+                tell(describe_shown_effects(base.shown))
             return find_missing_effects(
                 base.model,
                 self.train,

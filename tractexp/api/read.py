@@ -175,13 +175,13 @@ def read(
         raise UserError(f"name={name} names arrays (t=, U=, P=, Q=), and none are given")
     if not (sources or columns):
         raise UserError("nothing to read: give a file, a frame, or the arrays t=, U=, P= and Q=")
-    records = [record for source in sources for record in _records(source, settings)]
-    records += [table(columns, name or "arrays", settings)] if columns else []
+    records = [record for source in sources for record in _read_records(source, settings)]
+    records += [build_record(columns, name or "arrays", settings)] if columns else []
     names = [record.name for record in records]
     return Dips(detect(replace(r, name=r.where) if names.count(r.name) > 1 else r) for r in records)
 
 
-def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
+def read_dips(argument: str, given: Any, least: int = 0) -> Dips:
     """The records of a call: events, or whatever `read` reads, one or a list of them."""
     listed = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     dips = Dips(e for one in listed for e in ([one] if isinstance(one, Event) else read(one)))
@@ -192,14 +192,14 @@ def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
     return dips
 
 
-def dips_together(records: Any, validate: Any) -> tuple[Dips, Dips]:
+def read_dips_together(records: Any, validate: Any) -> tuple[Dips, Dips]:
     """Events fitted and held out, as `dips_of`, all on the base of the load in the first one."""
-    train, held = dips_of("records", records, least=1), dips_of("validate", validate)
+    train, held = read_dips("records", records, least=1), read_dips("validate", validate)
     events = rebase_events([view_dip(event) for event in (*train, *held)])
     return Dips(events[: len(train)]), Dips(events[len(train) :])
 
 
-def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) -> Record:
+def build_record(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) -> Record:
     """The checked record of columns (N,) each; further columns are left out with a note."""
     bases = {"base_voltage": None, "base_power": None, "frequency": None}
     for key, value in settings.items():
@@ -215,7 +215,7 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
     spare = [str(key) for key in columns if key not in (*REQUIRED, *OPTIONAL)]
     notes = (f"columns not used: {', '.join(spare)}",) if spare else ()
     values = {
-        key: _array(columns[key], f"{name}: {key}")
+        key: _check_array(columns[key], f"{name}: {key}")
         for key in (*REQUIRED, *OPTIONAL)
         if key in columns
     }
@@ -228,7 +228,7 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
     return Record(name, base=base, notes=notes, **signals).uniform().check()
 
 
-def _array(values: Any, where: str) -> np.ndarray:
+def _check_array(values: Any, where: str) -> np.ndarray:
     """Values as numbers. Raises `UserError` with the first that is none."""
     try:
         array = np.array(values, dtype=float)
@@ -252,10 +252,10 @@ def _find_odd_value(values: Any) -> str:
     return f"a {type(values).__name__}"
 
 
-def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
+def _read_records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
     """The records of a source. Raises `UserError` for what is none."""
     if isinstance(source, str | Path):
-        yield from _file(str(source), settings)
+        yield from _read_file(str(source), settings)
     elif isinstance(source, Record | Event):
         if settings:
             raise UserError(
@@ -267,7 +267,7 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
             str(key): source[key]
             for key in (source if isinstance(source, Mapping) else source.columns)
         }
-        yield table(columns, "frame", settings)
+        yield build_record(columns, "frame", settings)
     else:
         kind = type(source).__name__
         raise UserError(
@@ -276,14 +276,14 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
         )
 
 
-def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
+def _read_file(path: str, settings: Mapping[str, Any]) -> list[Record]:
     """The records of a file, by the reader its ending names, or of a choice of `conf/data`."""
     with time_limit.limit_time(path):
-        read = read_records(node_of(path, settings))
+        read = read_records(choose_reader_node(path, settings))
     return [*read.train, *read.validate]
 
 
-def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
+def choose_reader_node(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """The reader that a path, or a choice of `conf/data`, asks for, with its settings."""
     if not files.exists(path):
         shipped = list_choices(GROUP, files=True)

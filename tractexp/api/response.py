@@ -87,9 +87,9 @@ class Response:
 
     def write(self, stem: Path) -> list[Path]:
         """Write columns to `stem`.csv; of waveforms currents, too."""
-        columns = [_csv(stem.with_suffix(".csv"), self.columns)]
+        columns = [_write_csv(stem.with_suffix(".csv"), self.columns)]
         return columns + (
-            [_csv(stem.with_name(f"{stem.name}_currents.csv"), self.currents)]
+            [_write_csv(stem.with_name(f"{stem.name}_currents.csv"), self.currents)]
             if self.currents
             else []
         )
@@ -115,7 +115,7 @@ class Response:
         )
 
 
-def _csv(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
+def _write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
     """Write columns of numbers with their names."""
     text = io.StringIO()
     rows = np.column_stack(list(columns.values()))
@@ -133,14 +133,14 @@ def respond_to(
     """
     from tractexp.identification.fit import respond
 
-    return response_of(
+    return build_response(
         respond(model, values, event if own is None else own.convert_event(event), "validate"),
         event,
         own,
     )
 
 
-def response_of(fit: "Fit", event: Event, own: OwnBase | None = None) -> Response:
+def build_response(fit: "Fit", event: Event, own: OwnBase | None = None) -> Response:
     """The calculated response to an event, from the base `own` to that of its file."""
     # of waveforms, as the estimator sees recorded and calculated currents
     record = fit.event.record
@@ -159,12 +159,12 @@ def response_of(fit: "Fit", event: Event, own: OwnBase | None = None) -> Respons
         (measured[0], measured[1]),
         errors,
         notes,
-        _currents(fit, ratio),
+        _extract_currents(fit, ratio),
         fit.epsilon_i,
     )
 
 
-def _currents(fit: "Fit", ratio: float) -> dict[str, np.ndarray]:
+def _extract_currents(fit: "Fit", ratio: float) -> dict[str, np.ndarray]:
     """t [s] and the currents of each phase [pu of their peak], calculated and measured; none of
     phasors.
     """

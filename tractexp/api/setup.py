@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 from tractexp.api.arguments import Choice
-from tractexp.api.compose import LoadModel, Portable, model_of
-from tractexp.api.read import Dips, dips_together
+from tractexp.api.compose import LoadModel, Portable, resolve_model
+from tractexp.api.read import Dips, read_dips_together
 from tractexp.api.task import OF_MODEL
 from tractexp.configuration.schema import LEAST
 from tractexp.errors import check_range
@@ -17,7 +17,7 @@ from tractexp.outcome import Plain
 from tractexp.record import Event, describe
 from tractexp.record.identity import Identity
 from tractexp.text.progress import Progress, report_search
-from tractexp.text.wording import shown_in_words
+from tractexp.text.wording import describe_shown_effects
 
 if TYPE_CHECKING:
     from tractexp.identification.search import Limits, SearchResult
@@ -54,9 +54,9 @@ class Setup(Given):
         """
         for key, least in LEAST.items():
             check_range(key, given.get(key), least)
-        train, held = dips_together(records, validate)
+        train, held = read_dips_together(records, validate)
         of_model = {key: given.pop(key) for key in OF_MODEL if key in given}
-        load = model_of(model, of_model.get("domain")).with_(**of_model)
+        load = resolve_model(model, of_model.get("domain")).with_(**of_model)
         load = load.fit_for(train)
         return cls(
             train=train,
@@ -96,7 +96,7 @@ class Setup(Given):
         problem = self.problem
         model = f"model: {problem.model.title}, {problem.space.dimension} parameters"
         steps = f"Runge-Kutta steps: {problem.step.describe(problem.events)}"
-        shown = [shown_in_words(self.model.shown)] if self.model.shown else []
+        shown = [describe_shown_effects(self.model.shown)] if self.model.shown else []
         return [*describe_records(self.train, self.validate), f"{model}; {steps}", *shown]
 
     def search(self, optimizer: Choice, seed: int, progress: Progress) -> "SearchResult":

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from tractexp.api.arguments import public
-from tractexp.api.compose import LoadModel, model_of
+from tractexp.api.compose import LoadModel, resolve_model
 from tractexp.api.identification import Identification
 from tractexp.api.job import Job
-from tractexp.api.read import dips_of
+from tractexp.api.read import read_dips
 from tractexp.api.response import Response, respond_to
 from tractexp.api.task import LOAD, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
 from tractexp.domain import domain_of
-from tractexp.errors import TASK, UserError, check_range, list_allowed, setting
+from tractexp.errors import TASK, UserError, check_range, list_allowed, name_setting
 from tractexp.identification.result import load
 from tractexp.outcome import Drawing, Written
 
@@ -127,15 +127,15 @@ class Simulation(Written):
         return [
             path
             for k, one in enumerate(self.responses, start=1)
-            for path in one.write(folder / _stem(k))
+            for path in one.write(folder / _name_stem(k))
         ]
 
     def drawings(self) -> Mapping[str, Drawing]:
         """response.svg, with a number from the second event on."""
-        return {f"{_stem(k)}.svg": one.draw for k, one in enumerate(self.responses, start=1)}
+        return {f"{_name_stem(k)}.svg": one.draw for k, one in enumerate(self.responses, start=1)}
 
 
-def _stem(number: int) -> str:
+def _name_stem(number: int) -> str:
     """The name of an event's files without ending."""
     return "response" if number == 1 else f"response_{number}"
 
@@ -215,14 +215,14 @@ def simulate(
             *(f.name for f in fields(Dip)[1:] if getattr(dip, f.name) != f.default),
         ]
     ):
-        where = setting(f"task.{needless[0]}")
+        where = name_setting(f"task.{needless[0]}")
         raise UserError(
             f"{where} describes a dip made by hand; give its depth, too, or leave it out"
         )
     fit = model if isinstance(model, Identification) else None
-    load = fit.model if fit else model_of(model)
+    load = fit.model if fit else resolve_model(model)
     at = order_values(load.model.names, fit.result.parameters if fit else {}, values or {})
-    events = dips_of("records", records)
+    events = read_dips("records", records)
     if bool(events) == (depth is not None):
         raise UserError("give either records to play, or the depth of a dip")
     own = fit.result.base if fit else None

@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp.api.arguments import public
-from tractexp.api.compose import LoadModel, model_of
+from tractexp.api.compose import LoadModel, resolve_model
 from tractexp.api.identification import UNUSABLE, Identification
 from tractexp.api.job import Job
 from tractexp.api.joint_command import build_fit_command
 from tractexp.api.listed import Listed
 from tractexp.api.station_load import LoadJob, fit_load, read_files, restore_dips
 from tractexp.api.survey import survey
-from tractexp.api.surveying import FEWEST_DIPS, complete_entries, keys, name_load
+from tractexp.api.surveying import FEWEST_DIPS, complete_entries, compute_keys, name_load
 from tractexp.api.task import Task, call
 from tractexp.blocks import Report, Table
-from tractexp.cache.store import Store, environment, key
+from tractexp.cache.store import Store, describe_environment, key
 from tractexp.configuration.overrides import format_assignment, survey_of
 from tractexp.configuration.plugin import get, plugin
 from tractexp.configuration.run_command import find_folder
@@ -28,7 +28,7 @@ from tractexp.errors import DATA, UserError, check_choice, check_range, list_all
 from tractexp.exchange.format import choose_format
 from tractexp.identification.result import Result
 from tractexp.outcome import Written
-from tractexp.process.workers import Workers, backends
+from tractexp.process.workers import Workers, list_backends
 from tractexp.record import Record
 from tractexp.report import station as shown
 from tractexp.storage import files
@@ -218,10 +218,10 @@ def fit_station(
         For a folder that is not there or in which no event is worth fitting.
     """
     check_range("task.cores", cores, 1)
-    check_choice("task.backend", backend, backends())
+    check_choice("task.backend", backend, list_backends())
     workers = Workers(cores or -1, backend, address, where="task")
     chosen = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "physical": physical}
-    load = model_of(model).with_(**chosen)
+    load = resolve_model(model).with_(**chosen)
     if load.window is None:
         load = replace(load, window=window)
     check_window(load.window, load.domain)
@@ -256,7 +256,7 @@ def _read_dips(
     wanted = defaultdict[str, list[str]](list)
     for row in rows:
         wanted[row["file"]].append(row["event"])
-    own = keys(folder, [folder / file for file in wanted])
+    own = compute_keys(folder, [folder / file for file in wanted])
 
     def read(fresh: Sequence[str]) -> Iterator[tuple[str, Any]]:
         return read_files(folder, {file: wanted[file] for file in fresh}, workers)
@@ -308,7 +308,7 @@ def _fit_loads(
     """The entry of each load; of one that was fitted to the same dips before, the stored one."""
     store = Store(LOADS, folder=keep or Path())
     names = [
-        key(environment(), job.load, job.station, job.keys, job.model) if keep else ""
+        key(describe_environment(), job.load, job.station, job.keys, job.model) if keep else ""
         for job in jobs
     ]
     entries = enumerate(map(store.read_json, names))

@@ -107,7 +107,7 @@ def fit_load(job: LoadJob) -> dict[str, Any]:
     """The fit of all dips of a load as plain data; else why they tell nothing."""
     told = {"load": job.load, "station": job.station}
     try:
-        return told | files.plain(_fit(job))
+        return told | files.make_plain(_fit(job))
     except UserError as error:
         return told | {"why": str(error)}
 
@@ -218,7 +218,7 @@ def _tell_terms(fit: SharedFit, composition: Composition) -> dict[str, Any]:
 def _tell_power(dips: Sequence[Dip], fit: SharedFit) -> dict[str, Any]:
     """P before the dips [MW, or pu of the file], and by the terms that it shows."""
     kept = fit.regular
-    P = np.array([_power(dips[k].event) for k in kept])
+    P = np.array([_measure_power(dips[k].event) for k in kept])
     times, nothing = [dips[k].when for k in kept], np.zeros(len(kept))
     composition, shown = estimate_composition(P, nothing, times), find_terms(P, nothing, times)
     return {
@@ -231,7 +231,7 @@ def _tell_power(dips: Sequence[Dip], fit: SharedFit) -> dict[str, Any]:
     }
 
 
-def _power(event: Event) -> float:
+def _measure_power(event: Event) -> float:
     own = OwnBase.from_record(event.record)
     return event.P0 * (own.power if own.in_mva else own.ratio)
 
@@ -256,7 +256,7 @@ def _tell_events(
             "event": name,
             "when": dip.when and dip.when.isoformat(),
             "depth": dip.event.depth,
-            "P": _power(dip.event),
+            "P": _measure_power(dip.event),
             "Q": dip.event.Q0 * (own.power if own.in_mva else own.ratio),
             "share": shares[k],
             "low": shares[k] - half[k],

@@ -17,7 +17,7 @@ from tractexp.api.load_command import RACE
 from tractexp.api.surveying import (
     FEWEST_DIPS,
     complete_entries,
-    keys,
+    compute_keys,
     look_at_files,
     name_load,
 )
@@ -137,7 +137,7 @@ class Surveyed(Written):
             station = ("task=station", format_assignment("data.path", self.folder))
             return f"fit each load to all its dips: {quoting.shell('tractexp', *station)}"
         if worth:
-            best = max(worth, key=_promise)
+            best = max(worth, key=_rate_promise)
             return f"fit {best['event']}: {best['command']}"
         seen = next((row for row in self.content["rows"] if row["kind"] != UNREAD), None)
         if seen is None:
@@ -150,12 +150,12 @@ class Surveyed(Written):
         frame = self.to_frame()
         return [
             files.write_json(folder / "survey.json", self.content),
-            files.write(folder / "survey.csv", frame.map(_cell).to_csv(index=False)),
+            files.write(folder / "survey.csv", frame.map(_quote_cell).to_csv(index=False)),
             files.write(folder / "survey.parquet", frame.to_parquet(index=False)),
         ]
 
 
-def _cell(value: Any) -> Any:
+def _quote_cell(value: Any) -> Any:
     """A text that no spreadsheet takes for a formula."""
     return quoting.cell(value) if isinstance(value, str) else value
 
@@ -214,7 +214,7 @@ def survey(
     if not paths:
         raise UserError(f"{DATA.path}={folder} holds no file that can be read")
     look_at = functools.partial(look_at_files, place, cores=cores or -1)
-    own, where = keys(place, paths), Path(keep) if keep else None
+    own, where = compute_keys(place, paths), Path(keep) if keep else None
     rows, looked_at = complete_entries(ROWS, where, own, look_at, "files", progress)
     content = {
         "folder": str(folder),
@@ -227,16 +227,16 @@ def survey(
     }
     if informative is None:
         return Surveyed(content)
-    worth = sorted((row for row in content["rows"] if row["worth"]), key=_promise, reverse=True)[
-        :MOST_RANKED_EVENTS
-    ]
+    worth = sorted(
+        (row for row in content["rows"] if row["worth"]), key=_rate_promise, reverse=True
+    )[:MOST_RANKED_EVENTS]
     settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
     with tell_stages(progress) as stage:
         stage(f"choosing among {len(worth)} events")
         best = _choose_most_telling(
             place, [row["event"] for row in worth], informative, model, values, settings
         )
-    content["informative"] = files.plain(
+    content["informative"] = files.make_plain(
         [{"event": c.name, "gain": c.gain, "half": c.half} for c in best]
     )
     raced = propose_race(content["rows"], content["informative"]) if model is None else []
@@ -256,7 +256,7 @@ def propose_race(
     return [RACE]
 
 
-def _promise(row: Mapping[str, Any]) -> float:
+def _rate_promise(row: Mapping[str, Any]) -> float:
     """How much the event of a row may tell."""
     return measure_promise(row["depth"], row["noise"])
 

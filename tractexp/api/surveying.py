@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.api.load_command import build_load_command
-from tractexp.api.look import series
-from tractexp.api.look_content import event_row, hide_secondary
+from tractexp.api.look import build_series
+from tractexp.api.look_content import build_event_row, hide_secondary
 from tractexp.cache.store import Store, key
 from tractexp.errors import UserError
 from tractexp.process.workers import Workers
@@ -60,7 +60,7 @@ FEWEST_DIPS = 2  # of a load that a station fits
 LONGEST_PICTURED_EVENT = 5.0  # s of an event there
 
 
-def rows_of(folder: str, file: str) -> Rows:
+def build_rows(folder: str, file: str) -> Rows:
     """The rows of one file, `file` being its path within the folder. Nothing that happens in here
     is an error.
     """
@@ -70,10 +70,10 @@ def rows_of(folder: str, file: str) -> Rows:
         return [
             row
             for path in within
-            for row in _rows_of_one(folder, path.relative_to(folder).as_posix())
+            for row in _build_rows_of_file(folder, path.relative_to(folder).as_posix())
         ]
     except UserError as error:
-        return [_blank(file) | {"kind": UNREAD, "why": str(error)}]
+        return [_make_blank_row(file) | {"kind": UNREAD, "why": str(error)}]
 
 
 def _add_proposal(rows: Rows, path: Path) -> Rows:
@@ -83,17 +83,17 @@ def _add_proposal(rows: Rows, path: Path) -> Rows:
     return [{**row, "why": "; ".join(said)} for row, said in zip(rows, why, strict=True)]
 
 
-def _blank(file: str) -> dict[str, Any]:
+def _make_blank_row(file: str) -> dict[str, Any]:
     """A row of a file of which nothing is known."""
     return dict.fromkeys(COLUMNS) | {"file": file, "worth": False, "why": ""}
 
 
-def _rows_of_one(folder: str, file: str) -> Rows:
+def _build_rows_of_file(folder: str, file: str) -> Rows:
     """The rows of one file that is no .zip, or of a .zip that holds the files of one event."""
-    row, path = _blank(file), Path(folder, file)
+    row, path = _make_blank_row(file), Path(folder, file)
     try:
         with time_limit.limit_time(path):
-            return _rows_of_view(row, path)
+            return _build_rows_of_view(row, path)
     except UserError as error:
         return [row | {"kind": UNREAD, "why": str(error)}]
     except Exception as error:  # a survey of thousands of files does not end with one of them
@@ -104,19 +104,19 @@ def _rows_of_one(folder: str, file: str) -> Rows:
         return [row | {"kind": UNREAD, "why": why}]
 
 
-def _rows_of_view(row: dict[str, Any], path: Path) -> Rows:
+def _build_rows_of_view(row: dict[str, Any], path: Path) -> Rows:
     """The rows of a file, each with what stands in `row`."""
     try:
         view = archive.look_at_file(path)
     except UserError as error:
         return _add_proposal([row | {"kind": UNREAD, "why": str(error)}], path)
     rows = [
-        row | _event(view, row["file"], number, shown, event)
+        row | _build_event_row(view, row["file"], number, shown, event)
         for number, shown in enumerate(view.sights, 1)
         for event in shown.events
     ]
-    rows = rows or [row | _common(view) | _describe_file_without_events(view)]
-    return files.plain(rows if shows_load(view) else _add_proposal(rows, path))
+    rows = rows or [row | _list_common(view) | _describe_file_without_events(view)]
+    return files.make_plain(rows if shows_load(view) else _add_proposal(rows, path))
 
 
 def _describe_file_without_events(view: View) -> dict[str, str]:
@@ -140,7 +140,7 @@ def _find_dead_phases(view: View) -> list[str]:
     return [*filter(None, (describe_dead_phases(s.dead_phases) for s in view.sights))]
 
 
-def _common(view: View) -> dict[str, Any]:
+def _list_common(view: View) -> dict[str, Any]:
     """The cells that all rows of a file share: station, rate, begin."""
     recording = view.recording
     if recording is None:
@@ -151,25 +151,27 @@ def _common(view: View) -> dict[str, Any]:
     return {"station": recording.station, "rate": max(s.rate for s in recording.segments)}
 
 
-def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) -> dict[str, Any]:
+def _build_event_row(
+    view: View, file: str, number: int, shown: Sight, seen: LoadEvent
+) -> dict[str, Any]:
     """The row of an event."""
-    fields = hide_secondary(event_row(seen, view.begun), shown)
+    fields = hide_secondary(build_event_row(seen, view.begun), shown)
     event = seen.event
     return {
-        **_common(view),
+        **_list_common(view),
         **{key: value for key, value in fields.items() if key in COLUMNS},
         "event": archive.event_name(file, number, seen),
         "load": shown.name,
         "unit": "secondary" if shown.secondary else "pu" if shown.per_unit else "MW",
         "noise": event and event.noise_share,
         "command": build_load_command(view, shown) if seen.worth else "",
-        **_pictures(shown, seen),
+        **_draw_pictures(shown, seen),
     }
 
 
-def _pictures(shown: Sight, event: LoadEvent) -> dict[str, list[float | None]]:
+def _draw_pictures(shown: Sight, event: LoadEvent) -> dict[str, list[float | None]]:
     """U and P about an event, as shares of the greatest in the picture, few points each."""
-    columns = series(shown)
+    columns = build_series(shown)
     t, what = columns["t"], event.what
     first, stop = np.searchsorted(
         t, [what.start - AROUND[0], min(what.end, what.start + LONGEST_PICTURED_EVENT) + AROUND[1]]
@@ -199,7 +201,7 @@ def look_at_files(folder: Path, names: Sequence[str], cores: int) -> Iterator[tu
     """
     workers = Workers(cores if len(names) > MOST_OWN_FILES else 1)
     with contextlib.closing(
-        workers.results(functools.partial(rows_of, str(folder)), names)
+        workers.results(functools.partial(build_rows, str(folder)), names)
     ) as results:
         for name, rows in results:
             yield (
@@ -255,14 +257,14 @@ def complete_entries(
     fresh = [file for file in own if file not in found]
     with counter(what, progress)(len(fresh)) as count:
         for file, computed in compute(fresh):
-            entry = files.plain(computed)
+            entry = files.make_plain(computed)
             store.write_json(names[file], entry)
             found[file] = hold(entry)
             count()
     return {file: found[file] for file in own}, len(fresh)
 
 
-def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
+def compute_keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
     """{file within the folder: key of its rows}: name, size and time of the files of its name, and
     this program.
     """
@@ -275,7 +277,7 @@ def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
             beside[place / path.stem].append(path)
     names = {path: path.relative_to(folder).as_posix() for path in paths}
     return {
-        names[path]: key(__version__, names[path], _states(beside[path.parent / path.stem]))
+        names[path]: key(__version__, names[path], _read_states(beside[path.parent / path.stem]))
         for path in paths
     }
 
@@ -288,6 +290,6 @@ def name_load(row: Mapping[str, Any], folder: Path) -> tuple[str, str]:
     return row["station"] or "", (Path(folder.resolve().name) / file.parent).as_posix()
 
 
-def _states(paths: Sequence[Path]) -> list[Any]:
+def _read_states(paths: Sequence[Path]) -> list[Any]:
     """Size and time of change of each file that is there."""
-    return [[path.name, *files.state(path)] for path in paths if files.exists(path)]
+    return [[path.name, *files.read_state(path)] for path in paths if files.exists(path)]

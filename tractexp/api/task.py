@@ -12,7 +12,7 @@ from tractexp.api.job import Job
 from tractexp.blocks.terminal import show
 from tractexp.configuration.plugin import Plugin
 from tractexp.outcome import Written
-from tractexp.text.progress import console, say, text_width
+from tractexp.text.progress import build_console, find_text_width, say
 from tractexp.text.wording import shorten_path
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ class Task(Plugin):
         own, cls.__annotations__ = vars(cls).get("__annotations__", {}), {}
         for parameter in arguments.values():
             if parameter.name not in (*SOURCES, *OF_MODEL, *given, *own):
-                cls.__annotations__[parameter.name], default = setting_of(parameter)
+                cls.__annotations__[parameter.name], default = find_setting(parameter)
                 setattr(cls, parameter.name, default)
         cls.__annotations__ |= own
 
@@ -180,7 +180,7 @@ class Task(Plugin):
         return {}
 
 
-def setting_of(parameter: inspect.Parameter) -> tuple[Any, Any]:
+def find_setting(parameter: inspect.Parameter) -> tuple[Any, Any]:
     """Type and default of the setting that stands for an argument: of mappings and lists, plain and
     empty ones.
     """
@@ -208,7 +208,7 @@ def print_result(job: "Job", result: Written) -> None:
     report = result.summary() if job.tells_everything else result.screen()
     if step := result.next_step:
         report.text(f"next: {step}")
-    show(report, console(), text_width())
+    show(report, build_console(), find_text_width())
 
 
 def print_written(paths: Iterable[Path], page: str) -> None:

@@ -342,4 +342,4 @@ def _describe_block(block: Block) -> dict[str, Any]:
             fields[key] = [_describe_block(inner) for inner in fields[key]]
     if isinstance(block, Table):
         fields |= {"words": sorted(block.words), "detail": sorted(block.detail)}
-    return files.plain({"block": type(block).__name__.lower(), **fields})
+    return files.make_plain({"block": type(block).__name__.lower(), **fields})

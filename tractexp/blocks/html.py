@@ -201,5 +201,5 @@ def _inline(drawing: str, prefix: str, label: str) -> str:
 @functools.cache
 def _typeset(latex: str) -> str:
     """SVG of an equation, from the store or drawn; "" for LaTeX beyond mathtext."""
-    key = store.key(store.version("matplotlib"), latex)
+    key = store.key(store.read_version("matplotlib"), latex)
     return store.DRAWINGS.get(key, lambda: draw_equation(latex)).decode()

@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parents[1]
 
 
 @functools.cache
-def version() -> str:
+def read_version() -> str:
     """The version of the installed package, "" where it runs uninstalled."""
     from importlib.metadata import PackageNotFoundError
     from importlib.metadata import version as installed
@@ -24,7 +24,7 @@ def version() -> str:
 
 
 @functools.cache
-def commit(folder: Path = PACKAGE) -> str:
+def find_commit(folder: Path = PACKAGE) -> str:
     """The commit of the repository that keeps the files of `folder`; "" where none does, as for an
     installed wheel.
 
@@ -32,14 +32,14 @@ def commit(folder: Path = PACKAGE) -> str:
     add "-dirty".
     """
     try:
-        if not _git(folder, "ls-files", "--", "."):
+        if not _run_git(folder, "ls-files", "--", "."):
             return ""
-        return _git(folder, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
+        return _run_git(folder, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
     except (OSError, subprocess.SubprocessError):
         return ""
 
 
-def _git(folder: Path, *command: str) -> str:
+def _run_git(folder: Path, *command: str) -> str:
     """The output of a git command in a folder."""
     done = subprocess.run(
         ["git", *command], cwd=folder, capture_output=True, text=True, timeout=5, check=True
@@ -48,17 +48,17 @@ def _git(folder: Path, *command: str) -> str:
 
 
 @functools.cache
-def code() -> str:
+def hash_code() -> str:
     """SHA-256 of the installed code, plugins of all packages included: what is computed by the same
     is the same.
     """
     total = hashlib.sha256()
-    for file in sorted({file for folder in folders() for file in folder.rglob("*.py")}):
+    for file in sorted({file for folder in list_folders() for file in folder.rglob("*.py")}):
         total.update(hashlib.sha256(file.read_bytes()).digest())
     return total.hexdigest()
 
 
-def folders() -> set[Path]:
+def list_folders() -> set[Path]:
     """The folders of this package and of those with plugins."""
     from tractexp.configuration import plugin  # which imports NumPy
 
@@ -68,7 +68,7 @@ def folders() -> set[Path]:
     }
 
 
-def digest(record: Any) -> str:
+def hash_record(record: Any) -> str:
     """SHA-256 of the channels of a `Record` as they were read: equal for equal numbers, whatever
     the file is called.
     """

@@ -65,12 +65,12 @@ class Store:
 
     def path(self, key: str) -> Path:
         """The file of an entry."""
-        return (self.folder or cache_folder()) / self.kind / f"{key[:40]}{ENDING}"
+        return (self.folder or find_cache_folder()) / self.kind / f"{key[:40]}{ENDING}"
 
     def read(self, key: str) -> bytes | None:
         """The content of an entry; None where there is none, or its file is damaged."""
         try:
-            return _sound(self.path(key), self._read_secret()) if key else None
+            return _read_sound(self.path(key), self._read_secret()) if key else None
         except (OSError, UserError):
             return None
 
@@ -163,10 +163,10 @@ MOST_LINKS = 40  # that a path leads through, as the system has it
 def find_damaged_files(folder: Path) -> list[Path]:
     """The files of a cache folder that are damaged, or of an earlier version."""
     ours = [path for path in folder.rglob("*") if NAME.fullmatch(path.name)]
-    return [path for path in ours if path.suffix == EARLIER or _sound(path) is None]
+    return [path for path in ours if path.suffix == EARLIER or _read_sound(path) is None]
 
 
-def _sound(path: Path, secret: bytes = b"") -> bytes | None:
+def _read_sound(path: Path, secret: bytes = b"") -> bytes | None:
     """The content of a file as it was written with a secret; None where there is none, or
     another.
     """
@@ -189,7 +189,7 @@ def read_secret() -> bytes:
 
     Raises `UserError` where the cache folder cannot keep it.
     """
-    path = cache_folder() / SECRET
+    path = find_cache_folder() / SECRET
     if not path.exists():
         with locks.lock_file(path.with_suffix(".lock"), LONGEST_WAIT):
             if not path.exists():
@@ -209,11 +209,11 @@ def key(*things: Any) -> str:
     """
     digest = hashlib.sha256()
     for thing in things:
-        digest.update(_content(thing))
+        digest.update(_encode_content(thing))
     return digest.hexdigest()
 
 
-def _content(thing: Any) -> bytes:
+def _encode_content(thing: Any) -> bytes:
     """Everything that tells a thing from another as bytes: arrays with type and shape, fields and
     items in order.
     """
@@ -225,7 +225,7 @@ def _content(thing: Any) -> bytes:
             for field in dataclasses.fields(thing)
             if field.init
         }
-        return f"{type(thing).__qualname__} ".encode() + _content(fields)
+        return f"{type(thing).__qualname__} ".encode() + _encode_content(fields)
     if isinstance(thing, Mapping):
         return b"{%s}" % key(*(item for pair in thing.items() for item in pair)).encode()
     if isinstance(thing, list | tuple):
@@ -233,18 +233,18 @@ def _content(thing: Any) -> bytes:
     return f"{type(thing).__name__} {thing!r} ".encode()
 
 
-def environment() -> str:
+def describe_environment() -> str:
     """What every number computed here depends on, as one text: the code of all plugins, libraries,
     interpreter, processor.
     """
-    versions = [f"{name} {version(name)}" for name in LIBRARIES]
+    versions = [f"{name} {read_version(name)}" for name in LIBRARIES]
     return repr(
-        (provenance.code(), versions, sys.version, platform.machine(), platform.processor())
+        (provenance.hash_code(), versions, sys.version, platform.machine(), platform.processor())
     )
 
 
 @functools.cache  # the files of a package are searched for each time
-def version(library: str) -> str:
+def read_version(library: str) -> str:
     """The version of a library that is installed."""
     return importlib.metadata.version(library)
 
@@ -255,28 +255,28 @@ def is_installed(part: Any) -> bool:
     """
     file = getattr(sys.modules.get(type(part).__module__), "__file__", None)
     return file is not None and any(
-        Path(file).is_relative_to(folder) for folder in provenance.folders()
+        Path(file).is_relative_to(folder) for folder in provenance.list_folders()
     )
 
 
 # The folder
 
 
-def cache_folder() -> Path:
+def find_cache_folder() -> Path:
     """$TRACTEXP_CACHE_DIR, else `tractexp` in the user's cache folder, else a temporary one.
 
     Raises `UserError` where the folder chosen cannot be written to, or can by others.
     """
     if chosen := os.environ.get(CHOICE):
-        if reason := _unfit(Path(chosen)):
+        if reason := _explain_unfit(Path(chosen)):
             raise UserError(
                 f"{CHOICE}={chosen} cannot keep kernels: {reason}; choose a folder of your own,"
                 " such as a new one"
             )
         return Path(chosen)
     usual = _find_usual_folder()
-    reason = _unfit(usual, private=True) if usual else "no home folder is known"
-    return usual if usual and not reason else _temporary(f"{usual or CHOICE}: {reason}")
+    reason = _explain_unfit(usual, private=True) if usual else "no home folder is known"
+    return usual if usual and not reason else _make_temporary(f"{usual or CHOICE}: {reason}")
 
 
 def _find_usual_folder() -> Path | None:
@@ -290,7 +290,7 @@ def _find_usual_folder() -> Path | None:
         return None
 
 
-def _unfit(folder: Path, private: bool = False) -> str:
+def _explain_unfit(folder: Path, private: bool = False) -> str:
     """Why a folder, created where there is none, cannot hold the store; "" where it can.
 
     `private`: one of ours that others can read, as an older version created it, is closed to them.
@@ -400,7 +400,7 @@ def _create(folder: Path) -> None:
     folder.mkdir(mode=0o700, exist_ok=True)
 
 
-def _temporary(reason: str) -> Path:
+def _make_temporary(reason: str) -> Path:
     """A folder of this process, and of those that it starts, which goes when it ends."""
     try:
         folder = Path(tempfile.mkdtemp(prefix="tractexp-"))

@@ -11,7 +11,7 @@ from pathlib import Path
 from tractexp.cli.chosen import reads
 from tractexp.configuration.plugin import get
 from tractexp.configuration.repeatable import explain_refusal
-from tractexp.configuration.run_command import group_of
+from tractexp.configuration.run_command import get_group
 from tractexp.errors import UserError
 from tractexp.storage import yaml_files
 from tractexp.storage.run_folder import CONFIGURATION as FOLDER
@@ -66,13 +66,13 @@ def merge_settings(arguments: Iterable[str], settings: Iterable[str], folder: Pa
     not taken over.
     """
     settings = list(settings)
-    keys = set(map(_key, settings))
+    keys = set(map(_get_key, settings))
     stay = _select_kept(arguments, keys)
     for text in stay:
         _check_taken_over(text, folder)
-    tasks = [text.partition("=")[2] for text in (*stay, *settings) if _key(text) == "task"]
+    tasks = [text.partition("=")[2] for text in (*stay, *settings) if _get_key(text) == "task"]
     task = get("task", ["identify", *tasks][-1])
-    stay = [text for text in stay if reads(task, _key(text).replace("/", "."))]
+    stay = [text for text in stay if reads(task, _get_key(text).replace("/", "."))]
     own = {field.name for field in fields(task)}
     if "parameters" in own and "task.parameters" not in keys:
         settings.append(f"task.parameters={folder / RESULT}")
@@ -83,9 +83,11 @@ def _select_kept(arguments: Iterable[str], keys: Collection[str]) -> list[str]:
     """Earlier settings whose key is not among the newer ones', and whose group is not chosen
     anew.
     """
-    groups = {key for key in keys if key == group_of(key)}
+    groups = {key for key in keys if key == get_group(key)}
     return [
-        text for text in arguments if _key(text) not in keys and group_of(_key(text)) not in groups
+        text
+        for text in arguments
+        if _get_key(text) not in keys and get_group(_get_key(text)) not in groups
     ]
 
 
@@ -96,11 +98,11 @@ def _check_taken_over(text: str, folder: Path) -> None:
         raise UserError(
             f"{folder}: {key:.80} is not taken over from the folder of a run ({why}); where it is"
             " meant, say so:"
-            f" {quoting.shell('tractexp', 'again', str(folder), f'{_key(text):.80}=VALUE')}"
+            f" {quoting.shell('tractexp', 'again', str(folder), f'{_get_key(text):.80}=VALUE')}"
         )
 
 
-def _key(text: str) -> str:
+def _get_key(text: str) -> str:
     """The key of a setting."""
     return text.partition("=")[0].lstrip("+~").partition("@")[0]
 

@@ -9,7 +9,7 @@ from typing import Any
 from tractexp.configuration.composition import list_texts
 
 
-def contents(config: Any) -> Mapping[str, str]:
+def list_contents(config: Any) -> Mapping[str, str]:
     """The files that Hydra writes of a job, by their names."""
     from hydra.core.hydra_config import HydraConfig
     from omegaconf import OmegaConf

@@ -47,12 +47,18 @@ def doctor(arguments: list[str]) -> int:
     wrong = sum(
         map(
             print_findings,
-            (versions(), cores(), disk(chosen.folder), caches(), leavings(chosen.folder)),
+            (
+                check_versions(),
+                check_cores(),
+                check_disk(chosen.folder),
+                check_caches(),
+                find_leavings(chosen.folder),
+            ),
         )
     )
     if print_findings(store(uri)):
         return 2
-    wrong += print_findings(runs(uri))
+    wrong += print_findings(check_runs(uri))
     if chosen.folder.is_dir():
         wrong += send_folder(chosen.folder, chosen.uri)["not logged"]
     return 2 if wrong else 0
@@ -67,7 +73,7 @@ def print_findings(findings: Iterable[Finding]) -> int:
     return wrong
 
 
-def versions() -> Iterator[Finding]:
+def check_versions() -> Iterator[Finding]:
     """Whether the packages installed are those that this one asks for."""
     from importlib.metadata import PackageNotFoundError, requires, version
 
@@ -89,7 +95,7 @@ def versions() -> Iterator[Finding]:
         yield SOUND, "every package is of a version that is known to work"
 
 
-def cores() -> Iterator[Finding]:
+def check_cores() -> Iterator[Finding]:
     """How many cores a sweep may use, and whether a worker starts.
 
     However long it takes, and as often as a sweep tries it: on a machine that is short of time or
@@ -111,7 +117,7 @@ def cores() -> Iterator[Finding]:
     yield SOUND, f"{cpu_count()} of {os.cpu_count()} cores may be used, and a worker starts"
 
 
-def disk(folder: Path) -> Iterator[Finding]:
+def check_disk(folder: Path) -> Iterator[Finding]:
     """Whether there is room for results."""
     place = next(
         (p for p in (folder.absolute(), *folder.absolute().parents) if p.is_dir()), Path.cwd()
@@ -128,19 +134,19 @@ def disk(folder: Path) -> Iterator[Finding]:
         yield SOUND, f"{free / 1e9:.1f} GB are free on the disk of {place}"
 
 
-def caches() -> Iterator[Finding]:
+def check_caches() -> Iterator[Finding]:
     """Whether the store can be written and its entries be read."""
-    from tractexp.cache.store import CODE, cache_folder, find_damaged_files
+    from tractexp.cache.store import CODE, find_cache_folder, find_damaged_files
 
     try:
-        folder = cache_folder()
+        folder = find_cache_folder()
         files.write(
             folder / "doctor.txt", "written and removed by tractexp doctor\n", lasting=False
         ).unlink()
     except (OSError, UserError) as error:
         yield WRONG, f"nothing can be kept of what is compiled: {error}"
         return
-    gone = [*find_damaged_files(folder), *files.leftovers(folder)]
+    gone = [*find_damaged_files(folder), *files.find_leftovers(folder)]
     for path in gone:
         path.unlink(missing_ok=True)
     if gone:
@@ -148,9 +154,9 @@ def caches() -> Iterator[Finding]:
     yield SOUND, f"the cache {folder} holds {len(list((folder / CODE.kind).glob('*')))} kernels"
 
 
-def leavings(folder: Path) -> Iterator[Finding]:
+def find_leavings(folder: Path) -> Iterator[Finding]:
     """Findings on partial files of processes that were killed while they wrote."""
-    halves = files.leftovers(folder) if folder.is_dir() else []
+    halves = files.find_leftovers(folder) if folder.is_dir() else []
     for path in halves:
         path.unlink(missing_ok=True)
     if halves:
@@ -183,7 +189,7 @@ def store(uri: str) -> Iterator[Finding]:
                 " lets go",
             )
             return
-        if not _ours(database):
+        if not _is_ours(database):
             yield (
                 WRONG,
                 f"{database} is no MLflow store ({problem}) and is left as it is: name another by"
@@ -204,7 +210,7 @@ def store(uri: str) -> Iterator[Finding]:
     yield SOUND, f"the MLflow store {uri} can be used"
 
 
-def _ours(database: Path) -> bool:
+def _is_ours(database: Path) -> bool:
     """Whether a damaged file was a store of MLflow's, as far as what is left of it says; an empty
     one is nobody's.
     """
@@ -238,7 +244,7 @@ def _unsound(database: Path) -> str:
     return ""
 
 
-def runs(uri: str) -> Iterator[Finding]:
+def check_runs(uri: str) -> Iterator[Finding]:
     """Whether runs that say they are running are; those whose process has ended are closed."""
     database = database_of(uri)
     if database is not None and not database.exists():

@@ -10,7 +10,7 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.storage import files
-from tractexp.text.progress import console, text_width
+from tractexp.text.progress import build_console, find_text_width
 
 FOLDER = Path("outputs", "looks")
 DOES = (
@@ -44,7 +44,7 @@ def look(arguments: list[str]) -> int:
     for each in chosen.file:
         setting = None if files.exists(each) else SETTING.fullmatch(each)
         if setting:
-            settings[setting[1]] = _value(setting[2])
+            settings[setting[1]] = _parse_value(setting[2])
         else:
             paths.append(each)
     if not paths:
@@ -58,15 +58,15 @@ def look(arguments: list[str]) -> int:
     view = call(looked, *paths, **settings)
     show(
         view.build_full_report() if chosen.all else view.screen().text(EVERYTHING),
-        console(),
-        text_width(),
+        build_console(),
+        find_text_width(),
     )
     usual = FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-    print_written(view.write(chosen.folder or files.new_folder(usual)), view.page)
+    print_written(view.write(chosen.folder or files.make_new_folder(usual)), view.page)
     return 0
 
 
-def _value(text: str) -> Any:
+def _parse_value(text: str) -> Any:
     """A setting's value as YAML reads it; what YAML does not read is a text."""
     import yaml
 

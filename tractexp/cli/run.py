@@ -31,7 +31,7 @@ def run(config: Any) -> None:
             folder.rmdir()
         raise
     with run_folder(
-        folder, configuration.contents(config), configuration.list_named_files(plain)
+        folder, configuration.list_contents(config), configuration.list_named_files(plain)
     ) as place:
         try:
             run_command.remember_folder(folder)

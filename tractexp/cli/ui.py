@@ -24,11 +24,11 @@ def ui(arguments: list[str]) -> int:
     from tractexp.tracking.ui import serve
 
     return serve(
-        tracking.address(chosen.uri), port=chosen.port, page=_page, open_browser=chosen.open
+        tracking.address(chosen.uri), port=chosen.port, page=_open_page, open_browser=chosen.open
     )
 
 
-def _page(uri: str) -> str:
+def _open_page(uri: str) -> str:
     """The view of the comparison; the list of experiments where the store cannot keep it.
 
     MLflow's plain address opens a page on language models.

@@ -17,7 +17,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from tractexp.errors import nearest
+from tractexp.errors import suggest_nearest
 
 ENTRY_POINTS = "tractexp.plugins"
 FEWEST_VARIANTS = 3  # of a plugin that are told as a number
@@ -44,14 +44,14 @@ def read_choices(own: Iterable[Path] = ()) -> dict[str, dict[str, Option]]:
     `own` are further folders of configurations, as Hydra's `-cd` names one.
     """
     options: dict[str, dict[str, Option]] = defaultdict(dict)
-    for folder in (CONF, *configuration_folders(), *own):
+    for folder in (CONF, *list_configuration_folders(), *own):
         for file in folder.rglob("*.yaml"):
             place = file.relative_to(folder).with_suffix("")
             if len(place.parts) > 1 and not any(part.startswith("_") for part in place.parts):
                 options[place.parent.as_posix()][place.name] = Option(
                     place.name, _read_comment(file)
                 )
-    for package, folder in plugin_folders():
+    for package, folder in list_plugin_folders():
         for module in list_modules(package, [str(folder)]):
             for group, about in list_declared_plugins(module):
                 name = module.rpartition(".")[2]
@@ -152,7 +152,7 @@ def describe_available(group: str, name: str, names: Iterable[str]) -> str:
         f"{base} and {len(varied)} variants" if varied else base
         for base, varied in sorted(grouped.items())
     ]
-    return f"{nearest(name, names) or '.'} Available: {', '.join(parts) or 'none'}"
+    return f"{suggest_nearest(name, names) or '.'} Available: {', '.join(parts) or 'none'}"
 
 
 def describe_nameless(group: str) -> str:
@@ -164,7 +164,7 @@ def describe_nameless(group: str) -> str:
     )
 
 
-def entry_points() -> list[importlib.metadata.EntryPoint]:
+def list_entry_points() -> list[importlib.metadata.EntryPoint]:
     """The plugin packages that are installed, in order of name."""
     return sorted(
         importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value)
@@ -172,17 +172,17 @@ def entry_points() -> list[importlib.metadata.EntryPoint]:
 
 
 @functools.cache
-def plugin_folders() -> tuple[tuple[str, Path], ...]:
+def list_plugin_folders() -> tuple[tuple[str, Path], ...]:
     """(package, folder) of the plugin packages that are there."""
-    names = dict.fromkeys(point.module for point in entry_points())
+    names = dict.fromkeys(point.module for point in list_entry_points())
     return tuple((name, folder) for name in names for folder in _find_folders(name))
 
 
-def configuration_folders() -> list[Path]:
+def list_configuration_folders() -> list[Path]:
     """The `conf/` folders of the plugin packages, of which the last that has a file is the one that
     is read.
     """
-    return [folder / "conf" for _, folder in plugin_folders() if (folder / "conf").is_dir()]
+    return [folder / "conf" for _, folder in list_plugin_folders() if (folder / "conf").is_dir()]
 
 
 def list_modules(package: str, folders: Iterable[str]) -> Iterator[str]:
@@ -255,14 +255,14 @@ def _find_class(name: str, module: str, visited: set[str]) -> tuple[ast.ClassDef
         if isinstance(node, ast.ClassDef) and node.name == name:
             return node, module
         if isinstance(node, ast.ImportFrom):
-            there = _imported_module(node, module)
+            there = _resolve_import(node, module)
             for alias in node.names:
                 if (alias.asname or alias.name) == name and there not in visited:
                     return _find_class(alias.name, there, visited | {there})
     return None, module
 
 
-def _imported_module(node: ast.ImportFrom, module: str) -> str:
+def _resolve_import(node: ast.ImportFrom, module: str) -> str:
     """The whole name of what a module imports from, relative or not."""
     if not node.level:
         return node.module or ""

@@ -108,7 +108,7 @@ def list_choices(group: str, *, files: bool = False) -> list[str]:
 
 def list_folders() -> list[Path]:
     """The folders of configurations: of plugin packages first, whose files replace ours."""
-    return [*plugin.configuration_folders(), plugin.CONF]
+    return [*plugin.list_configuration_folders(), plugin.CONF]
 
 
 def _find_file(group: str, name: str, places: Iterable[Path]) -> Path | None:

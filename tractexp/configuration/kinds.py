@@ -8,7 +8,7 @@ from inspect import Parameter
 from numbers import Integral, Real
 from typing import Any, Union, get_args, get_origin
 
-from tractexp.errors import UserError, setting
+from tractexp.errors import UserError, name_setting
 
 WORDS: Mapping[Any, str] = {
     int: "a whole number",
@@ -36,7 +36,8 @@ def check_kind(name: str, value: Any, annotation: Any) -> None:
         )
         allowed = " or ".join(dict.fromkeys(_describe_kind(kind) for kind in kinds))
         raise UserError(
-            f"{setting(name)}={value!r:.60} is {_describe_kind_of(value)}, but it must be {allowed}"
+            f"{name_setting(name)}={value!r:.60} is {_describe_kind_of(value)},"
+            f" but it must be {allowed}"
         )
 
 

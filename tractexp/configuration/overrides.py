@@ -226,13 +226,13 @@ def quote_override(argument: str) -> str:
     key, equals, value = argument.partition("=")
     if equals and key == MODEL:
         chosen = [value] if _names_a_file(value) else _split_at_commas(value)  # a sweep has several
-        return f"{key}={','.join(map(_model_choice, chosen))}"
+        return f"{key}={','.join(map(_quote_model_choice, chosen))}"
     if equals and key.lstrip("+~").startswith(NAMING) and not _read_by_hydra(argument, value):
         argument = f"{key}={_quote_override_value(value)}"
     return f"++{argument}" if argument.startswith(OPEN) else argument
 
 
-def _model_choice(name: str) -> str:
+def _quote_model_choice(name: str) -> str:
     """A choice of a model as Hydra reads it: the path of a file whole and in quotes, another name
     as it stands.
     """

@@ -26,15 +26,14 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, dataclass_transform, get_type_hints
 
 from tractexp.configuration.choices import CONF as CONF
-from tractexp.configuration.choices import configuration_folders as configuration_folders
 from tractexp.configuration.choices import (
     describe_nameless,
-    entry_points,
     list_declared_plugins,
+    list_entry_points,
     list_modules,
-    plugin_folders,
+    list_plugin_folders,
 )
-from tractexp.errors import Unknown, UserError, list_allowed, setting
+from tractexp.errors import Unknown, UserError, list_allowed, name_setting
 from tractexp.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -219,7 +218,7 @@ def import_packages() -> tuple[Any, ...]:
     """The packages behind the entry points that can be imported, in order of name."""
     found = [
         package
-        for point in entry_points()
+        for point in list_entry_points()
         for package in _try_import(point.module, _import_package, point)
     ]
     return tuple(dict.fromkeys(found))
@@ -423,7 +422,7 @@ def _check_usable(group: str, name: str) -> None:
 def _find_modules_by_name() -> Mapping[str, Sequence[str]]:
     """{name: modules of this name} of the plugin packages."""
     named: dict[str, list[str]] = {}
-    for package, folder in plugin_folders():
+    for package, folder in list_plugin_folders():
         for module in list_modules(package, [str(folder)]):
             named.setdefault(module.rpartition(".")[2], []).append(module)
     return named
@@ -466,7 +465,7 @@ def build_chosen(group: str, given: Any) -> Any:
         return build(group, {"name": given})
     if not isinstance(given, Mapping) or "name" not in given:
         raise UserError(
-            f"{setting(f'data.{group}')}={given!r:.60} must be a name, or a mapping of 'name' and"
-            " settings"
+            f"{name_setting(f'data.{group}')}={given!r:.60} must be a name,"
+            " or a mapping of 'name' and settings"
         )
     return build(group, given)

@@ -120,7 +120,7 @@ def _describe_missing_choice(error: Any) -> str:
     group, _, choice = name.rpartition("/")
     find(group, choice)  # raises the reason where its file cannot be used
     options = [o for o in error.options or () if not o.startswith("_")]
-    if named := re.match(r"In '(.*)': Could not load '(.*)/(.*)'", first_line(error)):
+    if named := re.match(r"In '(.*)': Could not load '(.*)/(.*)'", get_first_line(error)):
         return _describe_missing_default(*named.groups())
     if not group or not options:
         return _read_first_line(error)
@@ -141,12 +141,12 @@ def _describe_error(error: BaseException) -> str:
     """The sentence of an error, by what caused it."""
     for link in _list_causes(error):
         key = getattr(link, "full_key", None)
-        text = first_line(link)
+        text = get_first_line(link)
         if key and ("not in" in text or "is not in struct" in text):
-            return _unknown_key(key, link)
-        if sentence := _wrong_value(key or _key_of(error), text):
+            return _describe_unknown_key(key, link)
+        if sentence := _describe_wrong_value(key or _find_key(error), text):
             return sentence
-    group = re.search(r"Could not override '([^']*)'", first_line(error))
+    group = re.search(r"Could not override '([^']*)'", get_first_line(error))
     if group and "No match in the defaults list" in str(error):
         groups = _list_groups()
         return f"there is no group '{group[1]}'{list_allowed(group[1], groups, 'Groups')}"
@@ -163,12 +163,12 @@ def _list_causes(error: BaseException) -> list[BaseException]:
     return chain
 
 
-def _key_of(error: BaseException) -> str:
+def _find_key(error: BaseException) -> str:
     """The key of the argument that an error is about."""
     return (_find_argument(error) or "").lstrip("+~").partition("=")[0]
 
 
-def _wrong_value(key: str, text: str) -> str:
+def _describe_wrong_value(key: str, text: str) -> str:
     """The sentence about a value of another kind than its setting; "" for another exception."""
     if match := re.search(
         r"[Vv]alue '(.*)' of type '.*' could not be converted to (\w+)", text, re.DOTALL
@@ -216,7 +216,7 @@ def _read_first_line(error: BaseException) -> str:
     """The first line of an exception where it is in plain words, else what can be said in its
     place.
     """
-    text = first_line(error)
+    text = get_first_line(error)
     if nameless := re.match(r"Interpolation key '(\w+)\.name' not found", text):
         return describe_nameless(nameless[1])
     for pattern, sentence in SENTENCES.items():
@@ -235,7 +235,7 @@ def _read_first_line(error: BaseException) -> str:
     return text if not PYTHON.search(text) else _describe_unforeseen(error)
 
 
-def _unknown_key(key: str, error: Any) -> str:
+def _describe_unknown_key(key: str, error: Any) -> str:
     """That a key is not there, with those that are."""
     if key == "experiment":
         return "the file of an experiment begins with the line '# @package _global_'"
@@ -256,6 +256,6 @@ def _list_groups() -> list[str]:
     return sorted({*discover(), "model", "experiment"})
 
 
-def first_line(error: BaseException) -> str:
+def get_first_line(error: BaseException) -> str:
     """The first line of an error, or its class."""
     return str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__

@@ -97,7 +97,7 @@ def find_folder() -> Path | None:
 def _blocks_repetition(argument: str) -> bool:
     """Whether an argument keeps `tractexp again` from repeating this run by its folder."""
     # which is none of the settings that a folder keeps
-    if group_of(argument) == "hydra" or "=" not in argument:
+    if get_group(argument) == "hydra" or "=" not in argument:
         return argument.startswith("--config-dir")
     return bool(repeatable.explain_refusal(argument))
 
@@ -110,14 +110,14 @@ def _repeat_settings(settings: Collection[str], of: Collection[str]) -> str:
     if {"-m", "--multirun"} & {*arguments}:
         arguments = []
     keys = [(argument, argument.partition("=")[0]) for argument in arguments if "=" in argument]
-    repeated = [argument for argument, key in keys if group_of(key) in of and key not in others]
+    repeated = [argument for argument, key in keys if get_group(key) in of and key not in others]
     if "--config-dir" in arguments and "--config-dir" not in settings:
         at = arguments.index("--config-dir")
         repeated = [*arguments[at : at + 2], *repeated]
     return quoting.shell("tractexp", *settings, *repeated)
 
 
-def group_of(key: str) -> str:
+def get_group(key: str) -> str:
     """The group of a setting's key: `data` of data.train."""
     return re.split(r"[./@]", key.lstrip("+~"), maxsplit=1)[0]
 
@@ -127,6 +127,6 @@ def list_arguments() -> tuple[str, ...]:
     return tuple(_started[1:])
 
 
-def command() -> str:
+def get_command() -> str:
     """The command line of this run, to be typed again; "" where there was none, as from Python."""
     return quoting.shell(*_started)

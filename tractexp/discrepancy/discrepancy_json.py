@@ -44,7 +44,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "where": [asdict(place) for place in investigation.places],
         "gap": gaps(investigation),
         "contributions": [
-            {"effects": list(names), "model_error": files.plain(error)}
+            {"effects": list(names), "model_error": files.make_plain(error)}
             for names, error in investigation.contributions
         ],
         "left": investigation.last.p_by_test,
@@ -102,7 +102,7 @@ def _gap(change: Change[Any], ranked: Change[Curves] | None) -> dict[str, Any]:
     return {
         "before": _misfit(change.before, ranked and ranked.before),
         "after": _misfit(change.after, ranked and ranked.after),
-        "closed": files.plain(change.closed_share),
+        "closed": files.make_plain(change.closed_share),
     }
 
 
@@ -111,7 +111,7 @@ def _misfit(misfit: Misfit, ranked: Curves | None) -> dict[str, Any]:
     own = {} if misfit.epsilon_i is None else {"epsilon_i": misfit.epsilon_i}
     errors = {"epsilon_p": misfit.epsilon_p, "epsilon_q": misfit.epsilon_q}
     chi2 = {"chi2_per_sample": ranked and ranked.chi2_per_sample}
-    return files.plain({"model_error": _error(misfit.error)} | errors | own | chi2)
+    return files.make_plain({"model_error": _error(misfit.error)} | errors | own | chi2)
 
 
 def _nearest(investigation: Findings) -> dict[str, Any] | None:
@@ -130,7 +130,8 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
         "effects": list(near.names),
         "gap": {role: both and _gap(both, both) for role, both in on.items()},
         "others": [
-            {"effects": list(names), "closed": files.plain(share)} for names, share in near.others
+            {"effects": list(names), "closed": files.make_plain(share)}
+            for names, share in near.others
         ],
         "parameters": {
             p.name: by_name[p.name].plain() for p in investigation.catalogue.parameters(near.names)
@@ -152,7 +153,7 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     last = change if near is None else near.held_out or near.fitted
     return {
         "model_error": _error(last.after.error),
-        "share": files.plain(1 - change.closed_share) if investigation.names else None,
+        "share": files.make_plain(1 - change.closed_share) if investigation.names else None,
         "p": tests.p_left,
         "where": tests.loudest,
         "sentence": investigation.headline,
@@ -170,13 +171,16 @@ def _best_term(investigation: Findings) -> dict[str, Any] | None:
     best = investigation.evidence.term
     if best is None or best.prediction is None:
         return None
-    return {"words": term(best.names[0]).words, "model_error": files.plain(best.prediction.error)}
+    return {
+        "words": term(best.names[0]).words,
+        "model_error": files.make_plain(best.prediction.error),
+    }
 
 
 def _error(error: ModelError) -> dict[str, Any]:
     """A model's error with its interval, and where it stalls."""
     own = {"stalls": error.stalls} if error.stalls else {}
-    return files.plain({"value": error.value, "interval": error.interval} | own)
+    return files.make_plain({"value": error.value, "interval": error.interval} | own)
 
 
 def write_left(investigation: Findings, path: Path) -> Path:
@@ -218,7 +222,7 @@ def sets(investigation: Findings) -> list[dict[str, Any]]:
             p.name: {"value": at.value(p.name, set_evidence.fit.unit), "standard_error": None}
             for p in own
         }
-        ratio = files.plain(set_evidence.lowered)
+        ratio = files.make_plain(set_evidence.lowered)
         status = find_status(
             set_evidence, investigation.verdict, investigation.evidence, investigation.context
         )
@@ -234,7 +238,7 @@ def sets(investigation: Findings) -> list[dict[str, Any]]:
             error["model_error"] = predicted.error
             if predicted.stalls:
                 error["stalls"] = predicted.stalls
-        rows.append(row | files.plain(error | {"evidence": _evidence(set_evidence)}))
+        rows.append(row | files.make_plain(error | {"evidence": _evidence(set_evidence)}))
     return rows
 
 
@@ -254,10 +258,13 @@ def _singles(investigation: Findings) -> list[dict[str, Any]]:
         if j.score is not None:
             null = {p.name: p.absent for p in investigation.catalogue[j.name].sizes}
             values = {
-                n: {"value": null[n] + size, "standard_error": files.plain(j.score.deviation[n])}
+                n: {
+                    "value": null[n] + size,
+                    "standard_error": files.make_plain(j.score.deviation[n]),
+                }
                 for n, size in j.score.size.items()
             }
-        ratio = None if j.score is None else files.plain(j.score.drop)
+        ratio = None if j.score is None else files.make_plain(j.score.drop)
         rows.append(
             {
                 "effects": [j.name],

@@ -33,7 +33,7 @@ from tractexp.discrepancy.ranking import (
 from tractexp.inference.chance import by_draws
 from tractexp.inference.context import Context
 from tractexp.inference.model_error import describe_stall, in_percent
-from tractexp.text.wording import alternatives, join_words, list_figures
+from tractexp.text.wording import join_alternatives, join_words, list_figures
 
 CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
 CONFIRMED_IN_TURN = "each event, left out in turn, confirms it"
@@ -202,8 +202,8 @@ def _describe_tie(sets: Sequence[Sequence[str]]) -> str:
     """Several explanations, told as the alternatives they are."""
     each = "either" if len(sets) == 2 else "each"
     return (
-        f"{alternatives(sets)}: {each} explains the disagreement, and these events cannot tell them"
-        " apart"
+        f"{join_alternatives(sets)}: {each} explains the disagreement,"
+        " and these events cannot tell them apart"
     )
 
 
@@ -227,7 +227,7 @@ def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) 
         following = join_words(label_effects(rest[0].names, context))
         worse.append(f"the next best of {len(rest)} other sets ({following}) {_size(rest[0])}")
     worse.append(_describe_term(evidence))
-    labels = alternatives([label_effects(names, context) for names in verdict.sets])
+    labels = join_alternatives([label_effects(names, context) for names in verdict.sets])
     off = list_figures([row.held_out_prediction.error for row in chosen], in_percent)
     if len(chosen) > 1:
         sentence = (

@@ -43,7 +43,7 @@ def recognizes(path: Path | str) -> bool:
     """Whether a file is there whose beginning names the samples in a cycle, as such a
     report does.
     """
-    return files.there(path) and b'"SAM/CYC_A"' in files.read(path, BEGINNING)
+    return files.is_there(path) and b'"SAM/CYC_A"' in files.read(path, BEGINNING)
 
 
 def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
@@ -192,9 +192,9 @@ def _open_report(path: Path, encoding: str | None) -> _Opened:
     """
     path = Path(path)
     files.check_there(path)
-    if files.size(path) > LARGEST:
+    if files.read_size(path) > LARGEST:
         raise UserError(
-            f"{path}: {files.size(path)} bytes are no event report; the limit is {LARGEST}"
+            f"{path}: {files.read_size(path)} bytes are no event report; the limit is {LARGEST}"
         )
     text, encoding = decode(files.read(path), str(path), encoding)
     remarks = Remarks(str(path))

@@ -5,7 +5,7 @@ import operator
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from tractexp.errors import DATA, UserError, list_allowed, nearest, setting
+from tractexp.errors import DATA, UserError, list_allowed, name_setting, suggest_nearest
 from tractexp.filetypes.column_unit import fits, is_unit
 from tractexp.filetypes.columns import Role, role
 from tractexp.filetypes.table import TableFile
@@ -40,7 +40,7 @@ def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
     """Raise `UserError` for a key or a unit that there is not."""
     for name, mapping in {"columns": columns, "units": units}.items():
         if not isinstance(mapping, Mapping):
-            key = setting(f"data.{name}")
+            key = name_setting(f"data.{name}")
             raise UserError(f"{key}={mapping!s:.60} must be a mapping, such as {key}={{U: ...}}")
     for key in columns:
         spell_key(key)
@@ -105,7 +105,7 @@ def find_column(table: TableFile, key: str, choice: Any) -> int:
     )
     raise UserError(
         f"{DATA.columns}: {key}={choice}: {table.source} has no such"
-        f" column{nearest(str(choice), fitting) or '.'} Columns: {', '.join(names)}"
+        f" column{suggest_nearest(str(choice), fitting) or '.'} Columns: {', '.join(names)}"
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import DATA, UserError, nearest
+from tractexp.errors import DATA, UserError, suggest_nearest
 from tractexp.filetypes import timeline
 from tractexp.filetypes.comtrade_header import parse
 from tractexp.filetypes.comtrade_lines import Analog, Header
@@ -91,7 +91,7 @@ def read_header(path: Path, encoding: str | None = None) -> Header:
 
 def _read_bytes(path: Path) -> ByteRange:
     """All bytes of a file."""
-    return ByteRange(path, 0, files.size(path))
+    return ByteRange(path, 0, files.read_size(path))
 
 
 def _read_pair(path: Path, encoding: str | None) -> Recording:
@@ -125,7 +125,7 @@ def _read_combined(path: Path, encoding: str | None) -> Recording:
 def _sections(path: Path) -> dict[str, ByteRange]:
     """Where the sections of a .cff lie; bytes of binary data are not searched for headings."""
     sections: dict[str, ByteRange] = {}
-    content: Any = ByteRange(path, 0, files.size(path)).numbers(np.dtype(np.uint8))
+    content: Any = ByteRange(path, 0, files.read_size(path)).numbers(np.dtype(np.uint8))
     counted, line, at = 0, 1, 0
     while (match := _SECTION.search(content, at)) is not None:
         name = match[1].decode().upper()
@@ -342,9 +342,9 @@ def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[s
 
 def _find_existing_path(path: Path) -> Path:
     """The path. Raises `UserError` with the nearest name of its folder where it is not there."""
-    if not files.there(path):
+    if not files.is_there(path):
         names = [item.name for item in files.list_folder(path.parent)]
-        raise UserError(f"{path}: there is no such file{nearest(path.name, names)}")
+        raise UserError(f"{path}: there is no such file{suggest_nearest(path.name, names)}")
     return path
 
 
@@ -377,14 +377,14 @@ def _pair(path: Path) -> tuple[Path, Path, str]:
 def _find_companion(path: Path, ending: str) -> Path | None:
     """The file beside a path with another ending, in whatever letters; None where there is none."""
     for one in (ending, ending.upper(), ending.capitalize()):
-        if files.there(path.with_suffix(one)):
+        if files.is_there(path.with_suffix(one)):
             return path.with_suffix(one)
     wanted = path.with_suffix(ending).name.casefold()
     return next(
         (
             item
             for item in files.list_folder(path.parent)
-            if item.name.casefold() == wanted and files.there(item)
+            if item.name.casefold() == wanted and files.is_there(item)
         ),
         None,
     )

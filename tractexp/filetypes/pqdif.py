@@ -74,7 +74,7 @@ class Stretch:
 
 def recognizes(path: Path | str) -> bool:
     """Whether a file is there and begins as a PQDIF file does."""
-    return files.there(path) and files.read(path, len(SIGNATURE)) == SIGNATURE
+    return files.is_there(path) and files.read(path, len(SIGNATURE)) == SIGNATURE
 
 
 def holds_waveforms(path: Path, encoding: str | None = None) -> bool:

@@ -36,10 +36,10 @@ def read_sidecar(path: str) -> Sidecar:
     no JSON.
     """
     own = locate_file(path)
-    if own.suffix.lower() == ".json" or not files.there(own):
+    if own.suffix.lower() == ".json" or not files.is_there(own):
         return Sidecar()
     file = own.with_name(f"{own.stem}.json")
-    if not files.there(file):
+    if not files.is_there(file):
         return Sidecar()
     content = files.read_json(file)
     if not isinstance(content, dict):

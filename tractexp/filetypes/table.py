@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from tractexp.errors import DATA, UserError, check_choice, list_allowed, nearest
+from tractexp.errors import DATA, UserError, check_choice, list_allowed, suggest_nearest
 from tractexp.filetypes.cells import BadCell, find_group_mark, is_number, numbers
 from tractexp.filetypes.clock import is_time, times
 from tractexp.filetypes.column_unit import split_unit
@@ -238,7 +238,7 @@ def content(path: str, limit: int | None = None, whole: tuple[bytes, ...] = ()) 
     Raises `UserError` where it is not there.
     """
     file = locate_file(path)
-    if not files.there(file):
+    if not files.is_there(file):
         raise UserError(_describe_missing(path, file))
     data = files.read(file, limit)
     if limit is None or len(data) < limit:
@@ -255,7 +255,7 @@ def _describe_missing(path: str, file: Path) -> str:
         hint = "; that folder does not exist"
     else:
         names = [item.name for item in files.list_folder(folder) if not item.is_dir()]
-        hint = nearest(file.name, names)
+        hint = suggest_nearest(file.name, names)
     return f"{path}: there is no such file in {folder}{hint}"
 
 

@@ -69,8 +69,8 @@ def conclude(
         parameters_on_given_base={}
         if own.ratio == 1
         else own.values(by_event(*estimates.values()), exponents),
-        tractexp_version=provenance.version(),
-        commit=provenance.commit(),
+        tractexp_version=provenance.read_version(),
+        commit=provenance.find_commit(),
     )
 
 

@@ -169,7 +169,9 @@ def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
     def compute() -> tuple[Complex, ...]:
         return tuple(part for one in _fit(ports, most) for part in (one.poles, one.coefficients))
 
-    parts = store.DESCENTS.arrays(store.key(store.environment(), "networks", ports, most), compute)
+    parts = store.DESCENTS.arrays(
+        store.key(store.describe_environment(), "networks", ports, most), compute
+    )
     return [LinearNetwork(*pair) for pair in zip(parts[::2], parts[1::2], strict=True)]
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.errors import TASK, UserError, setting
+from tractexp.errors import TASK, UserError, name_setting
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.inference.interval import INTERVAL_LEVEL
 from tractexp.text.progress import Counting, make_silent_counter
@@ -92,7 +92,7 @@ def sample(
         import emcee
     except ImportError:
         raise UserError(
-            f"{setting('task=posterior')} needs emcee; install it by: pip install"
+            f"{name_setting('task=posterior')} needs emcee; install it by: pip install"
             " 'tractexp[posterior]'"
         ) from None
     likelihood = uncertainty.likelihood

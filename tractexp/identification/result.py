@@ -253,7 +253,8 @@ class Result(Plain):
     def write(self, path: Path) -> Path:
         """Write the file in one move, so that no half-written one is ever seen."""
         return files.write(
-            path, json.dumps(files.plain(asdict(self)), indent=2, ensure_ascii=False) + "\n"
+            path,
+            json.dumps(files.make_plain(asdict(self)), indent=2, ensure_ascii=False) + "\n",
         )
 
     def predict(

@@ -94,8 +94,8 @@ def build_result(
         notes=["the motors' share is that expected over all dips; constants are those of all"],
         records=_list_records(played),
         own_base=asdict(OwnBase.from_record(event.record)),
-        tractexp_version=provenance.version(),
-        commit=provenance.commit(),
+        tractexp_version=provenance.read_version(),
+        commit=provenance.find_commit(),
     )
 
 

@@ -254,7 +254,7 @@ class Uncertainty:
         errors = self.information.standard_errors
         pairs = zip(self.names, self.intervals.tolist(), strict=True)
         return {
-            "standard_errors": files.plain(dict(zip(self.names, errors, strict=True))),
+            "standard_errors": files.make_plain(dict(zip(self.names, errors, strict=True))),
             "intervals": dict(pairs),
             "verdicts": {name: str(verdict) for name, verdict in self.verdicts.items()},
             "uncertainty": {

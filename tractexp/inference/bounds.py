@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from tractexp.errors import MODEL, UserError, list_allowed, setting
+from tractexp.errors import MODEL, UserError, list_allowed, name_setting
 from tractexp.parameter import Parameter
 
 
@@ -57,4 +57,4 @@ def check_name(name: str, by_name: Mapping[str, object], where: str) -> None:
     """
     if name not in by_name:
         lack = f"this model has no parameter '{name}'{list_allowed(name, by_name, 'Parameters')}"
-        raise UserError(f"{setting(where)}.{name}: {lack}")
+        raise UserError(f"{name_setting(where)}.{name}: {lack}")

@@ -200,7 +200,7 @@ class Context:
             self.prior,
             sorted(self.kernels.fixed.items()),
         )
-        return store.key(store.environment(), repr(parts), self.records.window, *content)
+        return store.key(store.describe_environment(), repr(parts), self.records.window, *content)
 
     @property
     def domain(self) -> Domain:

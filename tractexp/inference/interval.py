@@ -82,6 +82,6 @@ class ParameterEstimate:
 
     def plain(self) -> dict[str, Any]:
         """{value, standard_error, interval} as `discrepancy.json` holds them."""
-        return files.plain(
+        return files.make_plain(
             {"value": self.value, "standard_error": self.error, "interval": self.interval}
         )

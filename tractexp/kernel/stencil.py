@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.cache.texts import text_in
+from tractexp.cache.texts import get_text_of_module
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NUMBERS, WHOLE
 from tractexp.kernel.layout import VECTOR_LANES
@@ -56,7 +56,7 @@ class Stencil:
         """The LLVM text, and the first and last sample that it reads, counted from each one."""
         arrays = self.rows, self.shared, self.numbers, self.sums, self.shifts, self.onward
         settings = repr((self.expression.__qualname__, *arrays))
-        description = text_in(
+        description = get_text_of_module(
             self.expression.__module__,
             settings,
             lambda: "\n".join(map(str, ir_of(self))),

@@ -12,7 +12,7 @@ from typing import Any, Literal, NoReturn
 import sympy
 from sympy import I, conjugate, im, re
 
-from tractexp.errors import Unfit, Unknown, UserError, nearest
+from tractexp.errors import Unfit, Unknown, UserError, suggest_nearest
 from tractexp.kernel.graph import Symbol, symbols_of
 from tractexp.kernel.layout import EVENT, INPUTS, WAVE_INPUTS
 from tractexp.model import sites
@@ -139,7 +139,7 @@ class Equations:
         words = [*(w for w in dir(self) if not w.startswith("_")), *sites.SITES]
         raise Unknown(
             "the equations offer no"
-            f" 'eq.{name}'{nearest(name, words) or '; docs/plugins.md lists all words'}"
+            f" 'eq.{name}'{suggest_nearest(name, words) or '; docs/plugins.md lists all words'}"
         )
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -168,7 +168,7 @@ class Equations:
         about = (
             f" ({what.about})"
             if isinstance(what, Site)
-            else nearest(name, (s.name for s in self._symbols()))
+            else suggest_nearest(name, (s.name for s in self._symbols()))
         )
         raise Unfit(f"its equations have no {name}{about}")
 

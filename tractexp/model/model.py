@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.cache.texts import text_of
+from tractexp.cache.texts import get_text_of_parts
 from tractexp.errors import MODEL, UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel
@@ -197,7 +197,9 @@ class Model:
         parts = (self.motor, self.static, *self.effects, effect)
         return Acceptance(
             **json.loads(
-                text_of(parts, lambda: self._try_effect(effect), self._in_cache("acceptance"))
+                get_text_of_parts(
+                    parts, lambda: self._try_effect(effect), self._in_cache("acceptance")
+                )
             )
         )
 
@@ -219,7 +221,7 @@ class Model:
     def source(self) -> str:
         """The kernel's text: LLVM IR, the same on every machine."""
         name = "kernel" if self.integration == CLASSICAL else f"kernel_{self.integration}"
-        return text_of(
+        return get_text_of_parts(
             (self.motor, self.static, *self.effects), self._written, self._in_cache(name)
         )
 
@@ -452,7 +454,9 @@ class Model:
             Parameters, states (`NAME_before`) and named quantities.
         """
         stated = json.loads(
-            text_of((self.motor, self.static, *self.effects), self._at_rest, self._in_cache("rest"))
+            get_text_of_parts(
+                (self.motor, self.static, *self.effects), self._at_rest, self._in_cache("rest")
+            )
         )
         numbers = [*map(float, (*values, *drive.before[event], *drive.event[event]))]
         substitutes = dict(zip((*self.names, "P0", "Q0", *EVENT), numbers, strict=True))
@@ -477,7 +481,7 @@ class Model:
         were printed before.
         """
         parts = (self.motor, self.static, *self.effects)
-        printed = text_of(
+        printed = get_text_of_parts(
             parts, lambda: json.dumps(self.equations.latex()), self._in_cache("latex")
         )
         return json.loads(printed)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 SAFE_PATH = "PYTHONSAFEPATH"  # what -P says, for a Python that another package starts
 
 
-def command(*arguments: str) -> list[str]:
+def build_command(*arguments: str) -> list[str]:
     """The command that runs Python with these arguments; `-c` and `-m` would put the current folder
     first.
     """

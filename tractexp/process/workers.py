@@ -30,7 +30,7 @@ WATCH = 0.5  # s between two looks of a worker at its parent
 Item = TypeVar("Item")
 
 
-def backends() -> list[str]:
+def list_backends() -> list[str]:
     """The names of joblib's backends, and of those that a package or plugin has
     registered with it.
     """
@@ -148,7 +148,7 @@ class Workers:
                 chosen = {
                     "backend": Dask(
                         client=stack.enter_context(
-                            dask_client(self.n_jobs, self.address, self.where)
+                            connect_to_dask(self.n_jobs, self.address, self.where)
                         )
                     )
                 }
@@ -245,7 +245,9 @@ def _register_ray() -> None:
 
 
 @contextlib.contextmanager
-def dask_client(n_jobs: int, address: str | None, where: str = "hydra.launcher") -> Iterator[Any]:
+def connect_to_dask(
+    n_jobs: int, address: str | None, where: str = "hydra.launcher"
+) -> Iterator[Any]:
     """A client of the Dask cluster at `address`, or of one of our own; `where` names the setting.
 
     Raises `UserError` where Dask is not installed or no scheduler answers.

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.cache.provenance import digest
+from tractexp.cache.provenance import hash_record
 from tractexp.record.change import (
     CHANGED,
     clause,
@@ -68,7 +68,8 @@ def _cut_where_load_goes(record: Record, first: int, S: complex, U: float) -> Re
 def _cut_aftermath(record: Record, at: int, why: str) -> Record:
     """The record up to the sample `at`, with a note that says why."""
     return _add_note(
-        replace(record.part(slice(0, at)), digest=digest(record)), f"{why}: the record is cut there"
+        replace(record.part(slice(0, at)), digest=hash_record(record)),
+        f"{why}: the record is cut there",
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.cache.provenance import digest
+from tractexp.cache.provenance import hash_record
 from tractexp.errors import DATA, UserError
 from tractexp.record.direction import OUTWARD, explain_negative_power
 from tractexp.record.event import Event, detect, steady
@@ -152,7 +152,7 @@ def view_dip(event: Event) -> Event:
         " the first dip"
     )
     part = record.part(slice(first, stop))
-    return detect(replace(part, digest=digest(record), notes=(*record.notes, note)))
+    return detect(replace(part, digest=hash_record(record), notes=(*record.notes, note)))
 
 
 def level(record: Record) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from tractexp.cache.provenance import digest
+from tractexp.cache.provenance import hash_record
 from tractexp.errors import UserError
 from tractexp.record.aftermath import cut_at_change, loss
 from tractexp.record.direction import explain_negative_power
@@ -176,7 +176,7 @@ def detect(record: Record) -> Event:
     if before.start > usual.start:  # what was before is another state, which is not fitted
         first = before.start
         start, end, before = start - first, end - first, slice(0, before.stop - first)
-        record = replace(record.part(slice(first, record.samples)), digest=digest(record))
+        record = replace(record.part(slice(first, record.samples)), digest=hash_record(record))
     t, U, P, Q = (values[before] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(

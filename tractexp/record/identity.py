@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tractexp.cache.provenance import digest
+from tractexp.cache.provenance import hash_record
 from tractexp.record.record import Base, Record
 
 UNKNOWN = "kV and MVA of one per unit unknown"
@@ -37,7 +37,7 @@ class Identity:
         in_mva = record.file_base.in_mva
         given = None if record.original_base is None else _sizes(record.original_base, in_mva)
         source = {"file": record.source, **record.identity}
-        return cls(source, _sizes(record.base, in_mva), given, digest(record))
+        return cls(source, _sizes(record.base, in_mva), given, hash_record(record))
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> "Identity":

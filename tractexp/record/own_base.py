@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tractexp.cache.provenance import digest
+from tractexp.cache.provenance import hash_record
 from tractexp.errors import DATA, UserError
 from tractexp.record.event import Event, detect
 from tractexp.record.record import DECLARATION, LOAD, Base, Record
@@ -147,7 +147,7 @@ def convert_base(event: Event, ratio: float, own: OwnBase) -> Event:
             record,
             base=base,
             original_base=record.file_base,
-            digest=digest(record),
+            digest=hash_record(record),
             more=by.per_unit(record.more),
             notes=(*record.notes, *([note] if record.original_base is None else [])),
             **arrays,

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from tractexp.configuration.plugin import build
-from tractexp.errors import UserError, nearest
+from tractexp.errors import UserError, suggest_nearest
 from tractexp.record import Record
 from tractexp.recording.event_views import settings_of
 from tractexp.recording.overview import View, view_of
@@ -53,11 +53,11 @@ def _read_record(
     if not files.exists(path) and parts is not None:
         path, load = folder / parts["file"], int(parts["load"] or 1)
         dip = int(parts["dip"]) if parts["dip"] else None
-    if not files.there(path):
+    if not files.is_there(path):
         there = [str(p.relative_to(folder)) for p in find_records(folder)]
         raise UserError(
             f"{where}: there is no file '{path.relative_to(folder)}' in"
-            f" {folder}{nearest(name, there)}"
+            f" {folder}{suggest_nearest(name, there)}"
         )
     view = see(path)
     if not 1 <= load <= len(view.sights):

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.configuration.plugin import build_chosen
-from tractexp.errors import UserError, setting
+from tractexp.errors import UserError, name_setting
 from tractexp.record.direction import explain_negative_power
 from tractexp.record.phasor import sequences
 from tractexp.recording.channel_order import (
@@ -114,7 +114,7 @@ def _refuse_residuals(recording: Recording, feeder: Feeder) -> None:
         residuals = find_residuals([recording.channels[i] for i in numbers])
         if odd := [numbers[k] for k in residuals if len(numbers) > 1]:
             rest = [i for i in numbers if i not in odd]
-            where = setting(f"data.{key}")
+            where = name_setting(f"data.{key}")
             raise UserError(
                 f"{where}={[*numbers]}: {name_channel(recording, odd[0])} is the residual of all"
                 " phases, and no phase; give the phases, or with two line voltages or two current"

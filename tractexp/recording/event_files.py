@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, check_distinct, setting
+from tractexp.errors import UserError, check_distinct, name_setting
 from tractexp.recording.phase_mark import normalize, spell_marks
 from tractexp.recording.record_files import find_packed
 from tractexp.storage import files
@@ -96,8 +96,9 @@ def check_joined(where: str, paths: Sequence[Any], endings: Collection[str]) -> 
         ending = Path(str(path)).suffix.lower()
         if ending not in endings and not files.is_called_archive(str(path)):
             raise UserError(
-                f"{setting(where)}: {path} is of another kind than {paths[0]}: one reader reads all"
-                f" files of an event, here those ending in {join_words(sorted(endings), 'or')};"
+                f"{name_setting(where)}: {path} is of another kind than {paths[0]}: one reader"
+                f" reads all files of an event, here those ending in"
+                f" {join_words(sorted(endings), 'or')};"
                 " export them alike"
             )
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from tractexp.configuration import plugin
 from tractexp.configuration.overrides import format_assignment
-from tractexp.errors import DATA, UserError, check_range, setting
+from tractexp.errors import DATA, UserError, check_range, name_setting
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
 from tractexp.record.dips import (
     FileDip,
@@ -226,7 +226,7 @@ class WaveformReader(Reader):
         Raises `UserError` for fewer or more, for one named twice and for one of another quantity.
         """
         named, channels = getattr(self, key), recording.channels
-        where = setting(f"data.{key}")
+        where = name_setting(f"data.{key}")
         if len(named) != wanted:
             there = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(channels))
             raise UserError(
@@ -307,7 +307,7 @@ class WaveformReader(Reader):
             f"{f.name}: "
             + quoting.shell(
                 *(
-                    format_assignment(setting(f"data.{key}"), value)
+                    format_assignment(name_setting(f"data.{key}"), value)
                     for key, value in f.settings.items()
                 )
             )

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, nearest, setting
+from tractexp.errors import UserError, name_setting, suggest_nearest
 
 # {unit as files write it, in lower case: (quantity, factor to the unit used inside: kV, kA)}
 UNITS: Mapping[str, tuple[str, float]] = {
@@ -351,7 +351,7 @@ class Recording:
             if not 0 <= each < len(names):
                 extent = f"which has {len(names)}, counted from 0"
                 raise UserError(
-                    f"{setting(where)}: there is no channel {each} in {self.source}, {extent}"
+                    f"{name_setting(where)}: there is no channel {each} in {self.source}, {extent}"
                 )
             return each
         if str(each) not in names:
@@ -359,12 +359,14 @@ class Recording:
             fitting = [
                 name for name, c in zip(names, self.channels, strict=True) if c.quantity != other
             ]
-            lack = f"{self.source} has no analog channel '{each}'{nearest(str(each), fitting)}"
-            raise UserError(f"{setting(where)}: {lack}")
+            lack = (
+                f"{self.source} has no analog channel '{each}'{suggest_nearest(str(each), fitting)}"
+            )
+            raise UserError(f"{name_setting(where)}: {lack}")
         if names.count(str(each)) > 1:
             raise UserError(
-                f"{setting(where)}: {self.source} has several channels '{each}'; give the number,"
-                " from 0"
+                f"{name_setting(where)}: {self.source} has several channels '{each}';"
+                " give the number, from 0"
             )
         return names.index(str(each))
 

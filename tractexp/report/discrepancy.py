@@ -25,7 +25,13 @@ from tractexp.report.extended import equations, interval, laws, parameters, valu
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
 from tractexp.report.proposal import add_proposal_section, headlines
-from tractexp.text.wording import alternatives, count_noun, epsilon, finish_sentence, join_words
+from tractexp.text.wording import (
+    count_noun,
+    epsilon,
+    finish_sentence,
+    join_alternatives,
+    join_words,
+)
 
 if TYPE_CHECKING:
     from tractexp.api.investigation import Investigation as Outcome
@@ -49,7 +55,7 @@ def summary(findings: "Outcome") -> Report:
     do next.
     """
     content, left = findings.content, findings.remainder.caption
-    names = alternatives(content["name_sets"])
+    names = join_alternatives(content["name_sets"])
     report = Report().text(f"verdict: {findings.verdict.upper()} {names}".rstrip())
     grade, which = content["adequacy"], "extended" if findings.names else "base"
     report.items(
@@ -152,7 +158,7 @@ def report(
     spoken = [
         [findings.catalogue.label_effect(name) for name in names] for names in findings.verdict.sets
     ]
-    head = f"{findings.verdict.word.upper()} {alternatives(spoken)}".strip()
+    head = f"{findings.verdict.word.upper()} {join_alternatives(spoken)}".strip()
     left = [finish_sentence(findings.headline)] if findings.headline else []
     sentences = [
         finish_sentence(findings.reason),

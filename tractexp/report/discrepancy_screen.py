@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from tractexp.blocks import Report, Table
 from tractexp.report.discrepancy import describe_nearest, describe_where, gap
 from tractexp.report.screen import describe_load
-from tractexp.text.wording import alternatives, shorten
+from tractexp.text.wording import join_alternatives, shorten
 
 if TYPE_CHECKING:
     from tractexp.api.investigation import Investigation
@@ -18,7 +18,7 @@ MOST_SIZES = 3  # parameters of the effects named that the screen has room for
 
 def screen(found: "Investigation") -> Report:
     """One screen, the verdict first."""
-    names = alternatives(found.content["name_sets"])
+    names = join_alternatives(found.content["name_sets"])
     page = Report().text(f"verdict: {found.verdict.upper()} {shorten(names)}".rstrip())
     left, fitted = found.remainder.caption, [event.record.name for event in found.question.train]
     sentences = [found.reason, *found.sizes[:MOST_SIZES], left, *found.proposal_sentences[:1]]

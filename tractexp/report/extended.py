@@ -15,7 +15,7 @@ from tractexp.discrepancy.forms import CATALOGUE, forms
 from tractexp.identification.verdict import brief
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.model.sites import KINDS
-from tractexp.text.wording import alternatives, format_with_error, join_words
+from tractexp.text.wording import format_with_error, join_alternatives, join_words
 
 CURVE, TEXTBOOK = "#0072B2", "#D55E00"
 
@@ -108,7 +108,7 @@ def equations(page: Report, findings: Findings) -> None:
     from tractexp.model.printed import list_changed_lines
 
     page.heading("The extended model")
-    if others := alternatives(findings.verdict.sets[1:]):
+    if others := join_alternatives(findings.verdict.sets[1:]):
         page.text(
             f"It has {join_words(findings.names)}; {others} instead would fit these events as well."
         )

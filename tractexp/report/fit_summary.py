@@ -8,7 +8,7 @@ from tractexp.identification.yardstick import poles_in_words
 from tractexp.report.fit_sentences import describe_rivals, describe_search_end
 from tractexp.report.fit_tables import digits, errors, parameters
 from tractexp.report.race import tabulate_race
-from tractexp.text.wording import finish_sentence, shown_in_words
+from tractexp.text.wording import describe_shown_effects, finish_sentence
 
 if TYPE_CHECKING:
     from tractexp.api.identification import Identification
@@ -60,7 +60,7 @@ def network(fit: "Identification") -> list[str]:
         f"{n} {digits(v)} {result.units.get(n, '')}".rstrip(" 1")
         for n, v in result.nuisances.items()
     )
-    return [shown_in_words(result.shown_effects), f"nuisances of the fit: {values}"]
+    return [describe_shown_effects(result.shown_effects), f"nuisances of the fit: {values}"]
 
 
 def name_verdicts(result: Any) -> dict[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.blocks import Report, style
 from tractexp.blocks.chart import Chart
-from tractexp.configuration.run_command import command
+from tractexp.configuration.run_command import get_command
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
@@ -77,7 +77,7 @@ def report(fit: "Identification") -> Report:
     page.heading("How the estimates depend on each other")
     _correlation(page, uncertainty)
     page.heading("How this page was made")
-    return page.table(["", ""], list_origin(result, command()), words=(1,))
+    return page.table(["", ""], list_origin(result, get_command()), words=(1,))
 
 
 def _draw_shares(profile: Sequence[dict[str, float]]) -> Chart:

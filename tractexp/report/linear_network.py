@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from tractexp.blocks import Report, Table
-from tractexp.configuration.run_command import command
+from tractexp.configuration.run_command import get_command
 from tractexp.inference.model_error import in_percent
 from tractexp.record.identity import title_of
 from tractexp.report.fit_tables import error_table
@@ -79,6 +79,6 @@ def report(fit: "NetworkFit") -> Report:
     page.heading("How this page was made")
     origin = [
         ["tractexp", fit.content["tractexp_version"]],
-        *([["command", command()]] if command() else []),
+        *([["command", get_command()]] if get_command() else []),
     ]
     return page.table(["", ""], origin, words=(1,))

@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
-from tractexp.configuration.run_command import build_folder_command, command
+from tractexp.configuration.run_command import build_folder_command, get_command
 from tractexp.errors import UserError
 from tractexp.exchange.format import choose_format
 from tractexp.exchange.rating import SOURCE, rate_machine
@@ -65,7 +65,7 @@ def sheet(fit: "Identification") -> Report:
     for line in fit.model.model.latex():
         page.equation(line)
     page.heading("How this sheet was made")
-    return page.table(["", ""], [*list_origin(result, command()), *_export(fit)], words=(1,))
+    return page.table(["", ""], [*list_origin(result, get_command()), *_export(fit)], words=(1,))
 
 
 def _tabulate_powers(fit: "Identification") -> Table:

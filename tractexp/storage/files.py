@@ -60,7 +60,7 @@ def read_packaged_text(name: str) -> str:
     return (Path(__file__).parents[1] / name).read_text(encoding="utf-8")
 
 
-def there(path: Path | str) -> bool:
+def is_there(path: Path | str) -> bool:
     """Whether there is an ordinary file; raises `UserError` for what only seems to be one, and for
     no name of a file.
 
@@ -79,7 +79,7 @@ def there(path: Path | str) -> bool:
         if os.path.islink(path):
             raise UserError(f"{name} is a link that leads nowhere; give the file itself") from None
         packed = zip_archive.locate(path)
-        return packed is not None and packed[1] in zip_archive.members(packed[0])
+        return packed is not None and packed[1] in zip_archive.list_members(packed[0])
     except (OSError, ValueError) as error:
         raise UserError(
             f"{name:.200} cannot be read: {getattr(error, 'strerror', None) or error}"
@@ -93,7 +93,7 @@ def there(path: Path | str) -> bool:
 
 def check_there(path: Path) -> None:
     """Raise `UserError` where there is no ordinary file."""
-    if not there(path):
+    if not is_there(path):
         raise UserError(
             f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file"
         )
@@ -124,7 +124,7 @@ def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) 
     """
     try:
         with open_ordinary_file(path) as file:
-            bytes_there = size(path)
+            bytes_there = read_size(path)
             if limit is None and bytes_there > largest:
                 size_and_most = (
                     f"{bytes_there / 1e6:.4g} MB, and a file of its kind at most"
@@ -143,8 +143,8 @@ def open_ordinary_file(path: Path | str) -> Iterator[IO[bytes]]:
     """An ordinary file, or one in a .zip, open to be read. Raises `UserError` for what only seems
     to be one, `OSError` as `open`.
     """
-    there(path)
-    grant_time(size(path))
+    is_there(path)
+    grant_time(read_size(path))
     if packed := zip_archive.locate(path):
         with zip_archive.open_member(*packed) as file:
             yield file
@@ -156,10 +156,10 @@ def open_ordinary_file(path: Path | str) -> Iterator[IO[bytes]]:
         yield file
 
 
-def size(path: Path | str) -> int:
+def read_size(path: Path | str) -> int:
     """Bytes of a file, or of one in a .zip. Raises `OSError` where it is missing."""
     packed = zip_archive.locate(path)
-    return zip_archive.size(*packed) if packed else os.stat(path).st_size
+    return zip_archive.read_size(*packed) if packed else os.stat(path).st_size
 
 
 def list_folder(folder: Path) -> list[Path]:
@@ -176,16 +176,16 @@ def list_folder(folder: Path) -> list[Path]:
 
 def list_packed(archive: Path) -> list[Path]:
     """All files in a .zip, in order of name. Raises `UserError` for one that cannot be read."""
-    return sorted(archive / name for name in zip_archive.members(archive))
+    return sorted(archive / name for name in zip_archive.list_members(archive))
 
 
-def state(path: Path | str) -> tuple[int, int]:
+def read_state(path: Path | str) -> tuple[int, int]:
     """(bytes, time of the last change [ns]) of a file; of one in a .zip, when that was changed.
 
     Raises `OSError` where it is missing.
     """
     packed = zip_archive.locate(path)
-    return size(path), os.stat(packed[0] if packed else path).st_mtime_ns
+    return read_size(path), os.stat(packed[0] if packed else path).st_mtime_ns
 
 
 def is_packed(path: Path | str) -> bool:
@@ -196,7 +196,7 @@ def is_packed(path: Path | str) -> bool:
 def exists(path: Path | str) -> bool:
     """Whether there is a file or a folder of that name, also in a .zip; raises nothing."""
     try:
-        return os.path.exists(path) or there(path)
+        return os.path.exists(path) or is_there(path)
     except (UserError, OSError, ValueError):
         return False
 
@@ -332,7 +332,7 @@ class Transcript(io.TextIOBase):
         super().close()
 
 
-def new_folder(path: Path) -> Path:
+def make_new_folder(path: Path) -> Path:
     """A folder that was not there: of this name, or with a number behind it. Raises `UserError`
     where it cannot be.
     """
@@ -346,7 +346,7 @@ def new_folder(path: Path) -> Path:
     raise AssertionError("numbers end nowhere")
 
 
-def inside(path: Path, folder: Path) -> bool:
+def is_inside(path: Path, folder: Path) -> bool:
     """Whether a file or folder, with everything below it, lies below another folder, wherever links
     lead; pipes do not.
     """
@@ -360,7 +360,7 @@ def inside(path: Path, folder: Path) -> bool:
         return False
 
 
-def leftovers(folder: Path) -> list[Path]:
+def find_leftovers(folder: Path) -> list[Path]:
     """Partial files of killed processes of ours in `folder` and below, those of the last hour
     apart.
     """
@@ -408,7 +408,7 @@ def _fill(temporary: Path, data: bytes, lasting: bool, private: bool) -> None:
         if lasting:
             os.fsync(file.fileno())
     if not private:  # as a temporary file is
-        os.chmod(temporary, 0o666 & ~_umask())
+        os.chmod(temporary, 0o666 & ~_read_umask())
 
 
 def _settle(folder: Path) -> None:
@@ -428,29 +428,29 @@ def _settle(folder: Path) -> None:
 
 def write_json(path: Path | str, content: Any, *, private: bool = False) -> Path:
     """Write JSON that any reader takes: numbers that do not exist (nan, infinity) become null."""
-    text = json.dumps(plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    text = json.dumps(make_plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     return write(path, text, private=private)
 
 
-def plain(content: Any) -> Any:
+def make_plain(content: Any) -> Any:
     """Content as JSON knows it.
 
     Dataclasses, NumPy's arrays, tuples and paths are turned into plain ones, nan into None.
     """
     if isinstance(content, dict):
-        return {str(key): plain(value) for key, value in content.items()}
+        return {str(key): make_plain(value) for key, value in content.items()}
     if isinstance(content, list | tuple):
-        return [plain(value) for value in content]
+        return [make_plain(value) for value in content]
     if hasattr(content, "tolist"):
-        return plain(content.tolist())
+        return make_plain(content.tolist())
     if isinstance(content, float):
         return content if math.isfinite(content) else None
     if dataclasses.is_dataclass(content) and not isinstance(content, type):
-        return plain(dataclasses.asdict(content))
+        return make_plain(dataclasses.asdict(content))
     return content if isinstance(content, int | bool | None) else encode_text(str(content)).decode()
 
 
-def _umask() -> int:
+def _read_umask() -> int:
     """The rights that this process takes from new files."""
     now = os.umask(0)
     os.umask(now)

@@ -67,7 +67,7 @@ def _take_lock(path: Path) -> IO[bytes]:
     none any more.
     """
     while True:
-        files.there(path)
+        files.is_there(path)
         file = path.open("a+b")
         try:
             if not _try_lock(file):

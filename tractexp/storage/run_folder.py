@@ -201,7 +201,8 @@ def _settle(folder: Path) -> bool:
     for path in _sort_files(whole):
         target = folder / path.relative_to(whole)
         if not (
-            files.inside(path, whole) and target.parent.resolve().is_relative_to(folder.resolve())
+            files.is_inside(path, whole)
+            and target.parent.resolve().is_relative_to(folder.resolve())
         ):
             raise UserError(f"{target} would be moved by a link out of {folder}; remove {whole}")
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -56,20 +56,20 @@ def is_archive(path: Path | str) -> bool:
     return is_called_archive(path) and Path(path).is_file()
 
 
-def members(archive: Path) -> Mapping[str, zipfile.ZipInfo]:
+def list_members(archive: Path) -> Mapping[str, zipfile.ZipInfo]:
     """The files in an archive by their names, without folders, links and hidden files.
 
     Raises `UserError` for what is no .zip, is encrypted, or unpacks to more than any record has.
     """
     try:
         state = archive.stat()
-        return _members(str(archive), state.st_mtime_ns, state.st_size)
+        return _list_members_of_state(str(archive), state.st_mtime_ns, state.st_size)
     except OSError as error:
         raise UserError(f"{archive} cannot be read: {error.strerror or error}") from error
 
 
 @functools.lru_cache(maxsize=64)
-def _members(path: str, changed: int, size: int) -> Mapping[str, zipfile.ZipInfo]:
+def _list_members_of_state(path: str, changed: int, size: int) -> Mapping[str, zipfile.ZipInfo]:
     """Those of an archive in the state it has."""
     stated = _check_directory(path, size)
     try:
@@ -167,16 +167,16 @@ def _is_link(entry: zipfile.ZipInfo) -> bool:
     return stat.S_ISLNK(entry.external_attr >> 16)
 
 
-def size(archive: Path, name: str) -> int:
+def read_size(archive: Path, name: str) -> int:
     """Bytes of a file, unpacked. Raises `UserError` as `members`, `FileNotFoundError` where it is
     not there.
     """
-    return _entry(archive, name).file_size
+    return _find_entry(archive, name).file_size
 
 
-def _entry(archive: Path, name: str) -> zipfile.ZipInfo:
+def _find_entry(archive: Path, name: str) -> zipfile.ZipInfo:
     """The entry of that name. Raises FileNotFoundError where there is none."""
-    entry = members(archive).get(name)
+    entry = list_members(archive).get(name)
     if entry is None:
         raise FileNotFoundError(2, "there is no such file", os.path.join(archive, name))
     return entry
@@ -188,7 +188,7 @@ def open_member(archive: Path, name: str) -> Iterator[IO[bytes]]:
 
     It ends at the size that the archive states, and fails where its sum is another.
     """
-    entry = _entry(archive, name)
+    entry = _find_entry(archive, name)
     if entry.compress_type not in METHODS:
         raise UserError(
             f"{archive}: '{name}' is packed in a way that is not read here (method"

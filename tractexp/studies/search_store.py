@@ -59,7 +59,10 @@ class SearchStore:
         arrays = {name: getattr(result.history, name) for name in ARRAYS}
         key = self._key(settings, seed)
         SEARCHES.write_arrays(
-            key, ending=np.array(json.dumps(files.plain(ending))), found=result.values, **arrays
+            key,
+            ending=np.array(json.dumps(files.make_plain(ending))),
+            found=result.values,
+            **arrays,
         )
 
     def arrays(
@@ -90,5 +93,7 @@ def _key(problem: Problem, limits: Limits) -> str:
     and the seed.
     """
     return store.key(
-        store.environment(), repr((_parts(problem), problem.loss, limits)), problem.digest()
+        store.describe_environment(),
+        repr((_parts(problem), problem.loss, limits)),
+        problem.digest(),
     )

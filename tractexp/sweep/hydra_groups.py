@@ -15,7 +15,7 @@ from hydra.plugins.config_source import ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import OmegaConf
 
-from tractexp.cache.store import TEXTS, environment, key
+from tractexp.cache.store import TEXTS, describe_environment, key
 from tractexp.compat import hydra_config_store, hydra_plugins, hydra_versions
 from tractexp.configuration import plugin
 from tractexp.configuration.composition import MODEL
@@ -34,7 +34,7 @@ class PluginSearchPath(SearchPathPlugin):
 
     def manipulate_search_path(self, search_path: Any) -> None:
         """Add the configurations of plugins, model files and a user's own folders."""
-        for folder in plugin.configuration_folders():
+        for folder in plugin.list_configuration_folders():
             search_path.prepend("tractexp", f"file://{folder}", "main")
         search_path.prepend("tractexp", f"{ModelFiles.scheme()}://", "main")
         for folder in self.own:
@@ -123,7 +123,7 @@ def _list_offered() -> dict[str, set[str]]:
         for group, classes in classes_of.items():
             yield group, {name for name, cls in classes.items() if cls.chosen}
 
-    kept = json.loads(TEXTS.get(key(environment(), "plugins that Hydra offers"), ask))
+    kept = json.loads(TEXTS.get(key(describe_environment(), "plugins that Hydra offers"), ask))
     here = dict(list_groups(plugin.list_registered()))
     return {group: {*kept.get(group, ()), *here.get(group, ())} for group in {*kept, *here}}
 
@@ -145,7 +145,7 @@ def _is_configured(group: str, name: str) -> bool:
     """Whether a file gives this plugin its defaults: it begins with the schema, as
     conf/task/export.yaml does.
     """
-    folders = (plugin.CONF, *plugin.configuration_folders(), *PluginSearchPath.own)
+    folders = (plugin.CONF, *plugin.list_configuration_folders(), *PluginSearchPath.own)
     return any((folder / group / f"{name}.yaml").is_file() for folder in folders)
 
 

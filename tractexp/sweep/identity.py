@@ -27,7 +27,7 @@ def hash_inputs(config: Mapping[str, Any]) -> str:
     job names.
     """
     named = sorted(set(list_texts(config.get("data") or {})))
-    return _digest("".join([provenance.code(), *map(_file, named)]).encode())
+    return _digest("".join([provenance.hash_code(), *map(_file, named)]).encode())
 
 
 def _digest(content: bytes) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tractexp.api.job import Job, read_events, variant
+from tractexp.api.job import Job, name_variant, read_events
 from tractexp.cli.chosen import collect_chosen_settings
 from tractexp.cli.configuration import list_named_files
 from tractexp.configuration import run_command
@@ -112,7 +112,7 @@ class SweepJob:
             (text for text in self.overrides if text not in common), self.choices
         )
         data = f" on {self.choices['data']}" if "data" in own else ""
-        return variant(self.choices["optimizer"], own) + data
+        return name_variant(self.choices["optimizer"], own) + data
 
     @property
     def returns(self) -> Sequence[str] | None:
@@ -180,7 +180,7 @@ def _work_there(job: SweepJob, place: RunFolder, logs: bool) -> Status:
             status=FAILED if message else FINISHED,
             message=message,
             seconds=seconds,
-            metrics=files.plain(measured),
+            metrics=files.make_plain(measured),
         )
         conclude(ended)
     ended.end(job.folder)
@@ -219,7 +219,7 @@ def _run_task(job: SweepJob, place: RunFolder, measured: dict[str, float], logs:
     """Run the task, which notes what it measures; returns what went wrong, in one line, or ""."""
     from tractexp.cli.run import perform
 
-    if not run_command.command():  # in a process that no command started
+    if not run_command.get_command():  # in a process that no command started
         run_command.remember_command([*job.command])
     try:
         parent, of_many = parent_of(folder_of(job.folder)), not job.alone

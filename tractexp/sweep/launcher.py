@@ -16,7 +16,7 @@ from omegaconf import OmegaConf
 from tractexp.api.job import Job
 from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError, check_choice, check_range
-from tractexp.process.workers import Workers, backends
+from tractexp.process.workers import Workers, list_backends
 from tractexp.storage.run_folder import hold
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
@@ -69,7 +69,7 @@ class Cores(Launcher):
         """Raise `UserError` for a backend or numbers that cannot be."""
         self.hydra_context, self.config = hydra_context, config
         self.compose = Composer(hydra_context.config_loader, config)
-        check_choice("hydra.launcher.backend", self.workers.backend, backends())
+        check_choice("hydra.launcher.backend", self.workers.backend, list_backends())
         if self.workers.n_jobs != -1:
             check_range("hydra.launcher.n_jobs", self.workers.n_jobs, 1)
         check_range("hydra.launcher.tries", self.tries, 1)

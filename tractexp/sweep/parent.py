@@ -136,7 +136,7 @@ def _describe_sweep(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
         tags={
             "task": first.choices["task"],
             "sweep": " ".join(overrides),
-            "git_commit": provenance.commit(),
+            "git_commit": provenance.find_commit(),
         },
         description=f"A sweep of {len(jobs)} jobs: {quoting.markdown(' '.join(overrides))}",
     )

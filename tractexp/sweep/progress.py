@@ -9,7 +9,7 @@ from typing import Any
 
 from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.status import FAILED, SEARCHED, Status
-from tractexp.text.progress import Pace, console, say
+from tractexp.text.progress import Pace, build_console, say
 
 MOST_NAMED_VARIANTS = 3  # variants named in a line of a log file
 
@@ -68,7 +68,7 @@ def progress(jobs: Sequence[SweepJob]) -> Iterator[Callable[[SweepJob, Status], 
     in a log file.
     """
     tally = Tally(jobs)
-    if console().is_terminal:
+    if build_console().is_terminal:
         with _live(tally) as callback:
             yield callback
         return
@@ -96,13 +96,15 @@ def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
         TextColumn("{task.fields[note]}", markup=False),
         TimeElapsedColumn(),
     ]
-    bar = Progress(*columns, console=console())
+    bar = Progress(*columns, console=build_console())
     line = bar.add_task("", total=tally.total, note="")
 
     def render_progress() -> Any:
         return Group(bar, _table(tally))
 
-    with Live(render_progress(), console=console(), transient=True, refresh_per_second=4) as live:
+    with Live(
+        render_progress(), console=build_console(), transient=True, refresh_per_second=4
+    ) as live:
 
         def note(job: SweepJob, end: Status) -> None:
             tally.add(job, end)

@@ -21,7 +21,7 @@ from tractexp.blocks import Table
 from tractexp.cli.chosen import refuse_unread
 from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.configuration.plugin import build, get
-from tractexp.configuration.refusal import first_line
+from tractexp.configuration.refusal import get_first_line
 from tractexp.errors import Stopped, UserError
 from tractexp.storage import files
 from tractexp.storage.run_folder import hold
@@ -179,7 +179,7 @@ class Grid(Sweeper):
         except UserError:
             raise
         except Exception as error:
-            problem = f"the launcher gave up: {first_line(error)}"
+            problem = f"the launcher gave up: {get_first_line(error)}"
         finally:
             for job in jobs:
                 if end != INTERRUPTED or job.folder.exists():  # a job that has not begun has no end

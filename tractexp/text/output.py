@@ -37,7 +37,7 @@ class Outlet(io.FileIO):
 
 
 @contextmanager
-def outlet() -> Iterator[Outlet | None]:
+def open_outlet() -> Iterator[Outlet | None]:
     """Print by an `Outlet` within; None where the process's own output is redirected, closed, or
     Windows'.
 

@@ -38,7 +38,7 @@ def make_silent_counter(total: int) -> Counting:
 
 
 @functools.cache
-def console() -> Any:
+def build_console() -> Any:
     """Where progress is printed: a terminal's or a notebook's own width, a fixed one in logs."""
     from rich.console import Console
 
@@ -48,9 +48,9 @@ def console() -> Any:
     return Console(highlight=False, soft_wrap=True, width=LOG_WIDTH)
 
 
-def text_width() -> int | None:
+def find_text_width() -> int | None:
     """Where sentences are folded, in characters; None where each is one line, as in a log file."""
-    return console().width if console().is_terminal or WIDTH in os.environ else None
+    return build_console().width if build_console().is_terminal or WIDTH in os.environ else None
 
 
 def is_everything_asked() -> bool:
@@ -69,7 +69,7 @@ def ask_for(arguments: list[str]) -> list[str]:
 
 def say(text: str = "") -> None:
     """Print one line."""
-    console().print(write_on_one_line(text), markup=False)
+    build_console().print(write_on_one_line(text), markup=False)
 
 
 def log(text: str) -> None:
@@ -89,7 +89,7 @@ def report_search(
     if progress is False:
         yield None
         return
-    if not _lively():
+    if not _can_overwrite():
         pace = Pace()
 
         def line(iteration: int, best: float, simulations: int) -> None:
@@ -140,7 +140,7 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
         ended = itertools.count(1)
         yield lambda: progress(f"{next(ended)} of {total} {what}")
         return
-    if _lively():
+    if _can_overwrite():
         columns = [
             TextColumn(f"  {what}"),
             BarColumn(bar_width=30),
@@ -195,7 +195,7 @@ def tell_stages(progress: Progress = None) -> Iterator[Callable[[str], None]]:
     if callable(progress) or progress is False:
         yield progress or (lambda line: None)
         return
-    if _lively():
+    if _can_overwrite():
         with _live(
             [SpinnerColumn(), TextColumn("{task.fields[stage]}", markup=False)], None, stage=""
         ) as update:
@@ -256,9 +256,9 @@ class Pace:
         return spent
 
 
-def _lively() -> bool:
+def _can_overwrite() -> bool:
     """Whether lines can be overwritten: in a terminal or a notebook."""
-    return console().is_terminal or console().is_jupyter
+    return build_console().is_terminal or build_console().is_jupyter
 
 
 @contextmanager
@@ -266,14 +266,14 @@ def _live(columns: list[Any], total: float | None, **fields: Any) -> Iterator[Ca
     """Yield `update(completed=..., **fields)` of one bar, which vanishes at the end."""
     from rich.progress import Progress as Bar
 
-    if not console().is_jupyter:
-        with Bar(*columns, console=console(), transient=True, refresh_per_second=8) as bar:
+    if not build_console().is_jupyter:
+        with Bar(*columns, console=build_console(), transient=True, refresh_per_second=8) as bar:
             line = bar.add_task("", total=total, **fields)
             yield lambda **news: bar.update(line, **news)
         return
     from IPython.display import HTML, display
 
-    bar = Bar(*columns, console=console(), auto_refresh=False)
+    bar = Bar(*columns, console=build_console(), auto_refresh=False)
     line = bar.add_task("", total=total, **fields)
     shown: Any = display(bar, display_id=True)
     due = time.perf_counter() + BLINK

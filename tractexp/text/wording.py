@@ -116,7 +116,7 @@ def list_first(names: Sequence[str], most: int) -> str:
     return ", ".join(names[:most]) + more
 
 
-def alternatives(sets: Sequence[Sequence[str]]) -> str:
+def join_alternatives(sets: Sequence[Sequence[str]]) -> str:
     """Sets of names as alternatives.
 
     Several that share a name are told by that name and what may stand beside it.
@@ -232,7 +232,7 @@ def degrees(value: float | None) -> str:
     return "" if value is None else f"{round(value, 1) + 0.0:.1f}"
 
 
-def shown_in_words(shown: Mapping[str, str]) -> str:
+def describe_shown_effects(shown: Mapping[str, str]) -> str:
     """Which effects are in a model because the records show them, in a sentence."""
     return (
         "in the model because the record shows it:"

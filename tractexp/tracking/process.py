@@ -60,7 +60,7 @@ class Logger:
     def __init__(self, uri: str = ""):
         """Start the process that logs into a store."""
         self._process = subprocess.Popen(
-            interpreter.command("-c", f"from {__name__} import main; main()"),
+            interpreter.build_command("-c", f"from {__name__} import main; main()"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             # Ctrl-C is the job's business: it ends this process by leaving the `with`

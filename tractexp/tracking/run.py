@@ -281,7 +281,7 @@ def _create(client: Any, run: TrackedRun, uri: str) -> str:
         "mlflow.user": _user(),
         "mlflow.source.name": "tractexp",
         "mlflow.source.type": "LOCAL",
-        "mlflow.source.git.commit": provenance.commit(),
+        "mlflow.source.git.commit": provenance.find_commit(),
         NOTE: run.description,
         "mlflow.parentRunId": run.parent or "",
         KEY: run.key,

@@ -101,9 +101,9 @@ def _create_database(database: Path) -> None:
     MLflow's migrations take a second of work; what they came to is kept for the next folder.
     """
     # imports NumPy, for which the process that logs does not wait
-    from tractexp.cache.store import DATABASES, key, version
+    from tractexp.cache.store import DATABASES, key, read_version
 
-    makers = [version(name) for name in ("mlflow", "sqlalchemy", "alembic")]
+    makers = [read_version(name) for name in ("mlflow", "sqlalchemy", "alembic")]
     files.write(database, DATABASES.get(key(makers, sqlite3.sqlite_version), _migrate))
 
 

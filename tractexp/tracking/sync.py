@@ -124,7 +124,7 @@ def _may_go(path: Path, folder: Path, tell: Callable[[str], None]) -> bool:
     """
     if not os.path.exists(path):
         return False
-    if not files.inside(path, folder):
+    if not files.is_inside(path, folder):
         tell(f"{path} is not sent: it does not lie in the folder {folder} of its run")
         return False
     if any(one.name.lower() == MODEL for one in (path, *path.rglob("*"))):
@@ -188,7 +188,7 @@ def _sweep(one: RunFile, run_there: Any, uri: str) -> str:
     pages = [
         path
         for name in PAGES
-        if (path := one.folder / name).is_file() and files.inside(path, one.folder)
+        if (path := one.folder / name).is_file() and files.is_inside(path, one.folder)
     ]
     finish_parent(run_id, uri, one.run.status, one.run.metrics, pages)
     one.mark_logged(run_id, uri)

@@ -41,7 +41,7 @@ def serve(
         flush=True,
     )
     started = time.monotonic()
-    command = interpreter.command("-m", "tractexp.compat.mlflow_own_origin", "server")
+    command = interpreter.build_command("-m", "tractexp.compat.mlflow_own_origin", "server")
     command += ["--backend-store-uri", uri, "--registry-store-uri", uri]
     command += ["--host", host, "--port", str(port), "--workers", "1", *_guard(host, port)]
     settings = {

@@ -100,7 +100,7 @@ class Suite(Task):
             name=f"{row['method']}, case {row['case']}",
             parameters={key: str(row[key]) for key in ("method", "case", "seed", "file", "truth")},
             metrics=told,
-            tags={"task": "suite", "method": row["method"], "git_commit": provenance.commit()},
+            tags={"task": "suite", "method": row["method"], "git_commit": provenance.find_commit()},
             artifacts=paths,
             parent=job.sweep,
         )

@@ -289,7 +289,7 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
                 "task": "benchmark",
                 "optimizer": optimizer,
                 "seed": seed,
-                "git_commit": provenance.commit(),
+                "git_commit": provenance.find_commit(),
             },
             artifacts=paths,
             parent=job.sweep,

@@ -226,7 +226,7 @@ def content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
         for name in benchmark.optimizers
         for d in plan.dimensions
     ]
-    return files.plain(
+    return files.make_plain(
         {
             **asdict(plan),
             "optimizers": settings,

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, setting
+from tractexp.errors import UserError, name_setting
 from tractexp.identification.optimizer import Optimizer
 from tractexp.identification.search import Limits, search
 from tractexp.process.workers import Workers
@@ -33,7 +33,7 @@ def package() -> Any:
         import ioh
     except ImportError as error:
         raise UserError(
-            f"{setting('task=benchmark')} needs the package 'ioh', which is not installed: pip"
+            f"{name_setting('task=benchmark')} needs the package 'ioh', which is not installed: pip"
             " install 'tractexp[benchmark]'"
         ) from error
     return ioh

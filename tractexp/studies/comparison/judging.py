@@ -113,7 +113,7 @@ def _run_on_bbob(
         "optimizers": optimizers,
         "instances": instances,
         "multiplier": multiplier,
-        "code": provenance.code(),
+        "code": provenance.hash_code(),
     }
     result = _load_stored_runs(folder, settings) if folder else None
     if result is None:
@@ -132,7 +132,7 @@ def _load_stored_runs(folder: Path, settings: Mapping[str, Any]) -> BenchmarkRes
     """The runs on BBOB that were made before with the same code and settings."""
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError, UserError):
         content = files.read_json(folder / BBOB)
-        if content["of"] == files.plain(settings):
+        if content["of"] == files.make_plain(settings):
             return BenchmarkResult.from_dict(content["made"])
     return None
 

@@ -191,7 +191,7 @@ def _reading(page: Report) -> Report:
 
 def content(several: Several, source: str) -> dict[str, Any]:
     """The content of `comparison.json`: each problem as if it were alone, and all together."""
-    return files.plain(
+    return files.make_plain(
         {
             "source": source,
             "answer": claims.answer(several),

@@ -347,7 +347,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
     """The content of `comparison.json`: every number of the page. What is not finite is None."""
     failed, interrupted = _list_runs_without_result(comparison)
     polished = comparison.polished
-    return files.plain(
+    return files.make_plain(
         {
             "source": source,
             "problem": comparison.gathered.problem,

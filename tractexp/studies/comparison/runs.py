@@ -57,7 +57,7 @@ class SearchRun:
 
     def to_dict(self) -> dict[str, Any]:
         """The run as plain data."""
-        return files.plain(vars(self))
+        return files.make_plain(vars(self))
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
