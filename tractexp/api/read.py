@@ -193,7 +193,7 @@ def read_dips(argument: str, given: Any, least: int = 0) -> Dips:
 
 
 def read_dips_together(records: Any, validate: Any) -> tuple[Dips, Dips]:
-    """Events fitted and held out, as `dips_of`, all on the base of the load in the first one."""
+    """Events fitted and held out, as `read_dips`, all on the base of the load in the first one."""
     train, held = read_dips("records", records, least=1), read_dips("validate", validate)
     events = rebase_events([view_dip(event) for event in (*train, *held)])
     return Dips(events[: len(train)]), Dips(events[len(train) :])

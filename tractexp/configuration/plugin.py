@@ -33,6 +33,9 @@ from tractexp.configuration.choices import (
     list_modules,
     list_plugin_folders,
 )
+from tractexp.configuration.choices import (
+    list_configuration_folders as list_configuration_folders,
+)
 from tractexp.errors import Unknown, UserError, list_allowed, name_setting
 from tractexp.parameter import Parameter
 
