@@ -168,8 +168,8 @@ def _is_link(entry: zipfile.ZipInfo) -> bool:
 
 
 def read_size(archive: Path, name: str) -> int:
-    """Bytes of a file, unpacked. Raises `UserError` as `list_members`, `FileNotFoundError` where it is
-    not there.
+    """Bytes of a file, unpacked. Raises `UserError` as `list_members`, `FileNotFoundError` where it
+    is not there.
     """
     return _find_entry(archive, name).file_size
 
