@@ -60,7 +60,7 @@ class Chart:
         self._axes = self._laid_out(panels, heights or [1.0] * len(panels), log_y)
         self._x: dict[str, Any] = {
             "title": {"text": quoting.html(x)},
-            "anchor": _axis("y", len(panels) - 1),
+            "anchor": _name_axis("y", len(panels) - 1),
         }
         self._x |= {
             "showgrid": True,
@@ -96,7 +96,7 @@ class Chart:
             }
             if log:
                 axis |= {"type": "log", "exponentformat": "power", "nticks": MOST_LOG_TICKS}
-            axes[_axis("yaxis", k)] = axis
+            axes[_name_axis("yaxis", k)] = axis
             top = low - PANEL_GAP
         return axes
 
@@ -199,7 +199,8 @@ class Chart:
                 panel=self._panels[panel],
                 label=name,
             )
-        self._axes[_axis("yaxis", panel)]["title"] = {"text": ""}  # the traces' names stand there
+        # the traces' names stand there
+        self._axes[_name_axis("yaxis", panel)]["title"] = {"text": ""}
         self.ticks(
             panel,
             [0.35 - row for row in range(len(courses))],
@@ -281,7 +282,7 @@ class Chart:
         hover: Sequence[str] = (),
     ) -> "Chart":
         """Horizontal bars, the first label on top."""
-        self._axes[_axis("yaxis", panel)] |= {"autorange": "reversed", "type": "category"}
+        self._axes[_name_axis("yaxis", panel)] |= {"autorange": "reversed", "type": "category"}
         trace: dict[str, Any] = (
             {"text": [quoting.html(t) for t in hover], "textposition": "auto"} if hover else {}
         )
@@ -341,14 +342,14 @@ class Chart:
                 "xref": "x",
                 "x0": start,
                 "x1": end,
-                **_height(panel),
+                **_measure_height(panel),
                 "fillcolor": color,
                 "opacity": opacity,
                 "line": {"width": 0},
                 "layer": "below",
             }
         )
-        self._note(text, _height(panel)["yref"], x=start, y=1, bgcolor="#ffffffcc")
+        self._note(text, _measure_height(panel)["yref"], x=start, y=1, bgcolor="#ffffffcc")
         if name and name not in self._in_legend:
             square = {
                 "color": color,
@@ -378,10 +379,10 @@ class Chart:
         """A vertical line, in one panel or through all, with a `text` below the panel
         (the first).
         """
-        self._note(text, _height(panel or 0)["yref"], color, x=x, y=0)
+        self._note(text, _measure_height(panel or 0)["yref"], color, x=x, y=0)
         line = {"color": color, "width": 1, "dash": dash}
         self._shapes.append(
-            {"type": "line", "xref": "x", "x0": x, "x1": x, **_height(panel), "line": line}
+            {"type": "line", "xref": "x", "x0": x, "x1": x, **_measure_height(panel), "line": line}
         )
         return self
 
@@ -389,7 +390,7 @@ class Chart:
         self, y: float, text: str = "", panel: int = 0, color: str = style.FAINT, dash: str = "dash"
     ) -> "Chart":
         """A horizontal line across a panel, with a word at its right end."""
-        axis, line = _axis("y", panel), {"color": color, "width": 1, "dash": dash}
+        axis, line = _name_axis("y", panel), {"color": color, "width": 1, "dash": dash}
         self._shapes.append(
             {
                 "type": "line",
@@ -402,7 +403,7 @@ class Chart:
                 "line": line,
             }
         )
-        log = self._axes[_axis("yaxis", panel)].get("type") == "log"
+        log = self._axes[_name_axis("yaxis", panel)].get("type") == "log"
         at = float(np.log10(y)) if log else y
         self._note(text, axis, color, x=1, y=at, xref="x domain", xanchor="right", yanchor="bottom")
         return self
@@ -422,7 +423,7 @@ class Chart:
 
     def limits(self, panel: int | None, low: float, high: float) -> "Chart":
         """Set what an axis shows at first: of a panel, or of x where `panel` is None."""
-        axis = self._x if panel is None else self._axes[_axis("yaxis", panel)]
+        axis = self._x if panel is None else self._axes[_name_axis("yaxis", panel)]
         axis["range"] = np.log10([low, high]).tolist() if axis.get("type") == "log" else [low, high]
         if axis.get("type") == "log" and high < DECADE * low:
             axis.pop("dtick", None)  # powers of ten alone would leave the axis bare
@@ -438,7 +439,7 @@ class Chart:
         """Where an axis is marked, and with which words instead of numbers: of a panel, or of x
         where it is None.
         """
-        axis = self._x if panel is None else self._axes[_axis("yaxis", panel)]
+        axis = self._x if panel is None else self._axes[_name_axis("yaxis", panel)]
         words = [quoting.html(label) for label in labels] or [f"{v:g}" for v in at]
         axis |= {"tickmode": "array", "tickvals": list(at), "ticktext": words}
         if labels:
@@ -525,7 +526,7 @@ class Chart:
             "legendgroup": name,
             "showlegend": shown,
             "xaxis": "x",
-            "yaxis": _axis("y", at),
+            "yaxis": _name_axis("y", at),
             "hovertemplate": HOVER,
         }
         self._data.append(trace | more)
@@ -543,14 +544,18 @@ def _leave_room_above(names: Sequence[str]) -> dict[str, Any]:
     return {"title": {"text": "\u00a0", "side": "top"}} if several else {}
 
 
-def _axis(letter: str, panel: int) -> str:
+def _name_axis(letter: str, panel: int) -> str:
     """Plotly's name of a panel's axis: x, x2, ..."""
     return letter + (str(panel + 1) if panel else "")
 
 
-def _height(panel: int | None) -> dict[str, Any]:
+def _measure_height(panel: int | None) -> dict[str, Any]:
     """All of a panel, or of the chart."""
-    return {"yref": "paper" if panel is None else f"{_axis('y', panel)} domain", "y0": 0, "y1": 1}
+    return {
+        "yref": "paper" if panel is None else f"{_name_axis('y', panel)} domain",
+        "y0": 0,
+        "y1": 1,
+    }
 
 
 def _lighten_color(color: str) -> str:

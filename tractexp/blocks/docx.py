@@ -46,10 +46,10 @@ def save_document(report: Report, path: Path) -> Path:
     document = docx.Document()
     _set_paper(document.sections[0])
     _set_fonts(document)
-    document.core_properties.title = _visible(report.title)[:LONGEST_TITLE]
-    document.add_heading(_visible(report.title), 0)
+    document.core_properties.title = _keep_visible(report.title)[:LONGEST_TITLE]
+    document.add_heading(_keep_visible(report.title), 0)
     if report.lead:
-        document.add_paragraph(_visible(report.lead))
+        document.add_paragraph(_keep_visible(report.lead))
     with tempfile.TemporaryDirectory() as folder:
         for block in report.blocks:
             _add_block(document, block, Path(folder))
@@ -64,28 +64,28 @@ def _add_block(document: Any, block: blocks.Block, folder: Path) -> None:
     """A block as paragraphs, a table or a picture; nothing for what only a page can show."""
     match block:
         case blocks.Heading(text, level):
-            document.add_heading(_visible(text), level - 1)
+            document.add_heading(_keep_visible(text), level - 1)
         case blocks.Paragraphs(texts):
             for text in texts:
-                document.add_paragraph(_visible(text))
+                document.add_paragraph(_keep_visible(text))
         case blocks.VerdictBlock(texts):
             for text in texts:
-                document.add_paragraph().add_run(_visible(text)).bold = True
+                document.add_paragraph().add_run(_keep_visible(text)).bold = True
         case blocks.Items(texts):
             for text in texts:
-                document.add_paragraph(_visible(text), style="List Bullet")
+                document.add_paragraph(_keep_visible(text), style="List Bullet")
         case blocks.CodeBlock(text):
-            document.add_paragraph(_visible(text), style="No Spacing")
+            document.add_paragraph(_keep_visible(text), style="No Spacing")
         case Table():
             _add_table(document, block)
         case blocks.ChartBlock(chart, caption):
             _add_picture(document, draw_chart(chart, folder / "chart.png"))
-            document.add_paragraph(_visible(caption), style="Caption")
+            document.add_paragraph(_keep_visible(caption), style="Caption")
         case blocks.Equation(latex):
             _add_equation(document, latex, folder / "equation.png")
 
 
-def _visible(text: str) -> str:
+def _keep_visible(text: str) -> str:
     """A text as a document can hold it: what cannot be printed, such as control characters in the
     names of a record, as its escape.
     """
@@ -131,7 +131,7 @@ def _add_equation(document: Any, latex: str, path: Path) -> None:
     """An equation as a picture; as LaTeX where mathtext cannot draw it."""
     drawn = draw_equation(latex, "png")
     if not drawn:
-        document.add_paragraph(_visible(latex))
+        document.add_paragraph(_keep_visible(latex))
         return
     files.write(path, drawn)
     _add_picture(document, path, EQUATION_SCALE)
@@ -145,7 +145,7 @@ def _add_table(document: Any, table: Table) -> None:
     from docx.shared import Cm
 
     if table.title:
-        document.add_paragraph(_visible(table.title), style="Caption")
+        document.add_paragraph(_keep_visible(table.title), style="Caption")
     head = [list(table.columns)] if any(table.columns) else []
     rows = [*head, *table.cells]
     grid = document.add_table(len(rows), len(table.columns), style=TABLE_STYLE)
@@ -165,7 +165,7 @@ def _add_table(document: Any, table: Table) -> None:
     else:
         _take_off_head(grid)
     if table.caption:
-        document.add_paragraph(_visible(table.caption), style="Caption")
+        document.add_paragraph(_keep_visible(table.caption), style="Caption")
 
 
 def _fill_cell(cell: Any, text: str, to_the_right: bool) -> Any:
@@ -174,7 +174,7 @@ def _fill_cell(cell: Any, text: str, to_the_right: bool) -> Any:
     from docx.shared import Pt
 
     (paragraph,) = cell.paragraphs
-    paragraph.add_run(_visible(text)).font.size = Pt(TABLE_FONT_SIZE)
+    paragraph.add_run(_keep_visible(text)).font.size = Pt(TABLE_FONT_SIZE)
     paragraph.paragraph_format.space_after = Pt(0)
     if to_the_right:
         paragraph.alignment = WD_ALIGN_PARAGRAPH.RIGHT

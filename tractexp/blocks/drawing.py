@@ -29,7 +29,7 @@ def draw_chart(chart: Chart, path: Path) -> Path:
 
     plain = chart.plain()
     layout, units = plain["layout"], plain.get("units", {})
-    axes = sorted((key for key in layout if key.startswith("yaxis")), key=_number)
+    axes = sorted((key for key in layout if key.startswith("yaxis")), key=_number_panel)
     shares = [np.ptp(layout[key]["domain"]) for key in axes]
     size = (WIDTH, max(0.9 + PANEL_HEIGHT * len(axes), layout["height"] / 150))
     with rc_context(style.SETTINGS):
@@ -44,14 +44,14 @@ def draw_chart(chart: Chart, path: Path) -> Path:
         factors = units.get("factors", [1.0] * len(axes))
         for trace in plain["data"]:
             if trace.get("visible") != "legendonly" and "phasor" not in trace:
-                k = _number(trace["yaxis"].replace("y", "yaxis"))
+                k = _number_panel(trace["yaxis"].replace("y", "yaxis"))
                 _draw_trace(panels[k], trace, factors[k])
         panels[-1].set_xlabel(unescape_html(layout["xaxis"]["title"]["text"]))
         _add_legend(figure, panels)
         return style.save(figure, path)
 
 
-def _number(axis: str) -> int:
+def _number_panel(axis: str) -> int:
     """The panel of an axis, from the top."""
     return int(axis.removeprefix("yaxis") or 1) - 1
 
@@ -75,7 +75,7 @@ def _draw_trace(panel: Any, trace: dict[str, Any], factor: float) -> None:
     if "samples" in trace:
         x, y = _read_samples(trace["samples"])
     else:
-        x, y = _values(trace["x"]), _values(trace["y"])
+        x, y = _unpack_values(trace["x"]), _unpack_values(trace["y"])
     label = unescape_html(trace["name"]) if trace["showlegend"] else "_"
     line, marker = trace.get("line", {}), trace.get("marker", {})
     if trace["type"] == "bar":
@@ -104,7 +104,7 @@ def _draw_band(panel: Any, trace: dict[str, Any], x: Any, y: np.ndarray, label: 
     )
 
 
-def _values(packed: Any) -> Any:
+def _unpack_values(packed: Any) -> Any:
     """The numbers of an array as charts pack them; a list as it is."""
     if isinstance(packed, dict):
         return np.frombuffer(base64.b64decode(packed["bdata"]), f"<{packed['dtype']}").astype(float)

@@ -37,7 +37,7 @@ def page(report: Report) -> str:
     style = files.read_packaged_text("blocks/page.css")
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
     draws = f"<script>{script()}</script>" if any(map(_holds_chart, report.blocks)) else ""
-    elements = "\n".join(_element(block, figures) for block in report.blocks)
+    elements = "\n".join(_write_element(block, figures) for block in report.blocks)
     body = "\n".join([top, _share_outlines(elements), draws])
     return (
         "<!DOCTYPE html>\n<html"
@@ -76,22 +76,22 @@ def fragment(report: Report) -> str:
     """
     parts = []
     if report.title:
-        parts.append(_untypeset(f"<p><b>{quoting.html(report.title)}</b></p>"))
+        parts.append(_keep_dollars(f"<p><b>{quoting.html(report.title)}</b></p>"))
     if report.lead:
-        parts.append(_untypeset(f"<p>{quoting.html(report.lead)}</p>"))
+        parts.append(_keep_dollars(f"<p>{quoting.html(report.lead)}</p>"))
     for block in report.blocks:
         if isinstance(block, Table):
-            parts.append(_untypeset(_table(block.brief)))
+            parts.append(_keep_dollars(_write_table(block.brief)))
         elif isinstance(block, blocks.Equation):
             parts.append(f"<p>$${quoting.html(block.latex)}$$</p>")
         elif not isinstance(
             block, blocks.ChartBlock | blocks.Charts | blocks.Figure | blocks.Markup | blocks.Fold
         ):
-            parts.append(_untypeset(_element(block, itertools.count(1))))
+            parts.append(_keep_dollars(_write_element(block, itertools.count(1))))
     return "\n".join(parts)
 
 
-def _untypeset(element: str) -> str:
+def _keep_dollars(element: str) -> str:
     """An element whose dollar signs a notebook does not take for mathematics."""
     return (
         f'<div class="mathjax_ignore tex2jax_ignore">{element}</div>' if "$" in element else element
@@ -105,7 +105,7 @@ def _holds_chart(block: blocks.Block) -> bool:
     )
 
 
-def _element(block: blocks.Block, figures: "itertools.count[int]") -> str:
+def _write_element(block: blocks.Block, figures: "itertools.count[int]") -> str:
     """A block as HTML; `figures` counts the drawings of a page, whose ids differ by it."""
     match block:
         case blocks.Heading(text, level):
@@ -115,7 +115,7 @@ def _element(block: blocks.Block, figures: "itertools.count[int]") -> str:
         case blocks.VerdictBlock(texts, kind):
             return (
                 '<div class="verdict'
-                f' {kind}">\n{_element(blocks.Paragraphs(texts), figures)}\n</div>'
+                f' {kind}">\n{_write_element(blocks.Paragraphs(texts), figures)}\n</div>'
             )
         case blocks.Items(texts):
             return "\n".join(
@@ -126,28 +126,32 @@ def _element(block: blocks.Block, figures: "itertools.count[int]") -> str:
         case blocks.Equation(latex):
             drawing = _typeset(latex)
             inside = (
-                _inline(drawing, f"f{next(figures)}-", latex)
+                _inline_drawing(drawing, f"f{next(figures)}-", latex)
                 if drawing
                 else f"<code>{quoting.html(latex)}</code>"
             )
             return f'<div class="equation">{inside}</div>'
         case Table():
-            return _table(block)
+            return _write_table(block)
         case blocks.ChartBlock(chart, caption):
             return f"<figure>{chart.element(caption)}{_render_caption(caption)}</figure>"
         case blocks.Charts(charts):
             return "\n".join(
-                ['<div class="charts">', *(_element(chart, figures) for chart in charts), "</div>"]
+                [
+                    '<div class="charts">',
+                    *(_write_element(chart, figures) for chart in charts),
+                    "</div>",
+                ]
             )
         case blocks.Figure(svg, caption):
             return (
-                f"<figure>{_inline(svg, f'f{next(figures)}-', caption)}"
+                f"<figure>{_inline_drawing(svg, f'f{next(figures)}-', caption)}"
                 f"{_render_caption(caption)}</figure>"
             )
         case blocks.Markup(markup):
             return markup
         case blocks.Fold(summary, parts):
-            inside = (_element(inner, figures) for inner in parts)
+            inside = (_write_element(inner, figures) for inner in parts)
             return "\n".join(
                 [f"<details><summary>{quoting.html(summary)}</summary>", *inside, "</details>"]
             )
@@ -158,7 +162,7 @@ def _render_caption(caption: str) -> str:
     return f"<figcaption>{quoting.html(caption)}</figcaption>" if caption else ""
 
 
-def _table(table: Table) -> str:
+def _write_table(table: Table) -> str:
     """A table; the first column is to the left, the others are figures but for those that hold
     words.
     """
@@ -187,7 +191,7 @@ def _describe_words(cells: Iterable[str]) -> str:
     return "words" if any(len(cell) > LONGEST_UNBROKEN_WORD for cell in cells) else "short"
 
 
-def _inline(drawing: str, prefix: str, label: str) -> str:
+def _inline_drawing(drawing: str, prefix: str, label: str) -> str:
     """An SVG document as an element of a page: without header and metadata, its ids unlike any
     other figure's.
     """

@@ -13,11 +13,11 @@ def markdown(report: Report) -> str:
     if report.lead:
         parts.append(quoting.markdown(report.lead))
     for block in report.blocks:
-        parts.extend(_parts(block))
+        parts.extend(_write_parts(block))
     return "\n\n".join(parts) + "\n"
 
 
-def _parts(block: blocks.Block) -> Iterator[str]:
+def _write_parts(block: blocks.Block) -> Iterator[str]:
     """A block as paragraphs of Markdown."""
     match block:
         case blocks.Heading(text, level):
@@ -33,7 +33,7 @@ def _parts(block: blocks.Block) -> Iterator[str]:
         case blocks.Equation(latex):
             yield f"$$ {latex} $$"
         case Table():
-            yield _table(block)
+            yield _write_table(block)
             if block.caption:
                 yield quoting.markdown(block.caption)
         case blocks.ChartBlock(_, caption) | blocks.Figure(_, caption):
@@ -42,13 +42,13 @@ def _parts(block: blocks.Block) -> Iterator[str]:
             return
         case blocks.Charts(charts):
             for chart in charts:
-                yield from _parts(chart)
+                yield from _write_parts(chart)
         case blocks.Fold(_, parts):
             for inner in parts:
-                yield from _parts(inner)
+                yield from _write_parts(inner)
 
 
-def _table(table: Table) -> str:
+def _write_table(table: Table) -> str:
     """The first column and those of words are to the left."""
     marks = ["---" if i == 0 or i in table.words else "---:" for i in range(len(table.columns))]
     head, *rows = [

@@ -22,9 +22,9 @@ def show(report: Report, console: Any, width: int | None = None) -> None:
             _print_text(text, console, width)
     for block in report.blocks:
         if isinstance(block, Table):
-            _table(block.brief, console)
+            _write_table(block.brief, console)
         else:
-            for line in _lines(block):
+            for line in _write_lines(block):
                 _print_text(line, console, width)
 
 
@@ -58,7 +58,7 @@ def fold(text: str, width: int | None) -> list[str]:
     return lines
 
 
-def _lines(block: Any) -> Sequence[str]:
+def _write_lines(block: Any) -> Sequence[str]:
     """The lines of a block; none of what only a page can show."""
     if isinstance(block, Paragraphs | VerdictBlock):
         return block.texts
@@ -90,7 +90,7 @@ def plain(report: Report) -> str:
     return "\n".join(line.rstrip() for line in text.getvalue().rstrip().splitlines())
 
 
-def _table(table: Table, console: Any) -> None:
+def _write_table(table: Table, console: Any) -> None:
     """The first column and those of words are to the left. Columns of words are folded where the
     console is narrow; where that is not enough, each row is a sentence.
     """
@@ -112,13 +112,15 @@ def _table(table: Table, console: Any) -> None:
     )
     for i, column in enumerate(table.columns):
         justify = "left" if i == 0 or i in table.words else "right"
-        grid.add_column(write_on_one_line(column), justify=justify, no_wrap=not _folds(table, i))
+        grid.add_column(
+            write_on_one_line(column), justify=justify, no_wrap=not _is_folded(table, i)
+        )
     for row in table.cells:
         grid.add_row(*map(write_on_one_line, row))
     console.print(grid, markup=False)
 
 
-def _folds(table: Table, column: int) -> bool:
+def _is_folded(table: Table, column: int) -> bool:
     """Whether the cells of a column are folded where there is no room for them."""
     return column in table.words or column == len(table.columns) - 1
 
@@ -131,7 +133,7 @@ def _measure_least_width(table: Table) -> int:
     for i, column in enumerate(table.columns):
         cells = [column, *(row[i] for row in table.cells)]
         longest = max(map(cell_len, cells))
-        if _folds(table, i):
+        if _is_folded(table, i):
             words = [cell_len(word) for cell in cells for word in cell.split()]
             longest = min(longest, max([NARROWEST_WORDS, *words]))
         total += longest

@@ -67,30 +67,32 @@ def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> l
         Of more than 5 % of the apparent power.
     """
     S, n = fill_gaps(P) + 1j * fill_gaps(Q), max(1, round(cycle))
-    (before, after), (low, high) = _levels(S, n), _levels(U.astype(complex), n)
+    (before, after), (low, high) = _average_sides(S, n), _average_sides(U.astype(complex), n)
     if not len(before):
         return []
-    size = np.maximum(np.maximum(np.abs(before), np.abs(after)), SMALL_LOAD_SHARE * _greatest(S))
+    size = np.maximum(
+        np.maximum(np.abs(before), np.abs(after)), SMALL_LOAD_SHARE * _find_greatest(S)
+    )
     answer = (
         ANSWERED
         * np.abs(high - low)
-        / np.maximum(np.abs(low), DEAD_VOLTAGE_SHARE * _greatest(high))
+        / np.maximum(np.abs(low), DEAD_VOLTAGE_SHARE * _find_greatest(high))
     )
-    return list(_steps(before, after, size, answer, (CHANGED, LARGEST_USUAL_CHANGE), n))
+    return list(_find_steps(before, after, size, answer, (CHANGED, LARGEST_USUAL_CHANGE), n))
 
 
 def voltage_changes(U: np.ndarray, cycle: float) -> list[Change]:
     """The steps of a voltage (N,) of more than 1 %, where `cycle` samples are a cycle."""
     n = max(1, round(cycle))
-    low, high = _levels(U.astype(complex), n)
+    low, high = _average_sides(U.astype(complex), n)
     return list(
-        _steps(
+        _find_steps(
             low, high, np.maximum(np.abs(low), 1e-300), np.zeros(len(low)), (CHANGED_U, USUAL_U), n
         )
     )
 
 
-def _levels(x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+def _average_sides(x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     """The means of the n samples before each, and of the n that begin n samples later.
 
     Both are empty for too few samples.
@@ -102,7 +104,7 @@ def _levels(x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
     return means[: -2 * n], means[2 * n :]
 
 
-def _steps(
+def _find_steps(
     before: np.ndarray,
     after: np.ndarray,
     size: np.ndarray,
@@ -173,7 +175,7 @@ def fill_gaps(x: np.ndarray) -> np.ndarray:
     )
 
 
-def _greatest(S: np.ndarray) -> float:
+def _find_greatest(S: np.ndarray) -> float:
     """The apparent power that 95 % of the samples stay below, never 0."""
     return max(float(np.percentile(np.abs(S), 95)), 1e-300)
 

@@ -73,7 +73,7 @@ def explain_negative_power(
             "P changes its sign at normal voltage, as of a train that brakes and motors: power"
             " flows both ways"
         )
-    return _tell_cause(polarity, *_exponent(U / level, P / P0), P0, Q0)
+    return _tell_cause(polarity, *_find_exponent(U / level, P / P0), P0, Q0)
 
 
 def _tell_cause(polarity: int, a: float, fell: bool, P0: float, Q0: float) -> str:
@@ -117,7 +117,7 @@ def _load_like(a: float, P0: float, Q0: float) -> bool:
     )
 
 
-def _exponent(u: np.ndarray, p: np.ndarray) -> tuple[float, bool]:
+def _find_exponent(u: np.ndarray, p: np.ndarray) -> tuple[float, bool]:
     """(exponent of p over u while u is low, whether u is low long enough for it); p is 1 where u is
     1.
     """

@@ -171,7 +171,7 @@ def detect(record: Record) -> Event:
         raise UserError(f"{record.where}: {reason}")
     unfinished = end == record.samples
     end = min(end, record.samples - 1)
-    usual = _steady(record, start, swells)
+    usual = _find_steady(record, start, swells)
     before, notes = steady_part(record, usual, _count_least_samples(record))
     if before.start > usual.start:  # what was before is another state, which is not fitted
         first = before.start
@@ -229,7 +229,7 @@ def steady(record: Record) -> slice:
     start = dips[0][0] if dips else 0
     if start < FEWEST_BEFORE:
         return slice(0, record.samples)
-    return steady_part(record, _steady(record, start, swells), _count_least_samples(record))[0]
+    return steady_part(record, _find_steady(record, start, swells), _count_least_samples(record))[0]
 
 
 def _count_least_samples(record: Record) -> int:
@@ -237,7 +237,7 @@ def _count_least_samples(record: Record) -> int:
     return max(FEWEST_BEFORE, round(0.1 * record.rate))
 
 
-def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
+def _find_steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
     """The last second before the dip, or before a swell that leaves too little room behind it."""
     most = max(FEWEST_BEFORE, round(STEADY * record.rate))
     least = _count_least_samples(record)
@@ -258,7 +258,7 @@ def describe(event: Event) -> str:
     sentence = (
         f"{record.name}: dip of {100 * event.depth:.0f} % lasting {1000 * event.duration:.0f} ms at"
         f" t = {event.t_start:.3f} s, {event.start} samples before it, {event.rate:.0f} Hz, noise"
-        f" {_noise(event)}"
+        f" {_measure_noise(event)}"
     )
     odd = []
     if event.dips > 1:
@@ -277,7 +277,7 @@ def describe(event: Event) -> str:
     return sentence + (f". Note: {'; '.join(odd)}" if odd else "")
 
 
-def _noise(event: Event) -> str:
+def _measure_noise(event: Event) -> str:
     """The noise of P and Q as shares of P, per unit where no P is drawn."""
     if event.noise_share is None:
         return f"{event.noise_P:.2g} pu in P and {event.noise_Q:.2g} pu in Q"

@@ -31,7 +31,7 @@ def starting_level(
     what follows counts if it is higher; and so it does where a record begins inside a dip, lower by
     more than a step, and most of it is at the later level.
     """
-    at_trigger = _level_before_trigger(t, levels, limits, trigger)
+    at_trigger = _measure_level_before_trigger(t, levels, limits, trigger)
     if at_trigger is not None:
         return at_trigger
     first = levels[:, :most]
@@ -53,7 +53,7 @@ def starting_level(
     return after if begun and level[0] < (1 - NO_STEP) * after[0] else level
 
 
-def _level_before_trigger(
+def _measure_level_before_trigger(
     t: np.ndarray, levels: np.ndarray, limits: np.ndarray, trigger: float | None
 ) -> np.ndarray | None:
     """The levels (K,) of voltages (K, N) right before the recorder's trigger [s]; None without one,
@@ -120,8 +120,8 @@ def falls(
             k += len(part)
             continue
         crossing = k + int(np.argmax(below))
-        start = _onset(U, dips[-1][1] if dips else 0, crossing, reference, margin)
-        end = _recovery(U, crossing, reference, margin)
+        start = _find_onset(U, dips[-1][1] if dips else 0, crossing, reference, margin)
+        end = _find_recovery(U, crossing, reference, margin)
         if crossing - start > block:
             sudden = find_sudden_change(U[start:end], within, margin * reference)
             if sudden is not None and start + sudden > slid:
@@ -256,7 +256,7 @@ def _find_swell(
     return (first, end) if landed or t[end] - t[first] <= STEADY else None
 
 
-def _onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: float) -> int:
+def _find_onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: float) -> int:
     """The sample after the last one, not before `first`, that was still within a tenth of the
     margin.
     """
@@ -264,7 +264,7 @@ def _onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: f
     return first + int(high[-1]) + 1 if len(high) else crossing
 
 
-def _recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> int:
+def _find_recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> int:
     """The first sample that has recovered from the lowest voltage so far, or len(U)."""
     after = U[crossing:]
     missing = reference - np.minimum.accumulate(after)

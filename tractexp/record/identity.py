@@ -35,9 +35,11 @@ class Identity:
     def from_record(cls, record: Record) -> "Identity":
         """The identity of a record, with the sum of its bytes."""
         in_mva = record.file_base.in_mva
-        given = None if record.original_base is None else _sizes(record.original_base, in_mva)
+        given = (
+            None if record.original_base is None else _describe_sizes(record.original_base, in_mva)
+        )
         source = {"file": record.source, **record.identity}
-        return cls(source, _sizes(record.base, in_mva), given, hash_record(record))
+        return cls(source, _describe_sizes(record.base, in_mva), given, hash_record(record))
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> "Identity":
@@ -149,7 +151,7 @@ def title_of(records: Iterable[Record]) -> str:
     return title(map(Identity.from_record, records), (record.name for record in records))
 
 
-def _sizes(base: Base, in_mva: bool) -> dict[str, Any]:
+def _describe_sizes(base: Base, in_mva: bool) -> dict[str, Any]:
     """The base for `result.json`: kV and MVA where they are known, else None."""
     voltage = None if base.voltage == 1.0 else base.voltage
     power = base.power if in_mva else None

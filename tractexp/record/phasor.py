@@ -242,7 +242,7 @@ def track(voltages: np.ndarray, rate: float, nominal: float, least: float = 0.0)
     for _ in range(PASSES):
         V1 = symmetrical(fundamental(voltages, rate, f, at))[0]
         angle = np.unwrap(np.angle(V1)) + frame(f, rate)[at]
-        speed = _speed(angle, np.abs(V1) < least, half) * rate / every / (2 * np.pi)
+        speed = _measure_speed(angle, np.abs(V1) < least, half) * rate / every / (2 * np.pi)
         f = np.interp(
             np.arange(n),
             at,
@@ -251,7 +251,7 @@ def track(voltages: np.ndarray, rate: float, nominal: float, least: float = 0.0)
     return f
 
 
-def _speed(angle: np.ndarray, dead: np.ndarray, half: int) -> np.ndarray:
+def _measure_speed(angle: np.ndarray, dead: np.ndarray, half: int) -> np.ndarray:
     """The mean increase (M,) of an angle a step, over `half` steps either way or up to where it is
     dead; nan where it is.
     """
@@ -437,7 +437,7 @@ def measure(
     tracked = {} if tracked is None else tracked
     least = (
         DEAD_PHASOR_SHARE
-        * max(float(np.abs(waves[:K, a:b]).max()) for a, b in _blocks(n, block))
+        * max(float(np.abs(waves[:K, a:b]).max()) for a, b in _cut_in_blocks(n, block))
         / np.sqrt(2)
     )
     at, angle, pieces, distortions = np.arange(over.reach, n - over.reach, every), 0.0, [], []
@@ -456,7 +456,9 @@ def measure(
         pieces.append((X[0], f[here]))
         if harmonics:
             products = over.means(np.concatenate([x**2, x[:K] * x[K:]]), rate, f, here)
-            distortions.append(_distortion(X, products[: 2 * K], products[2 * K :], harmonics))
+            distortions.append(
+                _measure_distortion(X, products[: 2 * K], products[2 * K :], harmonics)
+            )
     X, f = (np.concatenate([part[k] for part in pieces], axis=-1) for k in (0, 1))
     more = {
         name: np.concatenate([one[name] for one in distortions])
@@ -466,7 +468,7 @@ def measure(
     return replace(phasors, f=_measure_frequency(phasors, rate / every, least))
 
 
-def _distortion(
+def _measure_distortion(
     X: np.ndarray, squares: np.ndarray, power: np.ndarray, harmonics: Sequence[int]
 ) -> dict[str, np.ndarray]:
     """The powers and distortions of phasors X (1 + H, 2 K, M), for waves with these mean squares
@@ -501,7 +503,7 @@ def _measure_frequency(phasors: Phasors, rate: float, least: float) -> np.ndarra
     return np.interp(k, k[alive], (phasors.f + measure_turning(np.angle(phasors.V1), rate))[alive])
 
 
-def _blocks(n: int, block: int) -> Iterator[tuple[int, int]]:
+def _cut_in_blocks(n: int, block: int) -> Iterator[tuple[int, int]]:
     """(first, end) of each block of n samples."""
     return ((a, min(a + block, n)) for a in range(0, n, block))
 
@@ -517,5 +519,5 @@ def _cut_overlapping_blocks(
     """
     every, own, half = _choose_tracking_grid(rate, nominal)
     margin = (PASSES * (own + (half + 2) * every) + max(own, reach)) // every * every + every
-    for a, b in _blocks(n, max(block // every, 1) * every):
+    for a, b in _cut_in_blocks(n, max(block // every, 1) * every):
         yield (max(a - margin, 0), min(b + margin, n)), (a, b)

@@ -69,7 +69,7 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
 
 def is_at_rest(record: Record, part: slice) -> bool:
     """Whether a load moves no more in samples before an event than noise does."""
-    return _course(record, part) is None
+    return _follow_course(record, part) is None
 
 
 def _may_step_be_dip(change: Change, dip: int, cycle: float) -> bool:
@@ -83,14 +83,14 @@ def _find_part_at_rest(
     record: Record, part: slice, least: int, notes: list[str]
 ) -> tuple[slice, list[str]]:
     """The part in which a load that came to rest rests; what is said of one that does not."""
-    whole, course = part, _course(record, part)
+    whole, course = part, _follow_course(record, part)
     while course is not None and not course.swings:
         rest = next(
             (late for late in _list_last_parts(part, least) if _rests(record, late, course)), None
         )
         if rest is None:
             break
-        part, course = rest, _course(record, rest)
+        part, course = rest, _follow_course(record, rest)
     lasts = (part.stop - part.start) * record.step
     if part != whole:
         notes = [
@@ -125,11 +125,11 @@ def _rests(record: Record, late: slice, course: "Course") -> bool:
     """Whether a load moves so much less in a late part of its course that it has come to rest
     there.
     """
-    rest = _course(record, late, at_all=True)
+    rest = _follow_course(record, late, at_all=True)
     return rest is not None and rest.span / rest.samples < REST * course.span / course.samples
 
 
-def _course(record: Record, part: slice, at_all: bool = False) -> "Course | None":
+def _follow_course(record: Record, part: slice, at_all: bool = False) -> "Course | None":
     """How the load moves in samples before a dip, without those that may show the dip early."""
     cycle = smear(record)
     part = slice(part.start, max(part.start, part.stop - round(EARLY[0] * cycle)))

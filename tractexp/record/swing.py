@@ -91,7 +91,7 @@ def _find_line(x: np.ndarray, rate: float, fastest: float) -> tuple[float, float
     if np.count_nonzero(inside) < 2 * WIDTH_OF_LINE * FINER:
         return None
     window = np.hanning(n)
-    power = np.abs(np.fft.rfft(_level(x) * window, FINER * n)) ** 2
+    power = np.abs(np.fft.rfft(_subtract_line(x) * window, FINER * n)) ** 2
     best = int(np.argmax(np.where(inside, power, 0.0)))
     low, high = f[best] - WIDTH_OF_LINE * rate / n, f[best] + WIDTH_OF_LINE * rate / n
     sides = ((f > f[best] / NEAR) & (f < low)), ((f > high) & (f < NEAR * f[best]))
@@ -109,7 +109,7 @@ def _find_line(x: np.ndarray, rate: float, fastest: float) -> tuple[float, float
     return float(f[best] + off * f[1]), float(2 * np.sqrt(power[best]) / window.sum())
 
 
-def _level(x: np.ndarray) -> np.ndarray:
+def _subtract_line(x: np.ndarray) -> np.ndarray:
     """x (N,) about its straight line."""
     at = np.arange(len(x)) - (len(x) - 1) / 2
     return x - x.mean() - at * (at @ x) / max(float(at @ at), 1e-300)
@@ -119,7 +119,7 @@ def _measure_amplitude(x: np.ndarray, rate: float, frequency: float) -> float:
     """Amplitude of x (N,) at a frequency [Hz]."""
     window = np.hanning(len(x))
     turn = np.exp(-2j * np.pi * frequency * np.arange(len(x)) / rate)
-    return 2 * float(np.abs((_level(x) * window) @ turn) / window.sum())
+    return 2 * float(np.abs((_subtract_line(x) * window) @ turn) / window.sum())
 
 
 def _measure_passed(record: Record, frequency: float) -> float:

@@ -187,7 +187,7 @@ def convert_to_waves(event: Event) -> WaveEvent:
     if isinstance(event, WaveEvent):
         return event
     record, nominal = event.record, event.record.base.frequency
-    waves = _waves(event)
+    waves = _cut_waves(event)
     t = waves.start + np.arange(waves.samples.shape[1]) / waves.rate
     cycle, K = 1 / nominal, waves.phases
     before = t < event.t_start - cycle  # phasors see an event half a window early
@@ -199,15 +199,15 @@ def convert_to_waves(event: Event) -> WaveEvent:
             f" ({1000 * FEWEST_CYCLES * cycle:.0f} ms); take domain=phasors, or a record that"
             " starts earlier"
         )
-    x = _per_unit(waves, record)
-    frequency = _frequency(t[before], x[:K, before], waves.rate, event.f0)
+    x = _scale_to_per_unit(waves, record)
+    frequency = _measure_frequency(t[before], x[:K, before], waves.rate, event.f0)
     periodic = Periodic.from_samples(t[before], x[:, before], frequency, waves.rate)
     x = x - periodic.offsets[:, None]
     lead = round(LEAD * waves.rate / frequency)
     time = np.concatenate([t[0] - np.arange(lead, 0, -1) / waves.rate, t])
     x = np.concatenate([periodic.evaluate_at(time[:lead]), x], axis=1)
 
-    V, I = (_positive(part) for part in np.split(periodic.fundamentals, 2))
+    V, I = (_extract_positive(part) for part in np.split(periodic.fundamentals, 2))
     turn = np.exp(1j * (2 * np.pi * frequency * (time - periodic.origin) + np.angle(V)))
     (v, v_zero), (i, i_zero) = (stationary(part, waves.rate, frequency) for part in np.split(x, 2))
     noise, noise_U = (
@@ -219,7 +219,7 @@ def convert_to_waves(event: Event) -> WaveEvent:
     v = course + noise_filter(v - course, 2 * noise_U**2)
     v_zero = course_zero + noise_filter(v_zero - course_zero, noise_U**2 / 2)
     power = V * np.conj(I)
-    start = lead + _onset(t, x[:K, lead:], periodic, K, before)
+    start = lead + _find_onset(t, x[:K, lead:], periodic, K, before)
     half = half_cycle(v / turn, i / turn, turn, waves.rate, frequency)
     currents = np.stack([i.real, i.imag, i_zero])
     currents[:, :lead] = np.nan
@@ -305,7 +305,7 @@ def has_fine_samples(record: Record) -> bool:
     return waves is not None and waves.rate >= COARSEST * record.base.frequency
 
 
-def _waves(event: Event) -> Waves:
+def _cut_waves(event: Event) -> Waves:
     """The waveforms of an event, from as early and to as late as its record may use them."""
     record, waves = event.record, event.record.waves
     if waves is None:
@@ -331,7 +331,7 @@ def _scale(record: Record, phases: int) -> np.ndarray:
     return np.repeat([V, 2 * record.base.power / (phases * V)], phases)
 
 
-def _per_unit(waves: Waves, record: Record) -> np.ndarray:
+def _scale_to_per_unit(waves: Waves, record: Record) -> np.ndarray:
     """(2 K, M) per unit of the peaks, channels that are sampled late moved back."""
     x = waves.samples / _scale(record, waves.phases)[:, None]
     if waves.late is None:
@@ -345,12 +345,12 @@ def _per_unit(waves: Waves, record: Record) -> np.ndarray:
     )
 
 
-def _positive(phasors: np.ndarray) -> complex:
+def _extract_positive(phasors: np.ndarray) -> complex:
     """Positive sequence of three phasors, or the only one."""
     return complex(phasors @ TURN ** np.arange(len(phasors)) / len(phasors))
 
 
-def _frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float:
+def _measure_frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float:
     """Frequency [Hz] of voltages (K, n), from how their fundamental turns from the first half to
     the second.
     """
@@ -363,7 +363,9 @@ def _frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float
             for part in (slice(0, n), slice(-n, None))
         )
         first, last = halves
-        angle = np.angle(_positive(last.fundamentals) / _positive(first.fundamentals))
+        angle = np.angle(
+            _extract_positive(last.fundamentals) / _extract_positive(first.fundamentals)
+        )
         between = last.origin - first.origin
         frequency += float(np.angle(np.exp(1j * (angle - 2 * np.pi * frequency * between)))) / (
             2 * np.pi * between
@@ -371,7 +373,9 @@ def _frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float
     return frequency
 
 
-def _onset(t: np.ndarray, v: np.ndarray, periodic: Periodic, K: int, before: np.ndarray) -> int:
+def _find_onset(
+    t: np.ndarray, v: np.ndarray, periodic: Periodic, K: int, before: np.ndarray
+) -> int:
     """The first sample at which a voltage (K, M) departs from its periodic course."""
     off = np.abs(v - periodic.evaluate_at(t)[:K]).max(axis=0)
     limit = max(LARGEST_PERIODIC_DEPARTURE, NOISE_DEVIATIONS * float(periodic.rest[:K].max()))
@@ -405,10 +409,10 @@ def _choose_compared_components(after: np.ndarray, before: np.ndarray, phases: i
     """
     if phases == 1:
         return np.array([True, False, False])
-    size, vector, calm = _rms(after[2]), _rms(after[:2]), _rms(before[2])
+    size, vector, calm = _compute_rms(after[2]), _compute_rms(after[:2]), _compute_rms(before[2])
     return np.array([True, True, size > max(SILENT * vector, LOUDER * calm)])
 
 
-def _rms(x: np.ndarray) -> float:
+def _compute_rms(x: np.ndarray) -> float:
     """The root mean square of all values."""
     return float(np.sqrt(np.mean(x**2)))

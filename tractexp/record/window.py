@@ -233,7 +233,7 @@ def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Even
     )
     free = (np.abs(at - event.start) < near) | (np.abs(at - event.end) < near)
     error = max(ERROR, event.noise_U)
-    factor = _factor(weights.tobytes(), len(U), free.tobytes(), error)
+    factor = _factorize(weights.tobytes(), len(U), free.tobytes(), error)
 
     def undo(shown: np.ndarray) -> np.ndarray:
         u = cho_solve_banded((factor, False), np.convolve(shown, weights) / error**2)
@@ -282,7 +282,7 @@ def _measure_turn(event: "Event", turned: np.ndarray, near: int) -> float:
 
 
 @functools.lru_cache(maxsize=32)
-def _factor(weights: bytes, n: int, free: bytes, error: float) -> np.ndarray:
+def _factorize(weights: bytes, n: int, free: bytes, error: float) -> np.ndarray:
     """The banded Cholesky factor of the normal equations: the same for every voltage
     of one event.
     """

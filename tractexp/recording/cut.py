@@ -35,8 +35,8 @@ def cut_recording(recording: Recording, begin: float, end: float) -> Recording:
     triggers = [trigger for trigger in moved if 0 <= trigger <= end - origin]
     return replace(
         recording,
-        channels=[_part(channel, parts) for channel in recording.channels],
-        status=[_part(status, parts) for status in recording.status],
+        channels=[_cut_channel(channel, parts) for channel in recording.channels],
+        status=[_cut_channel(status, parts) for status in recording.status],
         segments=[replace(segment, start=segment.start - origin) for segment in segments],
         start=recording.start and recording.start + timedelta(seconds=origin),
         trigger=triggers[0] if triggers else None,
@@ -50,7 +50,7 @@ def cut_recording(recording: Recording, begin: float, end: float) -> Recording:
     )
 
 
-def _part(channel: Any, parts: list[slice]) -> Any:
+def _cut_channel(channel: Any, parts: list[slice]) -> Any:
     """A channel's samples within some stretches, one after the other."""
     raw = np.asarray(channel.raw)
     return replace(

@@ -29,14 +29,14 @@ def settings_of(path: str, *join: str) -> dict[str, Any]:
     several records.
     """
     if files.is_archive(path):
-        return _settings_of_archive(Path(path))
+        return _find_settings_of_archive(Path(path))
     if files.is_called_archive(path):
         files.check_there(Path(path))
     cls = reader_of(path, *join)
     return {"name": cls.name, **cls.build_settings(path)} | ({"join": list(join)} if join else {})
 
 
-def _settings_of_archive(archive: Path) -> dict[str, Any]:
+def _find_settings_of_archive(archive: Path) -> dict[str, Any]:
     """The settings that read what a packed archive holds. Raises `UserError` where it holds no
     record.
     """
@@ -105,7 +105,7 @@ def propose_joining(path: str, view: View | None = None) -> str:
     to it.
     """
     alone = view is not None and shows_load(view)
-    for group in _named_alike(path):
+    for group in _find_named_alike(path):
         if alone and not name_one_event(group):
             continue
         node = join_event(group)
@@ -117,7 +117,7 @@ def propose_joining(path: str, view: View | None = None) -> str:
     return ""
 
 
-def _named_alike(path: str) -> Iterator[list[str]]:
+def _find_named_alike(path: str) -> Iterator[list[str]]:
     """The file, first, with those of its folder whose names differ from its own in one word alone;
     for each word.
     """

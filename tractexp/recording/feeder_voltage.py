@@ -56,7 +56,8 @@ def add_question(recording: Recording, phasors: Snapshots, feeders: list[Feeder]
     if len(feeders) == 1:
         return feeders
     which = " or ".join(
-        f"{list_names(recording, f.voltages)} ({_size_of(recording, phasors, f)})" for f in feeders
+        f"{list_names(recording, f.voltages)} ({_describe_size(recording, phasors, f)})"
+        for f in feeders
     )
     question = f"which voltages these currents belong to cannot be told: {which}"
     return [
@@ -70,7 +71,7 @@ def add_question(recording: Recording, phasors: Snapshots, feeders: list[Feeder]
     ]
 
 
-def _size_of(recording: Recording, phasors: Snapshots, feeder: Feeder) -> str:
+def _describe_size(recording: Recording, phasors: Snapshots, feeder: Feeder) -> str:
     """Voltage and powers of a feeder while it is alive, in words."""
     if any(is_unit_in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
         return "units in doubt"
@@ -121,7 +122,7 @@ def find_voltages(
         buses = _select_alive(phasors, buses) or buses
     if len(buses) == 1:
         return [(buses[0], "the only ones alive")]
-    ties, why = _named_alike(recording, phasors, load, buses)
+    ties, why = _find_named_alike(recording, phasors, load, buses)
     if len(ties) == 1:
         return [(ties[0], why)]
     apart = max(_measure_difference(phasors, a, b) for a, b in combinations(ties, 2))
@@ -165,7 +166,7 @@ def _follow_voltages(
     return [(bus, "the currents may follow them") for bus in buses if bus is best or bus in others]
 
 
-def _named_alike(
+def _find_named_alike(
     recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group]
 ) -> tuple[list[Group], str]:
     """(the voltages whose names share most with those of the currents, what they share where it is

@@ -290,7 +290,7 @@ def _group_by_name(
         places = buckets[label]
         if size == 2 and not _are_two_enough(label, places, worth[label] >= SURE):
             continue
-        for have, missing in _sets(places, size):
+        for have, missing in _match_sets(places, size):
             if used & set(have):
                 continue
             used |= set(have)
@@ -328,10 +328,10 @@ def _read_marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
             backward = "-" if (y - x) % 3 == 2 else ""
             key = f"{text[: mark.begin]}**{text[mark.end :]}{backward}"
             yield key, letters, True, PLACE[mark.letters], 6.0 - 2 * (letters == DIGITS)
-        yield from _single_marks(text, letters)
+        yield from _read_single_marks(text, letters)
 
 
-def _single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int, float]]:
+def _read_single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int, float]]:
     """The readings of a name with one phase: a mark that stands alone, after a word ("HCSA"), or
     several times.
     """
@@ -373,7 +373,7 @@ def _group_by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Gr
     result = list[Group]()
     taken = set[int]()
     for label, places in buckets.items():
-        for have, missing in _sets(places, size):
+        for have, missing in _match_sets(places, size):
             backward = tuple(down[label].intersection(have))
             if len(backward) == 1 and taken.isdisjoint(have):
                 taken.update(have)
@@ -396,14 +396,14 @@ def _group_by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
                 place = "abc".index(mark) if len(mark) == 1 else PLACE[mark]
                 rows[normalize(channel.circuit), len(mark) == 2][place].append(i)
         for (_, two), places in rows.items():
-            for have, missing in _sets(places, size):
+            for have, missing in _match_sets(places, size):
                 shared = shared_name([channels[n] for n in have])
                 result.append(Group(have, two, shared, False, "the file's phases say so", missing))
                 used |= set(have)
     return result
 
 
-def _sets(
+def _match_sets(
     places: Mapping[int, list[int]], size: int
 ) -> Iterator[tuple[tuple[int, ...], int | None]]:
     """Channels, one of each phase, so many together, in the order in which they stand; the phase

@@ -114,8 +114,8 @@ def list_single_feeders(
                 f"one current {list_names(recording, [i])}",
                 f"one voltage {list_names(recording, bus.numbers)}: {why}",
             )
-            said += _part_of_railway(recording, phasors, volts, amps, bus.numbers[0], i)
-            said += _part_of_phases(recording, phasors, free, bus.numbers[0])
+            said += _describe_railway_part(recording, phasors, volts, amps, bus.numbers[0], i)
+            said += _describe_phase_part(recording, phasors, free, bus.numbers[0])
             loaded = not is_return(recording, i)
             parts = [part for part in (MAYBE_HALF, HALF, ONE_PHASE) if part in " ".join(said)]
             name = f"{group.name} ({parts[0]})" if parts else group.name
@@ -133,7 +133,7 @@ def list_single_feeders(
     return single
 
 
-def _part_of_railway(
+def _describe_railway_part(
     recording: Recording,
     phasors: Snapshots,
     volts: Sequence[int],
@@ -152,7 +152,7 @@ def _part_of_railway(
     pure = [i for i in volts if i != voltage and phasors.pure(i)]
     opposite = next((i for i in pure if is_opposite(phasors, voltage, i)), None)
     if opposite is not None:
-        return (_half_at(recording, phasors, (voltage, opposite), current, amps),)
+        return (_describe_half(recording, phasors, (voltage, opposite), current, amps),)
     other = find_other_conductor(recording, phasors, current, [i for i in amps if phasors.pure(i)])
     if other is not None:
         name = list_names(recording, [other])
@@ -165,7 +165,7 @@ def _part_of_railway(
     return ()
 
 
-def _half_at(
+def _describe_half(
     recording: Recording,
     phasors: Snapshots,
     volts: tuple[int, int],
@@ -191,7 +191,7 @@ def _half_at(
     )
 
 
-def _part_of_phases(
+def _describe_phase_part(
     recording: Recording, phasors: Snapshots, volts: Sequence[int], voltage: int
 ) -> tuple[str, ...]:
     """A sentence on a single voltage that is one of several phases: by its name and angle, or by

@@ -176,18 +176,18 @@ def _find_mark(text: str, letters: str) -> PhaseMark | None:
     )
     if quantity is not None:
         at = quantity.end()
-        mark = _first_mark(text[at:], letters)
+        mark = _find_first_mark(text[at:], letters)
         if mark is not None and (letters.isupper() or mark.ground or len(mark.places) == 2):
             return replace(mark, begin=mark.begin + at, end=mark.end + at)
-    return _first_mark(text, letters)
+    return _find_first_mark(text, letters)
 
 
-def _first_mark(text: str, letters: str) -> PhaseMark | None:
+def _find_first_mark(text: str, letters: str) -> PhaseMark | None:
     """The mark of a name: two phases, else one to ground, else one that is no letter of a quantity
     by itself.
     """
     digits, alone, letters = letters == DIGITS, letters.isupper(), letters.lower()
-    two = next((mark for mark in pairs(text, letters) if _ends(text, mark.end)), None)
+    two = next((mark for mark in pairs(text, letters) if _can_end(text, mark.end)), None)
     two = None if alone and two is not None and two.end - two.begin == len("uv") else two
     if two is not None:
         return two
@@ -213,6 +213,6 @@ def _first_mark(text: str, letters: str) -> PhaseMark | None:
     return None
 
 
-def _ends(text: str, at: int) -> bool:
+def _can_end(text: str, at: int) -> bool:
     """Whether a mark ends at a place of a text."""
     return re.compile(END).match(text, at) is not None

@@ -36,7 +36,7 @@ def find_pole_slips(trace: Trace) -> list[Excursion]:
     level = float(np.percentile(U, 90))
     if level <= 0:
         return []
-    lows = [k for k in _swings(U / level) if _smooth(U / level, k, trace)]
+    lows = [k for k in _find_swings(U / level) if _smooth(U / level, k, trace)]
     lows = [k for k in lows if not trace.U2[k] > LARGEST_SWING_UNBALANCE * max(trace.U[k], level)]
     slips, first = [], 0
     while first < len(lows):
@@ -53,7 +53,7 @@ def find_pole_slips(trace: Trace) -> list[Excursion]:
     return slips
 
 
-def _swings(u: np.ndarray) -> list[int]:
+def _find_swings(u: np.ndarray) -> list[int]:
     """Minima of u that lie lower by `SWING` than the maxima on either side."""
     lows, low, high, falling = [], 0, 0, False
     for k in range(1, len(u)):

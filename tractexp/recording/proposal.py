@@ -86,7 +86,7 @@ def buses_alone(recording: Recording) -> list[Feeder]:
     grouped = [g for g in find_groups(recording, phasors, volts) if not pure.isdisjoint(g.numbers)]
     taken = {i for g in grouped for i in g.numbers}
     alone = select_free(recording, phasors, volts, taken)
-    feeders = [_bus_alone(recording, phasors, group) for group in grouped]
+    feeders = [_propose_bus(recording, phasors, group) for group in grouped]
     why = (_explain_lone_voltages(recording),)
     names = [recording.channels[i].name.strip() for i in alone]
     return feeders + [
@@ -104,7 +104,7 @@ def _explain_lone_voltages(recording: Recording) -> str:
     return f"which voltages {currents} belong to cannot be told: no load is shown"
 
 
-def _bus_alone(recording: Recording, phasors: Snapshots, group: Group) -> Feeder:
+def _propose_bus(recording: Recording, phasors: Snapshots, group: Group) -> Feeder:
     """A bus without currents, its voltages in the order in which they turn."""
     numbers, names = group.numbers, list_names(recording, group.numbers)
     said = [f"voltages {names}: {group.evidence}", _explain_lone_voltages(recording)]

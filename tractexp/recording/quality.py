@@ -74,13 +74,13 @@ def quality(
     x = channel.values(segment.first, segment.stop)
     valid = np.isfinite(x)
     gaps = int(np.count_nonzero(~valid)) + holes
-    step, span = _step(channel, x if valid.all() else x[valid])
-    f = _frequency(recording, number, segment, network)
+    step, span = _measure_step(channel, x if valid.all() else x[valid])
+    f = _measure_frequency(recording, number, segment, network)
     clipped = _measure_clipped_share(channel, x, segment, f or recording.frequency, step)
     offset, level, noise, lag, count, thd = _measure_quiet_part(
         x, segment.rate, f, AT_WORK.get(channel.quantity, IDLE)
     )
-    colour = _colour(lag, count, noise, step)
+    colour = _estimate_color(lag, count, noise, step)
     return Quality(
         segment.rate,
         jitter,
@@ -119,7 +119,7 @@ def measure_clipped_shares(recording: Recording, numbers: Sequence[int]) -> dict
     for number in numbers:
         channel = recording.channels[number]
         x = channel.values(segment.first, segment.stop)
-        step, _ = _step(channel, x[np.isfinite(x)])
+        step, _ = _measure_step(channel, x[np.isfinite(x)])
         shares[number] = _measure_clipped_share(channel, x, segment, recording.frequency, step)
     return shares
 
@@ -145,7 +145,7 @@ def measure_stamp_jitter(recording: Recording, segment: Segment) -> tuple[float,
     return float(np.abs(t).max() / usual), int(np.count_nonzero(holes))
 
 
-def _step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
+def _measure_step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
     """(least difference of two values, span of the values)."""
     if len(x) < 2:
         return 0.0, 0.0
@@ -188,7 +188,7 @@ def _count_crest_samples(x: np.ndarray, cycle: float, near: float) -> int:
     return 2 + int(2 * np.sqrt(2 * near / amplitude) * cycle / (2 * np.pi))
 
 
-def _frequency(
+def _measure_frequency(
     recording: Recording, number: int, segment: Segment, network: float | None
 ) -> float | None:
     """The network's frequency [Hz] as this channel shows it, else as the others do; None for
@@ -222,11 +222,11 @@ def _measure_quiet_part(
     n = min(round(QUIET_CYCLES * rate / f), len(x))
     if n < 2 * round(rate / f):
         return none, none, none, none, 0, none
-    first = _quietest(x, n, round(rate / f))
+    first = _find_quietest(x, n, round(rate / f))
     part = x[first : first + n]
     if not np.isfinite(part).all():
         return none, none, none, none, 0, none
-    orders, Q, solve = _basis(n, rate, f)
+    orders, Q, solve = _build_basis(n, rate, f)
     coordinates = Q.T @ part
     weights, rest = solve @ coordinates, part - Q @ coordinates
     size = np.hypot(weights[2 : 2 + 2 * orders : 2], weights[3 : 3 + 2 * orders : 2]) / np.sqrt(2)
@@ -237,7 +237,7 @@ def _measure_quiet_part(
 
 
 @functools.lru_cache(maxsize=8)
-def _basis(n: int, rate: float, f: float) -> tuple[int, np.ndarray, np.ndarray]:
+def _build_basis(n: int, rate: float, f: float) -> tuple[int, np.ndarray, np.ndarray]:
     """(number of harmonics, orthonormal basis (n, K), what makes weights of coordinates in it (K,
     K)).
 
@@ -289,7 +289,7 @@ def _variances(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([np.empty(0), *own]), np.concatenate([np.empty(0), *changed])
 
 
-def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
+def _find_quietest(x: np.ndarray, n: int, cycle: int) -> int:
     """First sample of the span of n in which the wave repeats best from one cycle to the next, for
     its energy.
     """
@@ -319,7 +319,7 @@ def _measure_windows(
     return np.concatenate(parts)
 
 
-def _colour(lag: float, count: int, noise: float, step: float) -> str:
+def _estimate_color(lag: float, count: int, noise: float, step: float) -> str:
     """The color of the noise by its lag-1 correlation, where there is more noise than the
     converter's rounding.
     """

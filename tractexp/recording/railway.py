@@ -262,19 +262,19 @@ class DirectVoltage:
     def describe(self, name: str, start: float = 0.0) -> str:
         """One clause, times counted from `start` [s] at the first sample."""
         dip = (
-            f", and falls to {_volts(self.mean * (1 - self.fall))} ({self.fall:.1%}) at"
+            f", and falls to {_format_voltage(self.mean * (1 - self.fall))} ({self.fall:.1%}) at"
             f" {start + self.begin:.3f} s for {1000 * self.seconds:.0f} ms"
             if self.fall > LEAST_DC_DIP
             else ""
         )
         what = "keeps its sign, as RMS values do" if self.is_magnitude else "is direct"
         return (
-            f"the voltage '{name}' {what}: {_volts(self.mean)} in the mean with a ripple of"
-            f" {self.alternating / abs(self.mean):.1%} RMS{dip}"
+            f"the voltage '{name}' {what}: {_format_voltage(self.mean)} in the mean with a ripple"
+            f" of {self.alternating / abs(self.mean):.1%} RMS{dip}"
         )
 
 
-def _volts(kilovolts: float) -> str:
+def _format_voltage(kilovolts: float) -> str:
     """A voltage as it is said of direct ones: in V, and in kV above those of railways."""
     large = abs(kilovolts) > 2 * max(NOMINAL_DIRECT)
     return f"{kilovolts:.4g} kV" if large else f"{1000 * kilovolts:.4g} V"

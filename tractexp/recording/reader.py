@@ -184,7 +184,7 @@ class WaveformReader(Reader):
         if first is None:
             return file_dips
         base = self._measure_base(first, frequency)
-        return [replace(dip, result=_per_unit(dip.result, base)) for dip in file_dips]
+        return [replace(dip, result=_scale_to_per_unit(dip.result, base)) for dip in file_dips]
 
     def _measure_base(self, record: Record, frequency: float) -> Base:
         """Voltage and apparent power before a dip. Raises `UserError` for a load without power."""
@@ -418,7 +418,7 @@ def _load_waveforms(record: Record) -> Record:
     return replace(record, waves=record.waves.between(record.t[0] - about, record.t[-1] + about))
 
 
-def _per_unit(record: Record | UserError, base: Base) -> Record | UserError:
+def _scale_to_per_unit(record: Record | UserError, base: Base) -> Record | UserError:
     """A record in kV, MW and Mvar on a base and checked, or why it cannot be used."""
     if isinstance(record, UserError):
         return record

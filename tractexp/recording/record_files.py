@@ -74,12 +74,12 @@ def _is_wanted(path: Path, readable: Collection[str], beside: Collection[str]) -
     every: list[Any] = list(discover()[Reader.group].values())
     parts = next((cls.parts for cls in every if ending in cls.parts), None)
     if parts is None:
-        return not _prose(path)
+        return not _holds_prose(path)
     before = parts[: parts.index(ending)]  # of the parts of one record the first is read
     return not any(path.with_suffix(each).name.lower() in beside for each in before)
 
 
-def _prose(path: Path) -> bool:
+def _holds_prose(path: Path) -> bool:
     """Whether a text that would be read as a table holds words: not one row of numbers at its
     beginning.
     """

@@ -110,14 +110,14 @@ def snapshots(
         for s in recording.segments
         if s.rate >= FEWEST_PER_CYCLE * f and s.stop - s.first >= 2 * s.rate / f + 1
     ]
-    parts = [_windows(recording, numbers, segment, f) for segment in fast]
+    parts = [_measure_windows(recording, numbers, segment, f) for segment in fast]
     if not parts:
         return None
     t, X, rest = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
     return Snapshots(tuple(numbers), t, X, f, rest)
 
 
-def _windows(
+def _measure_windows(
     recording: Recording, numbers: Sequence[int], segment: Segment, f: float
 ) -> tuple[np.ndarray, ...]:
     """Phasors of whole cycles spread over a segment: start [s], phasor and rest of each channel;
@@ -146,7 +146,7 @@ def _measure_channel(
     from the segment's.
     """
     begin = segment.first
-    basis, inverse = _basis(f / segment.rate, n)
+    basis, inverse = _build_basis(f / segment.rate, n)
     if whole:
         blocks = channel.values(begin, begin + len(firsts) * n).reshape(len(firsts), n)
     else:
@@ -158,7 +158,7 @@ def _measure_channel(
 
 
 @functools.lru_cache(maxsize=64)
-def _basis(turns: float, n: int) -> tuple[np.ndarray, np.ndarray]:
+def _build_basis(turns: float, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Mean and sinusoid (n, 3) of so many turns a sample, and what fits them to samples (3, n)."""
     phase = 2 * np.pi * turns * np.arange(n)
     basis = np.column_stack([np.ones(n), np.sqrt(2) * np.cos(phase), -np.sqrt(2) * np.sin(phase)])
@@ -173,7 +173,9 @@ def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
     window to window.
     """
     coarse = [
-        line for s in recording.segments if (line := _line(recording, numbers, s)) is not None
+        line
+        for s in recording.segments
+        if (line := _find_strongest_line(recording, numbers, s)) is not None
     ]
     if not coarse:
         return None
@@ -211,7 +213,7 @@ def frequency_of(recording: Recording, numbers: Sequence[int]) -> float | None:
     return frequency(recording, numbers)
 
 
-def _line(
+def _find_strongest_line(
     recording: Recording, numbers: Sequence[int], segment: Segment
 ) -> tuple[float, float] | None:
     """(energy, frequency [Hz]) of the strongest line of a segment's first two seconds; None for a

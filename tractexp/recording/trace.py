@@ -67,10 +67,10 @@ def trace_waves(
     center = (t - start) * rate + 0.5  # sample k lies between k and k + 1
     low, high = np.clip(center - width / 2, 0, n), np.clip(center + width / 2, 0, n)
     pieces: list[tuple[np.ndarray, np.ndarray]] = []
-    for windows, (a, b) in _blocks(low, high):
+    for windows, (a, b) in _cut_in_blocks(low, high):
         x, mean = (
             waves[:, a:b],
-            functools.partial(_means, low=low[windows] - a, high=high[windows] - a),
+            functools.partial(_average_windows, low=low[windows] - a, high=high[windows] - a),
         )
         turn = np.exp(-1j * frame(np.interp(start + np.arange(a, b) / rate, phasors.t, f), rate))
         pieces.append(
@@ -125,13 +125,13 @@ def half_cycle_rms(
     cycle = rate / frequency  # samples, not whole
     low = np.arange(0.0, waves.shape[-1] - cycle + 1e-9, cycle / 2)
     squares = [
-        _means(waves[:, a:b] ** 2, low[windows] - a, low[windows] + cycle - a)
-        for windows, (a, b) in _blocks(low, low + cycle)
+        _average_windows(waves[:, a:b] ** 2, low[windows] - a, low[windows] + cycle - a)
+        for windows, (a, b) in _cut_in_blocks(low, low + cycle)
     ]
     return (low + (cycle - 1) / 2) / rate, np.sqrt(np.maximum(np.concatenate(squares, axis=1), 0.0))
 
 
-def _blocks(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[slice, tuple[int, int]]]:
+def _cut_in_blocks(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[slice, tuple[int, int]]]:
     """Windows from `low` to `high` (M,), about as many at a time as lie in a block, and the samples
     that they need.
     """
@@ -142,7 +142,7 @@ def _blocks(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[slice, tuple[in
         first = windows.stop
 
 
-def _means(x: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def _average_windows(x: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Means (K, M) of x (K, N) from `low` to `high` (M,), sample k lying between k and k + 1."""
     total = np.concatenate([np.zeros((len(x), 1), x.dtype), np.cumsum(x, axis=1)], axis=1)
     return (_interpolate(total, high) - _interpolate(total, low)) / (high - low)

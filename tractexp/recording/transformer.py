@@ -56,7 +56,7 @@ def mark_other_sides(
             if _has_high_voltage(recording, phasors, marked[high], marked[low])
             else (low, high)
         )
-        ratio = _size(phasors, marked[low]) / _size(phasors, marked[high])
+        ratio = _measure_size(phasors, marked[low]) / _measure_size(phasors, marked[high])
         share = ratio if other == low else 1 / ratio
         if not sure:
             said = f"{MAYBE_SAME} as that of {marked[kept].name} times {share:.3g}{OR_ALIKE}"
@@ -75,7 +75,7 @@ def mark_other_sides(
     return marked
 
 
-def _size(phasors: Snapshots, feeder: Feeder) -> float:
+def _measure_size(phasors: Snapshots, feeder: Feeder) -> float:
     """How large the currents of a feeder are."""
     return phasors.size(feeder.currents)
 
@@ -94,7 +94,7 @@ def _judge_sides(
     recording: Recording, phasors: Snapshots, sides: tuple[Feeder, Feeder], likeness: _Likeness
 ) -> bool | None:
     """Whether feeders (high, low) are surely sides of one transformer; None where they are not."""
-    small, large = (_size(phasors, side) for side in sides)
+    small, large = (_measure_size(phasors, side) for side in sides)
     steps = round(likeness.turned / 30)
     named = _find_sides(recording, *sides) is not None
     alike = likeness.rest < LARGEST_REST[named]
@@ -181,7 +181,10 @@ def _has_high_voltage(recording: Recording, phasors: Snapshots, high: Feeder, lo
     """Whether the one recorded voltage is the high side's: by the channels' names, else by whether
     the voltage over the ratio or times the ratio is nearer a nominal one.
     """
-    U, ratio = _measure_voltage(phasors, high), _size(phasors, low) / _size(phasors, high)
+    U, ratio = (
+        _measure_voltage(phasors, high),
+        _measure_size(phasors, low) / _measure_size(phasors, high),
+    )
     sides, own = _find_sides(recording, high, low), _read_side(recording, high.voltages)
     if (
         sides is not None and sides[1] > 0

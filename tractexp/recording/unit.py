@@ -79,7 +79,7 @@ def _find_bare(
     """
     stated = {channels[i].unit for i in numbers if not is_unit_in_doubt(channels[i])}
     bare = [i for i in numbers if not channels[i].unit.strip()]
-    size = max((_size(channels[i]) for i in bare), default=0.0)
+    size = max((_measure_size(channels[i]) for i in bare), default=0.0)
     return bare if bare and _is_plainly_volts(letter, size, stated, voltage) else []
 
 
@@ -123,7 +123,7 @@ def _have_secondary_size(channels: Sequence[Channel]) -> bool:
         for i, c in enumerate(channels)
         if c.form == "waveform" and kind(c) == "voltage" and not is_unit_in_doubt(c)
     }
-    sizes = {i: c.factor * _size(c) for i, c in volts.items()}
+    sizes = {i: c.factor * _measure_size(c) for i, c in volts.items()}
     alive = [i for i, size in sizes.items() if size > ALIVE * max(sizes.values())]
     lines = {i for group in groups(volts) if group.pairs for i in group.numbers}
     limits = {i: SECONDARY_LINES if i in lines else SECONDARY_GROUND for i in alive}
@@ -137,7 +137,7 @@ def _mark_secondary(channels: Sequence[Channel]) -> list[Channel]:
     if not any(c.side for c in channels):
         return [*channels]
     low, high = SECONDARY
-    sizes = np.array([c.factor * _size(c) for c in channels if _is_sided_voltage(c)])
+    sizes = np.array([c.factor * _measure_size(c) for c in channels if _is_sided_voltage(c)])
     larger, alike = (sizes > high).any(), ((low <= sizes) & (sizes <= high)).any()
     return [
         _set_secondary(c) if not larger and (alike or c.side == "S") else replace(c, side="")
@@ -172,7 +172,7 @@ def _note_secondary_values(channels: Sequence[Channel], by_size: bool) -> list[s
         f"{letter}: '{examples[letter]}'" for letter, c in letters.items() if c is not None
     )
     sizes = " and ".join(
-        f"{_size(c):.4g} {c.unit.strip()}" for c in letters.values() if c is not None
+        f"{_measure_size(c):.4g} {c.unit.strip()}" for c in letters.values() if c is not None
     )
     told = "and the file gives no ratio of the transformers"
     if by_size:
@@ -217,7 +217,7 @@ def _is_plainly_volts(letter: str, size: float, stated: set[str], voltage: str) 
     return letter == "I" and not stated and in_volts and size >= LEAST_AMPERES
 
 
-def _size(channel: Channel) -> float:
+def _measure_size(channel: Channel) -> float:
     """RMS about the mean, as recorded, on the primary side."""
     x = channel.read_values()
     x = x[np.isfinite(x)]
@@ -241,7 +241,8 @@ def check_doubt(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> N
     if not odd:
         return
     said = "; ".join(
-        f"'{c.name.strip()}' has {_unit_said(c, letter)} and numbers of an RMS of {_size(c):.4g}"
+        f"'{c.name.strip()}' has {_describe_unit(c, letter)}"
+        f" and numbers of an RMS of {_measure_size(c):.4g}"
         for letter, c in odd.items()
     )
     plainly = ", ".join(f"{letter}: {PLAIN[letter][2]}" for letter in odd)
@@ -252,7 +253,7 @@ def check_doubt(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> N
     )
 
 
-def _unit_said(channel: Channel, letter: str) -> str:
+def _describe_unit(channel: Channel, letter: str) -> str:
     """The unit of a channel that is in doubt, and what is open about it."""
     unit = channel.unit.strip()
     if not unit:

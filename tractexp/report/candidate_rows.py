@@ -46,7 +46,7 @@ def list_candidates(findings: Findings) -> list[CandidateRow]:
     """
     sets = [_tell_set(findings, row) for row in findings.evidence.rows if row.names]
     tested = {row.names for row in sets}  # of the chosen size
-    rows = [*sets, *(row for row in _singles(findings) if row.names not in tested)]
+    rows = [*sets, *(row for row in _list_singles(findings) if row.names not in tested)]
     return sorted(rows, key=lambda row: (row.rank, -np.nan_to_num(row.drop, nan=-1.0), row.names))
 
 
@@ -80,12 +80,12 @@ def explain_other_than_steepest(findings: Findings) -> str:
     if findings.verdict.word in (NONE, UNEXPLAINED):
         return (
             f"{promise}, but that does not make it an explanation:"
-            f" {_verdict_on(findings, best.name)}."
+            f" {_tell_verdict(findings, best.name)}."
         )
     chosen = next(r for r in list_candidates(findings) if r.rank == 0)
     return (
         f"{promise}, yet the verdict is {join_words(findings.names)}, which lowers the deviance by"
-        f" {chosen.drop:.0f}: {_verdict_on(findings, best.name)}."
+        f" {chosen.drop:.0f}: {_tell_verdict(findings, best.name)}."
     )
 
 
@@ -103,7 +103,7 @@ def describe_untestable_beside(findings: Findings) -> str:
     )
 
 
-def _verdict_on(findings: Findings, name: str) -> str:
+def _tell_verdict(findings: Findings, name: str) -> str:
     """The verdict on one effect, as the end of a sentence."""
     row = next((r for r in list_candidates(findings) if r.names == (name,)), None)
     if row is None:
@@ -144,7 +144,7 @@ def _tell_fate(findings: Findings, row: SetEvidence) -> tuple[str, str]:
     return "denied", "does not hold on the held-out events"
 
 
-def _singles(findings: Findings) -> list[CandidateRow]:
+def _list_singles(findings: Findings) -> list[CandidateRow]:
     """Every effect of the catalogue by itself: refitted where it was, else in one linear step from
     the base model.
     """

@@ -36,11 +36,11 @@ def candidates(page: Report, findings: Findings) -> None:
     if findings.evidence.is_predicted:
         return add_prediction_section(page, findings)
     rows = list_candidates(findings)
-    labels = _labels(rows)
+    labels = _number_sets(rows)
     page.heading("Candidates by their evidence")
     finite = [row for row in rows if np.isfinite(row.drop)]
     if finite:
-        page.chart(_bars(findings, finite, labels), _bars_caption(findings, finite))
+        page.chart(_chart_drops(findings, finite, labels), _caption_drops(findings, finite))
     for sentence in (explain_other_than_steepest(findings), describe_untestable_beside(findings)):
         if sentence:
             page.text(sentence)
@@ -66,12 +66,12 @@ def candidates(page: Report, findings: Findings) -> None:
         " Sizes have their standard error where it was reckoned.",
         words=(0, 2, 3, 4),
     )
-    _sets(page, findings)
+    _add_sets(page, findings)
     if chosen:
         _add_further_gains(page, findings)
 
 
-def _labels(rows: Sequence[CandidateRow]) -> dict[CandidateRow, str]:
+def _number_sets(rows: Sequence[CandidateRow]) -> dict[CandidateRow, str]:
     """A candidate's name; sets of several are numbered, because a chart has no room for all their
     names.
     """
@@ -79,7 +79,7 @@ def _labels(rows: Sequence[CandidateRow]) -> dict[CandidateRow, str]:
     return {row: f"set {sets.index(row) + 1}" if row in sets else row.names[0] for row in rows}
 
 
-def _bars(
+def _chart_drops(
     findings: Findings, rows: Sequence[CandidateRow], labels: Mapping[CandidateRow, str]
 ) -> Chart:
     """Each candidate's drop of the deviance as a bar, colored by its status."""
@@ -99,7 +99,7 @@ def _describe_bar(row: CandidateRow) -> str:
     return f"{drop}, {row.status}" if row.rank < 2 else drop
 
 
-def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
+def _caption_drops(findings: Findings, rows: Sequence[CandidateRow]) -> str:
     """The caption with the meaning of the colors."""
     colors = []
     if findings.names:
@@ -117,7 +117,7 @@ def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
     )
 
 
-def _sets(page: Report, findings: Findings) -> None:
+def _add_sets(page: Report, findings: Findings) -> None:
     """Add the table of sets that were refitted."""
     rows = [
         [

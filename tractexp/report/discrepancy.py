@@ -105,7 +105,7 @@ def gap(content: Mapping[str, Any]) -> Table:
         for model, stage in (("base model", "before"), ("extended model", "after"))[: 1 + named]:
             if (one := gaps[role]) is not None:
                 closed = one["closed"] if stage == "after" else None
-                error = _error(one[stage]["model_error"])
+                error = _format_error(one[stage]["model_error"])
                 rows.append(
                     [
                         label,
@@ -175,7 +175,7 @@ def report(
         findings.graded_overlays,
         answer_clicks(findings),
     )
-    _smaller(page, findings, content)
+    _add_gap(page, findings, content)
     if findings.verdict.word == UNEXPLAINED:
         add_proposal_section(page, findings)
     if not findings.verdict.complete:
@@ -203,7 +203,7 @@ def _describe_grade(findings: Findings) -> str:
     return f"The {which} model is graded {word}: {told}."
 
 
-def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> None:
+def _add_gap(page: Report, findings: Findings, content: Mapping[str, Any]) -> None:
     """The gap; where nothing explains it, that of the nearest candidates beside it."""
     page.heading("How large the gap is" if not findings.names else "How much smaller the gap is")
     table, near = gap(content), findings.nearest
@@ -236,7 +236,7 @@ def _describe_gap_with_nearest(near: Nearest) -> list[list[str]]:
         [
             label,
             stage,
-            _error(c.error.to_dict()),
+            _format_error(c.error.to_dict()),
             *_describe_misfit(vars(c), waves=near.fitted.before.epsilon_i is not None),
         ]
         for label, both in pairs
@@ -245,7 +245,7 @@ def _describe_gap_with_nearest(near: Nearest) -> list[list[str]]:
     ]
 
 
-def _error(entry: Mapping[str, Any]) -> str:
+def _format_error(entry: Mapping[str, Any]) -> str:
     """A model's error with its interval, as a table has it."""
     ends = [in_percent(end) for end in entry["interval"] if end is not None and np.isfinite(end)]
     return tell_error(entry) + (
@@ -270,13 +270,13 @@ def _add_remainder_section(page: Report, findings: Findings) -> None:
     )
     if findings.names:
         whose = f"the model with {join_words(findings.names)}"
-    _shapes(page, findings, shapes, whose)
+    _add_shapes(page, findings, shapes, whose)
     if near is not None:
-        _shapes(page, findings, findings.rest.of_base, "the base model alone")
-        _nearest(page, findings, near)
+        _add_shapes(page, findings, findings.rest.of_base, "the base model alone")
+        _add_nearest(page, findings, near)
 
 
-def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose: str) -> None:
+def _add_shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose: str) -> None:
     """Add the shapes of what is left by `whose` model."""
     if not shapes:
         page.text(
@@ -293,9 +293,9 @@ def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose
             s.kind,
             f"{s.start:.3f}",
             s.when,
-            _number(s.frequency),
-            _number(s.time_constant),
-            _number(s.damping),
+            _format_number(s.frequency),
+            _format_number(s.time_constant),
+            _format_number(s.damping),
             f"{s.size:.2g}",
             s.times,
             f"{s.share:.0%}",
@@ -331,7 +331,7 @@ def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose
         )
 
 
-def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
+def _add_nearest(page: Report, findings: Findings, near: Nearest) -> None:
     """The candidates that come nearest, with their shares and sizes."""
     assert near.row.tests is not None
     by_name = {
@@ -361,6 +361,6 @@ def _share(closed: float) -> str:
     return f"{closed:.0%}" if np.isfinite(closed) else ""
 
 
-def _number(value: float | None) -> str:
+def _format_number(value: float | None) -> str:
     """A number with three digits; "" for none."""
     return "" if value is None else f"{value:.3g}"

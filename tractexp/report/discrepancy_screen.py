@@ -24,7 +24,7 @@ def screen(found: "Investigation") -> Report:
     sentences = [found.reason, *found.sizes[:MOST_SIZES], left, *found.proposal_sentences[:1]]
     page.items([shorten(sentence) for sentence in sentences if sentence])
     page.text(describe_load(found.result, fitted), shorten(_describe_grade(found)), "")
-    page.add(_gap(found)).text("")
+    page.add(_build_gap(found)).text("")
     told = [
         *describe_where(found.content),
         *describe_nearest(found.content, found.sizes_of_nearest),
@@ -40,7 +40,7 @@ def _describe_grade(found: "Investigation") -> str:
     return f"{found.fit.usability}: {'; '.join(filter(None, [sentence, doubt]))}"
 
 
-def _gap(found: "Investigation") -> Table:
+def _build_gap(found: "Investigation") -> Table:
     """The gap without the errors of single channels."""
     table = gap(found.content)
     epsilons = [k for k, name in enumerate(table.columns) if name.startswith("epsilon")]

@@ -66,7 +66,7 @@ def event_chart(
         above, measured = 1 + 2 * c, getattr(record, channel)
         if deviation is not None and around is not None:
             for panel, middle in ((above, around[c]), (above + 1, np.zeros(len(t)))):
-                _noise_band(chart, t, middle, BAND_DEVIATIONS * deviation[c], panel)
+                _add_noise_band(chart, t, middle, BAND_DEVIATIONS * deviation[c], panel)
         _shade_places(chart, [place for place in places if place.channel == channel], above)
         chart.line("measured", t, measured, style.MEASURED, above, width=3)
         for name, power, color, dash, hidden in curves:
@@ -95,7 +95,7 @@ def show_units(chart: Chart, panels: Sequence[str], base: Base | None) -> Chart:
     return chart.units(labels, [factor for _, factor in units])
 
 
-def _noise_band(
+def _add_noise_band(
     chart: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int
 ) -> None:
     """Where noise alone would let a sample lie; every so many samples of a long record."""

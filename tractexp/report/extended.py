@@ -46,13 +46,13 @@ def laws(page: Report, findings: Findings) -> None:
     for name, form in entries:
         if form["curve"] is not None:
             page.chart(
-                _curve(form["curve"]),
+                _chart_law(form["curve"]),
                 f"{name}: the law found, with its 95 % band, beside the catalogue's as it fits"
                 " these events best.",
             )
 
 
-def _curve(law: Mapping[str, Any]) -> Chart:
+def _chart_law(law: Mapping[str, Any]) -> Chart:
     """The law found with its band, beside the catalogue's."""
     x, y, lower, upper, textbook = (
         np.array(law[key]) for key in ("x", "y", "lower", "upper", "textbook")

@@ -51,7 +51,7 @@ def fit(
     from matplotlib import rc_context
 
     with rc_context(style.SETTINGS):
-        figure, top = _page(8.0, 7.8, title, notes)
+        figure, top = _open_figure(8.0, 7.8, title, notes)
         panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.0, 1.7, 1.7, 1.1))
         figure.subplots_adjust(left=0.1, right=0.975, bottom=0.06, top=top, hspace=0.13)
         panels[0].plot(*style.thin(t, U), color=style.VOLTAGE, label="voltage")
@@ -77,7 +77,7 @@ def fit(
             panels, ("U [pu]", "P [pu]", "Q [pu]", "residual [pu]"), strict=True
         ):
             _label_axis(panel, label, -0.085)
-            _legend_above(panel)
+            _put_legend_above(panel)
         panels[3].set_xlabel("t [s]")
         return style.save(figure, path)
 
@@ -99,7 +99,7 @@ def response(
     from matplotlib import rc_context
 
     with rc_context(style.SETTINGS):
-        figure, top = _page(8.0, 5.2, title, notes)
+        figure, top = _open_figure(8.0, 5.2, title, notes)
         panels = figure.subplots(3, 1, sharex=True, height_ratios=(1.0, 1.5, 1.5))
         figure.subplots_adjust(left=0.1, right=0.975, bottom=0.09, top=top, hspace=0.13)
         colors = (style.VOLTAGE, style.ACTIVE, style.REACTIVE)
@@ -128,7 +128,9 @@ def _check_lengths(path: Path, **columns: np.ndarray) -> None:
             raise UserError(f"{path}: {name} has no finite value to draw")
 
 
-def _page(width: float, height: float, title: str, notes: Sequence[str]) -> "tuple[Figure, float]":
+def _open_figure(
+    width: float, height: float, title: str, notes: Sequence[str]
+) -> "tuple[Figure, float]":
     """An empty figure [inch] with its heading, and how far up the panels may reach (a share of the
     height).
     """
@@ -151,7 +153,7 @@ def _page(width: float, height: float, title: str, notes: Sequence[str]) -> "tup
     return figure, 1 - (0.52 + 0.14 * len(lines)) / height
 
 
-def _legend_above(panel: "Axes") -> None:
+def _put_legend_above(panel: "Axes") -> None:
     """Put a panel's legend above it."""
     panel.legend(
         loc="lower right",

@@ -56,26 +56,26 @@ def report(fit: "Identification") -> Report:
     page.heading("Parameters").add(parameters(fit)).text(*map(finish_sentence, machine(fit)))
     if result.share_bound:
         page.chart(_draw_shares(result.share_bound["profile"]), SHARES_HELD)
-    _parameters(page, fit, uncertainty)
+    _add_parameters(page, fit, uncertainty)
     page.add(*tabulate_race(result.race))
     page.heading("Moved by hand")
     add_sliders(page, fit)
     page.heading("How well it fits").add(errors(fit)).text(*map(finish_sentence, samples(fit)))
     page.heading("What to do next").items(fit.advice)
     if together is not None:
-        _events(page, uncertainty, together)
+        _add_events(page, uncertainty, together)
     page.heading("The search and the estimate").add(tabulate_search_end(fit)).text(
         finish_sentence(describe_search_end(fit))
     )
     page.chart(
-        _fitness(fit.search_result.history, result),
+        _chart_fitness(fit.search_result.history, result),
         "Best objective of the search; dashed: the estimate's.",
     )
-    _starts(page, details.estimation.starts)
+    _add_starts(page, details.estimation.starts)
     page.heading("What the fit leaves")
     _add_residual_section(page, uncertainty)
     page.heading("How the estimates depend on each other")
-    _correlation(page, uncertainty)
+    _add_correlations(page, uncertainty)
     page.heading("How this page was made")
     return page.table(["", ""], list_origin(result, get_command()), words=(1,))
 
@@ -97,7 +97,7 @@ def _describe_current_errors(result: Any) -> str:
     return f" Of the currents themselves epsilon_i is {', '.join(values)}." if values else ""
 
 
-def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -> None:
+def _add_parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -> None:
     """The base of the values, a picture against the bounds, and what rivals make of
     the parameters.
     """
@@ -106,7 +106,9 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
         base = f"Values and bounds in the table are on the record's own base of {result.base}."
         page.text(f"{finish_sentence(on_given_base)} {base}")
     page.chart(
-        _forest(uncertainty, by_event(result.search["parameters"], result.search["per_event"])),
+        _chart_estimates(
+            uncertainty, by_event(result.search["parameters"], result.search["per_event"])
+        ),
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the"
         " upper bound); cross: where the search ended.",
     )
@@ -118,7 +120,7 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
     page.items([*map(finish_sentence, describe_rivals(fit)), *poor])
 
 
-def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
+def _chart_estimates(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
     """Estimates and intervals in their bounds, beside where the search ended."""
     lower, width = uncertainty.lower, uncertainty.upper - uncertainty.lower
     at, spans = (
@@ -154,7 +156,7 @@ def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
     return chart.limits(None, -0.02, 1.02).limits(0, len(uncertainty.names) - 0.5, -0.5)
 
 
-def _fitness(history: History, result: Any) -> Chart:
+def _chart_fitness(history: History, result: Any) -> Chart:
     """The best objective [pu²] by simulations."""
     valid = history.objective < REFUSED
     chart = Chart("simulations", ["best objective [pu²]"], log_y=True, pixels=300)
@@ -165,7 +167,7 @@ def _fitness(history: History, result: Any) -> Chart:
     return chart.level(max(result.objective, 1e-30), "estimate")
 
 
-def _starts(page: Report, starts: Sequence[Mapping[str, Any]]) -> None:
+def _add_starts(page: Report, starts: Sequence[Mapping[str, Any]]) -> None:
     """Where each descent to the estimate ended."""
     above = np.maximum([s["above"] for s in starts], SAME_END_SHARE)
     chart = Chart("rank of the start", ["deviance above the best"], log_y=True, pixels=280)
@@ -207,7 +209,7 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
     drive, events = likelihood.problem.drive, likelihood.problem.events
     white = uncertainty.whitened_residual.reshape(drive.channels, -1)
     colored = [t for t in tests if t["p"] < REJECTED]
-    page.text(_conclusion(colored, len(tests)))
+    page.text(_conclude_tests(colored, len(tests)))
     for e, event in enumerate(events[:MOST_OPEN_EVENTS]):
         part = drive.part(e)
         compared = [c for c in range(drive.channels) if likelihood.valid[c, part].any()]
@@ -274,7 +276,7 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
         )
 
 
-def _conclusion(speaking: Sequence[dict[str, Any]], tests: int) -> str:
+def _conclude_tests(speaking: Sequence[dict[str, Any]], tests: int) -> str:
     """The verdict of the tests on the residual, in a sentence."""
     if not tests:
         return "There are too few samples to test what is left."
@@ -289,7 +291,7 @@ def _conclusion(speaking: Sequence[dict[str, Any]], tests: int) -> str:
     )
 
 
-def _correlation(page: Report, uncertainty: Uncertainty) -> None:
+def _add_correlations(page: Report, uncertainty: Uncertainty) -> None:
     """The strongest correlations in words, all of them as a table."""
     names, matrix = uncertainty.names, uncertainty.information.correlation
     pairs = [(abs(matrix[i, j]), i, j) for i in range(len(names)) for j in range(i)]
@@ -313,7 +315,7 @@ def _correlation(page: Report, uncertainty: Uncertainty) -> None:
     )
 
 
-def _events(page: Report, uncertainty: Uncertainty, together: Mapping[str, Any]) -> None:
+def _add_events(page: Report, uncertainty: Uncertainty, together: Mapping[str, Any]) -> None:
     """Add what each event of a joint fit contributes, and which does not belong."""
     page.heading("What each event adds")
     if together["notes"]:
@@ -321,13 +323,13 @@ def _events(page: Report, uncertainty: Uncertainty, together: Mapping[str, Any])
     page.table(
         ["without", *uncertainty.names],
         [
-            [event, *(_wider(gain[n]) for n in uncertainty.names)]
+            [event, *(_tell_widening(gain[n]) for n in uncertainty.names)]
             for event, gain in together["gains"].items()
         ],
         caption="How many times as wide each 95 % interval would be without the event.",
     )
 
 
-def _wider(ratio: float) -> str:
+def _tell_widening(ratio: float) -> str:
     """By how much a parameter's own value in each event widens its interval."""
     return f"{ratio:.2f}" if ratio < 1000 else "not identifiable"

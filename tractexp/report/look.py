@@ -38,14 +38,14 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
     for view, entry in zip(views, files, strict=True):
         if len(files) > 1:
             page.heading(entry["file"])
-        _conclusion(page, entry)
-        page.table(["", ""], _facts(entry), words=(1,))
+        _add_conclusion(page, entry)
+        page.table(["", ""], _list_facts(entry), words=(1,))
         if entry["notes"]:
             page.items(entry["notes"])
         if len(entry["feeders"]) > 1:
             page.table(
                 ["load", "connected as", "channels", "U", "P", "Q", "events", "worth fitting"],
-                [_summary(f) for f in entry["feeders"]],
+                [_build_summary_row(f) for f in entry["feeders"]],
                 words=(1, 2),
                 caption=BEFORE,
             )
@@ -76,7 +76,7 @@ def channels(entry: Mapping[str, Any]) -> Table:
         "bits",
         "fit for what",
     ]
-    rows = [_channel(c) for c in entry["channels"]]
+    rows = [_build_channel_row(c) for c in entry["channels"]]
     return Table(columns, rows, "", caption, words=(1, 2, 3, 6, 9), detail=(5, 6, 7, 8))
 
 
@@ -117,7 +117,7 @@ def describe_joint_fit(joint: Mapping[str, Any]) -> str:
     return f"fit {joint['dips']} dips together, as of one load, {joint['held_out']} held out"
 
 
-def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
+def _add_conclusion(page: Report, entry: Mapping[str, Any]) -> None:
     """Add the commands that fit, or why there is nothing to fit."""
     commands = [(f["name"], f["command"]) for f in entry["feeders"] if f["command"]]
     if not entry["feeders"]:
@@ -135,7 +135,7 @@ def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
             page.code(command)
 
 
-def _facts(entry: Mapping[str, Any]) -> list[list[str]]:
+def _list_facts(entry: Mapping[str, Any]) -> list[list[str]]:
     """Rows on the file: samples, frequency, station, notes."""
     segments = [
         f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s"
@@ -170,7 +170,7 @@ def size(entry: Mapping[str, Any]) -> str:
     return ", ".join(filter(None, sizes))
 
 
-def _channel(c: Mapping[str, Any]) -> list[str]:
+def _build_channel_row(c: Mapping[str, Any]) -> list[str]:
     """A channel's cells."""
     noise, thd = (None if c[key] is None else 100 * c[key] for key in ("noise_share", "thd"))
     return [
@@ -187,7 +187,7 @@ def _channel(c: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _summary(entry: Mapping[str, Any]) -> list[str]:
+def _build_summary_row(entry: Mapping[str, Any]) -> list[str]:
     """A load's cells."""
     sizes = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
     channels = ", ".join(map(str, (*entry["voltages"], *entry["currents"])))

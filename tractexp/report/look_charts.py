@@ -59,11 +59,11 @@ def charts(page: Report, view: View, shown: Sight) -> None:
         )
         with page.fold_blocks("Spectrum before anything happened"):
             page.chart(
-                _spectrum(view.recording, shown),
+                _chart_spectrum(view.recording, shown),
                 f"{SPECTRUM_CYCLES} cycles, Hann window, of phase a.",
             )
         if max(every, coarse) > 1:
-            _details(page, view, shown)
+            _add_details(page, view, shown)
 
 
 def add_unassigned_channels(page: Report, view: View) -> None:
@@ -187,11 +187,11 @@ def _chart_waves(
         heights.append(TRACE * len(states))
     chart = Chart("t [s]", panels, heights=heights, pixels=round(150 + 110 * sum(heights)))
     for segment in recording.waveforms():
-        _waves(chart, recording, shown, segment, every, span)
+        _add_waves(chart, recording, shown, segment, every, span)
     for p in shown.phasors:
         part = slice(*np.searchsorted(p.t, span)) if span else slice(None)
         if len(p.t[part]) > 1:
-            _phasors(chart, p, part, recording.frequency, 1 if span else coarse)
+            _add_phasors(chart, p, part, recording.frequency, 1 if span else coarse)
     chart.limits(6, (1 - BOUND / 2) * recording.frequency, (1 + BOUND / 2) * recording.frequency)
     if states:
         chart.states(states, len(panels) - 1, VOLTAGE)
@@ -212,7 +212,7 @@ def _describe_status_channels(view: View) -> str:
     return f" Status channels that change are below{most}." if count else ""
 
 
-def _waves(
+def _add_waves(
     chart: Chart,
     recording: Recording,
     shown: Sight,
@@ -229,9 +229,9 @@ def _waves(
     if waves.shape[1] < 2:
         return
     K = waves.shape[0] // 2
-    colors, names = _colors(K), _name_waves(recording, shown.feeder, K)
+    colors, names = _choose_colors(K), _name_waves(recording, shown.feeder, K)
     for k in range(2 * K):
-        y = _thin_wave(functools.partial(_row, waves, k), waves.shape[1], every)
+        y = _thin_wave(functools.partial(_sum_channels, waves, k), waves.shape[1], every)
         chart.samples(
             PHASES[K][k % K],
             start,
@@ -249,7 +249,7 @@ def _waves(
             chart.samples(name, start + t[0], t[1] - t[0], values, color, panel=2 + k // K)
 
 
-def _colors(phases: int) -> tuple[str, ...]:
+def _choose_colors(phases: int) -> tuple[str, ...]:
     """Colors of so many phases."""
     return COLORS if phases > 1 else (VOLTAGE,)
 
@@ -268,14 +268,14 @@ def _name_waves(recording: Recording, feeder: Feeder, phases: int) -> list[str]:
     ]
 
 
-def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> None:
+def _add_phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> None:
     """Symmetrical components, powers and frequency of one segment."""
     t = p.t[part]
     step = float(t[-1] - t[0]) / (len(t) - 1)
     sparse = max(1, -(-4 * p.V.shape[0] * len(t) // MOST_ARROWS))
     for panel, phases in enumerate((p.V, p.I)):
         for name, color, turning in zip(
-            PHASES[len(phases)], _colors(len(phases)), phases, strict=True
+            PHASES[len(phases)], _choose_colors(len(phases)), phases, strict=True
         ):
             chart.phasors(name, float(t[0]), step * sparse, turning[part][::sparse], color, panel)
     lines = [("P", p.S.real, ACTIVE, 5), ("Q", p.S.imag, REACTIVE, 5)]
@@ -300,7 +300,7 @@ def _read_values(channel: Channel, segment: Segment, a: int, b: int) -> np.ndarr
     return channel.values(segment.first + a, segment.first + b)
 
 
-def _row(waves: FeederWaves, k: int, a: int, b: int) -> np.ndarray:
+def _sum_channels(waves: FeederWaves, k: int, a: int, b: int) -> np.ndarray:
     """One sum of a feeder's channels within a part of a segment."""
     return waves[k : k + 1, a:b][0]
 
@@ -326,7 +326,7 @@ def envelope(wave: np.ndarray, every: int) -> np.ndarray:
     return np.take_along_axis(parts, order, axis=1).ravel()
 
 
-def _spectrum(recording: Recording, shown: Sight) -> Chart:
+def _chart_spectrum(recording: Recording, shown: Sight) -> Chart:
     """The spectra of the first voltage and the first current, before the first event."""
     assert shown.feeder is not None
     segment = recording.waveforms()[0]
@@ -344,7 +344,7 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
     return chart
 
 
-def _details(page: Report, view: View, shown: Sight) -> None:
+def _add_details(page: Report, view: View, shown: Sight) -> None:
     """A chart with every sample for each event, where the chart of the whole has not
     all of them.
     """

@@ -49,11 +49,11 @@ def screen(content: Entry) -> Report:
         page.text(shorten(_describe_recorder(entry), TWO_LINES))
         if notes := entry["notes"]:
             page.items([shorten(f"note: {notes[0]}", ONE_LINE)])
-        buses = _buses(entry["feeders"])
+        buses = _group_by_bus(entry["feeders"])
         told = [_describe_bus(entry, n, bus) for n, bus in enumerate(buses, 1) if _is_loaded(bus)]
         page.items([shorten(bus, TWO_LINES) for bus in told[:MOST_BUSES]])
         if buses:
-            _add_loads(page, entry, _loads(entry, buses))
+            _add_loads(page, entry, _tabulate_loads(entry, buses))
     if len(entries) > MOST_FILES:
         page.text(f"  {count_noun(len(entries) - MOST_FILES, 'file')} more")
     return page
@@ -78,12 +78,12 @@ def summary(content: Entry) -> Report:
     page = _begin_with_answer(content).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
         _add_file(page, entry)
-        buses = _buses(entry["feeders"])
+        buses = _group_by_bus(entry["feeders"])
         page.text(
             *(f"  {_describe_bus(entry, number, bus)}" for number, bus in enumerate(buses, 1))
         )
         if buses:
-            page.add(_loads(entry, buses))
+            page.add(_tabulate_loads(entry, buses))
         elif len(content["files"]) > 1:
             page.text(f"  {explain_unnamed(entry)}")
         _add_remarks(page, entry["feeders"])
@@ -108,7 +108,8 @@ def _add_remarks(page: Report, feeders: Sequence[Entry]) -> None:
         f"{feeder['name']}: {said}"
         for feeder in feeders
         for said in feeder["why"]
-        if said.startswith(SAME_CURRENT) or (_worth(feeder) and said.startswith(MAYBE_SAME))
+        if said.startswith(SAME_CURRENT)
+        or (_select_worthwhile(feeder) and said.startswith(MAYBE_SAME))
     ]
     page.items(alike)
     page.items(list(dict.fromkeys(said for feeder in feeders for said in feeder["said"])))
@@ -162,24 +163,24 @@ def _find_best(files: Sequence[Entry]) -> Entry | None:
     worth fitting.
     """
     feeders = [feeder for entry in files for feeder in entry["feeders"]]
-    promising = [feeder for feeder in feeders if _worth(feeder)]
+    promising = [feeder for feeder in feeders if _select_worthwhile(feeder)]
     if not promising:
         return None
     sure = [each for each in promising if not _may_be_another(each)] or promising
-    best = max(sure, key=lambda feeder: _measure_answer(_worth(feeder)[0]))
+    best = max(sure, key=lambda feeder: _measure_answer(_select_worthwhile(feeder)[0]))
     # of loads that one command fits, the one whose dip is fitted
     return next(feeder for feeder in promising if feeder["command"] == best["command"])
 
 
 def _propose(best: Entry, files: Sequence[Entry]) -> str:
     """That the first dip of a load is worth fitting, with reservations and the command."""
-    first = _worth(best)[0]
+    first = _select_worthwhile(best)[0]
     secondary = SECONDARY if best.get("secondary") else ""
-    worth = f"is worth fitting{_reservation(first['why'])}"
+    worth = f"is worth fitting{_take_reservation(first['why'])}"
     own = [entry for entry in files if best in entry["feeders"]]
     command = f"to fit it: {best['command']}" if best["command"] else ""
     told = [worth, secondary, best.get("clipped"), *_list_proposed(own), command]
-    return f"{_event(first)} of {best['name']} {'; '.join(filter(None, told))}"
+    return f"{_describe_event(first)} of {best['name']} {'; '.join(filter(None, told))}"
 
 
 def _list_proposed(files: Sequence[Entry]) -> list[str]:
@@ -207,7 +208,7 @@ def _refuse(files: Sequence[Entry]) -> str:
             f" {next(iter((*map(explain_no_event, feeders), *map(explain_unnamed, files))), '')}"
         )
     feeder, event = max(happened, key=lambda each: _measure_answer(each[1]))
-    return f"nothing is worth fitting; {_event(event)} of {feeder['name']}: {event['why']}"
+    return f"nothing is worth fitting; {_describe_event(event)} of {feeder['name']}: {event['why']}"
 
 
 def _measure_answer(event: Entry) -> float:
@@ -219,7 +220,7 @@ def _measure_answer(event: Entry) -> float:
     return 0.0 if power is None else abs(event["depth"] * power)
 
 
-def _worth(feeder: Entry) -> list[Entry]:
+def _select_worthwhile(feeder: Entry) -> list[Entry]:
     """The events that are worth fitting."""
     return [event for event in feeder["events"] if event["worth"]]
 
@@ -229,21 +230,21 @@ def _label(event: Entry) -> str:
     return event["kind"] if event["dip"] is None else f"{event['kind']} {event['dip']}"
 
 
-def _event(event: Entry) -> str:
+def _describe_event(event: Entry) -> str:
     """An event in a phrase: kind, time, depth, duration, phases."""
     fallen = name_fallen_phases(event.get("phases") or ())
     size = [f"{event['depth']:.1%}", f"{1000 * event['duration']:.0f} ms", fallen]
     return f"{_label(event)} at {starts(event, ' s')} ({', '.join(filter(None, size))})"
 
 
-def _reservation(why: str) -> str:
+def _take_reservation(why: str) -> str:
     """The first clause after the size of an event that is worth fitting: what speaks against it
     nevertheless; "" where nothing.
     """
-    return f", but {_clause(why, '; ')}" if "; " in why else ""
+    return f", but {_take_clause(why, '; ')}" if "; " in why else ""
 
 
-def _clause(why: str, after: str) -> str:
+def _take_clause(why: str, after: str) -> str:
     """The deciding clause of a sentence such as 'the voltage falls by 30 %, but P is negative
     before it: ...'.
     """
@@ -262,7 +263,7 @@ def _describe_recorder(entry: Entry) -> str:
     return f"{entry['file']}: {'; '.join(filter(None, [*about, frequency(entry)]))}"
 
 
-def _buses(feeders: Sequence[Entry]) -> list[list[Entry]]:
+def _group_by_bus(feeders: Sequence[Entry]) -> list[list[Entry]]:
     """The loads by the voltages that they have; a load without channels is alone."""
     buses: dict[Any, list[Entry]] = {}
     for k, feeder in enumerate(feeders):
@@ -275,7 +276,7 @@ def _list_shared_facts(event: Entry) -> tuple[Any, ...]:
     return event["kind"], event["start"], event["end"]
 
 
-def _common(bus: Sequence[Entry]) -> list[Entry]:
+def _find_common_events(bus: Sequence[Entry]) -> list[Entry]:
     """The events that all loads of a bus have: they happened to the voltage."""
     each = [feeder["events"] for feeder in bus if feeder["loaded"]] or [
         feeder["events"] for feeder in bus
@@ -290,14 +291,14 @@ def _list_voltage_events(bus: Sequence[Entry]) -> list[Entry]:
     Circuits that open at different instants divide one fault at different times: it is told from
     first to last.
     """
-    shared = _common(bus)
+    shared = _find_common_events(bus)
     loads = [feeder for feeder in bus if feeder["loaded"]] or bus
     rest = [event for feeder in loads for event in feeder["events"] if not _is_current_event(event)]
     told: list[Entry] = []
     for event in sorted(rest, key=lambda each: each["start"]):
-        if any(_overlap(event, other) for other in shared):
+        if any(_do_overlap(event, other) for other in shared):
             continue
-        if told and _overlap(event, told[-1]):
+        if told and _do_overlap(event, told[-1]):
             last = told.pop()
             worst, end = (
                 max(last, event, key=lambda each: abs(each["depth"])),
@@ -320,7 +321,7 @@ def _is_current_event(event: Entry) -> bool:
     return event["kind"] in (*OF_LOADS, "inrush") or abs(event["depth"]) < HYSTERESIS
 
 
-def _overlap(a: Entry, b: Entry) -> bool:
+def _do_overlap(a: Entry, b: Entry) -> bool:
     """Whether two events overlap in time."""
     return a["start"] <= b["end"] and b["start"] <= a["end"]
 
@@ -328,7 +329,7 @@ def _overlap(a: Entry, b: Entry) -> bool:
 def _describe_bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     """The voltages of a bus, their size, and what happened to them, in one line."""
     names = ", ".join(entry["channels"][k]["name"] for k in bus[0]["voltages"])
-    happened = [_event(event) for event in _list_voltage_events(bus)]
+    happened = [_describe_event(event) for event in _list_voltage_events(bus)]
     told = happened[:MOST_LINE_EVENTS]
     if len(happened) > MOST_LINE_EVENTS:
         told.append(f"{len(happened) - MOST_LINE_EVENTS} more")
@@ -340,7 +341,7 @@ def _describe_bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     return f"bus {number}: {'; '.join(parts)}"
 
 
-def _loads(entry: Entry, buses: Sequence[Sequence[Entry]]) -> Table:
+def _tabulate_loads(entry: Entry, buses: Sequence[Sequence[Entry]]) -> Table:
     """A load in each row: those without load are left out where there are others."""
     loaded = any(feeder["loaded"] for feeder in entry["feeders"])
     rows = [
@@ -349,7 +350,7 @@ def _loads(entry: Entry, buses: Sequence[Sequence[Entry]]) -> Table:
             number,
             ", ".join(map(str, feeder["currents"])),
             *(figure(feeder[key]) for key in "PQ"),
-            _describe_own_events(feeder, _common(bus)),
+            _describe_own_events(feeder, _find_common_events(bus)),
             _fit(feeder),
         ]
         for number, bus in enumerate(buses, 1)
@@ -373,13 +374,14 @@ def _fit(feeder: Entry) -> str:
     """Which of a load's dips are worth fitting, with what is to be known of the first; else what
     decides against it.
     """
-    if worth := _worth(feeder):
-        return f"yes: {', '.join(map(_label, worth))}{_reservation(worth[0]['why'])}"
+    if worth := _select_worthwhile(feeder):
+        return f"yes: {', '.join(map(_label, worth))}{_take_reservation(worth[0]['why'])}"
     if feeder["events"]:
         event = max(feeder["events"], key=_measure_answer)
-        return f"no: {_clause(event['why'], ', but ') if event['kind'] == 'dip' else event['kind']}"
+        is_dip = event["kind"] == "dip"
+        return f"no: {_take_clause(event['why'], ', but ') if is_dip else event['kind']}"
     return (
-        f"no: {_clause(explain_no_event(feeder), ', but ')}"
+        f"no: {_take_clause(explain_no_event(feeder), ', but ')}"
         if feeder["U"] is not None
         else "no: see below"
     )

@@ -35,11 +35,11 @@ def section(page: Report, choice: NextEvent) -> None:
     tells apart.
     """
     if not choice.same or len(choice.rivals) > 2:
-        page.chart(_chart(choice), _caption(choice))
+        page.chart(_chart_probability(choice), _write_caption(choice))
     page.heading("What each kind of event would do", 3)
     page.table(
         ["event", "probability [%]"],
-        [_row(t) for kind in KINDS for t in _select_surest_events(choice, kind)],
+        [_build_row(t) for kind in KINDS for t in _select_surest_events(choice, kind)],
         "Probability that all rivals but the true one are rejected, the least over all of them as"
         " the truth. The best events of each kind.",
         words=(0,),
@@ -71,7 +71,7 @@ def section(page: Report, choice: NextEvent) -> None:
     )
 
 
-def _caption(choice: NextEvent) -> str:
+def _write_caption(choice: NextEvent) -> str:
     """The caption of the chart."""
     decided = f"Dashed: the {DECIDED:.0%} from which an event is recommended as sure."
     return (
@@ -80,10 +80,10 @@ def _caption(choice: NextEvent) -> str:
     )
 
 
-def _chart(choice: NextEvent) -> Chart:
+def _chart_probability(choice: NextEvent) -> Chart:
     """Probability by depth, a line for each duration."""
     chart = Chart("depth of the dip [%]", ["probability [%]"], pixels=360)
-    plain = [t for t in choice.tried if _kind(t) == KINDS[0]]
+    plain = [t for t in choice.tried if _tell_kind(t) == KINDS[0]]
     for color, duration in zip(PALETTE, sorted({t.event.duration for t in plain}), strict=False):
         line = sorted((t.event.depth, t.least) for t in plain if t.event.duration == duration)
         x, y = 100 * np.array(line).T
@@ -91,7 +91,7 @@ def _chart(choice: NextEvent) -> Chart:
     return chart.level(100 * DECIDED).limits(0, -3, 103)
 
 
-def _kind(tried: EventTrial) -> str:
+def _tell_kind(tried: EventTrial) -> str:
     """The kind of an event that was tried."""
     event = tried.event
     if event.unbalance:
@@ -106,12 +106,12 @@ def _kind(tried: EventTrial) -> str:
 def _select_surest_events(choice: NextEvent, kind: str) -> list[EventTrial]:
     """The surest events of a kind."""
     ranked = sorted(
-        (t for t in choice.tried if _kind(t) == kind),
+        (t for t in choice.tried if _tell_kind(t) == kind),
         key=lambda t: (-t.least, t.event.burden),
     )
     return ranked[:MOST_EVENTS_A_KIND]
 
 
-def _row(tried: EventTrial) -> list[str]:
+def _build_row(tried: EventTrial) -> list[str]:
     """An event's cells."""
     return [tried.event.words, f"{100 * tried.least:.0f}"]

@@ -60,7 +60,7 @@ def _add_overlay(page: Report, overlay: Overlay, role: str, answers: Sequence[An
 
 def chart(overlay: Overlay) -> Chart:
     """One event with the curves of the models; the noise band is that of the best of them."""
-    curves = [CalculatedCurve(*model) for model in _models(overlay)]
+    curves = [CalculatedCurve(*model) for model in _list_models(overlay)]
     return event_chart(
         overlay.event,
         curves,
@@ -73,7 +73,7 @@ def chart(overlay: Overlay) -> Chart:
 
 def currents(event: WaveEvent, overlay: Overlay) -> Chart:
     """The currents of the phases, in which the noise band is that of the best of the models."""
-    curves = [Drawn(*model) for model in _models(overlay)]
+    curves = [Drawn(*model) for model in _list_models(overlay)]
     return wave_chart(
         event,
         curves,
@@ -87,7 +87,7 @@ def chart_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
     """The chart of phasors by the record's estimator, of calculated and recorded currents."""
     curves = [
         (name, measure_as_phasors(event, calculated), color, dash)
-        for name, calculated, color, dash in _models(overlay)
+        for name, calculated, color, dash in _list_models(overlay)
     ]
     return event_chart(
         curves[0][1][0],
@@ -98,7 +98,7 @@ def chart_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
     )
 
 
-def _models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:
+def _list_models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:
     """The models to draw, as (name, curves, color, dash)."""
     models = (
         ("base model", overlay.before, BASE, "solid"),

@@ -103,8 +103,10 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
         title, f"A plan for {planned.problem.model.title}, before anything more is recorded."
     )
     page.verdict(finish_sentence(str(needed)), kind="bad" if needed.depth is None else "good")
-    by_depth, *others = [_chart(planned, label, legend=label == DEPTH) for label in planned.scans]
-    page.chart(by_depth, _caption(needed))
+    by_depth, *others = [
+        _chart_halves(planned, label, legend=label == DEPTH) for label in planned.scans
+    ]
+    page.chart(by_depth, _write_caption(needed))
     _add_question_section(page, planned)
     page.heading("What another kind of dip would tell")
     page.text(
@@ -115,7 +117,7 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     page.charts(others)
     with page.fold_blocks("The same in numbers"):
         page.add(*(scan(content, label) for label in planned.scans))
-    _events(page, planned)
+    _add_best_events(page, planned)
     page.heading("What it rests on").items(
         [
             f"Intervals follow from the sensitivity of {planned.problem.domain.compared} to each"
@@ -128,7 +130,7 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     return page
 
 
-def _caption(needed: Needed) -> str:
+def _write_caption(needed: Needed) -> str:
     """The caption of the chart."""
     met = "" if needed.depth is None else ", met at the dotted line"
     return (
@@ -137,7 +139,7 @@ def _caption(needed: Needed) -> str:
     )
 
 
-def _chart(planned: Planned, label: str, legend: bool) -> Chart:
+def _chart_halves(planned: Planned, label: str, legend: bool) -> Chart:
     """Half intervals in percent against one property of the dip; the parameter asked for is drawn
     bold.
     """
@@ -196,14 +198,14 @@ def _add_question_section(page: Report, planned: Planned) -> None:
     )
     page.table(
         ["symbol", "meaning", "value", "unit", "bounds"],
-        [*_symbols(planned)],
+        [*_assign_symbols(planned)],
         caption=f"Planned at {planned.origin}. P and Q are the active and reactive power; pu is per"
         " unit of the record's own base.",
         words=(1,),
     )
 
 
-def _symbols(planned: Planned) -> Iterator[list[str]]:
+def _assign_symbols(planned: Planned) -> Iterator[list[str]]:
     """A line for every parameter, and for the inertia constant that stands for M."""
     problem = planned.problem
     values = dict(zip(problem.space.names, planned.values, strict=True)) | dict(problem.fixed)
@@ -223,7 +225,7 @@ def _symbols(planned: Planned) -> Iterator[list[str]]:
         ]
 
 
-def _events(page: Report, planned: Planned) -> None:
+def _add_best_events(page: Report, planned: Planned) -> None:
     """The best events of the archive, in the order in which they are worth fitting."""
     page.heading("Which events of the archive to fit")
     if not planned.chosen:

@@ -38,7 +38,7 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
     )
     sentences = (
         ([finish_sentence(grade)] if grade else [])
-        + [_agreement(uncertainty, drawn)]
+        + [_tell_agreement(uncertainty, drawn)]
         + ([SCATTER] if not uncertainty.exact else [])
     )
     page.verdict(
@@ -46,7 +46,7 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
         _describe_chain_length(drawn),
         kind="good" if uncertainty.exact and drawn.has_converged else "plain",
     )
-    page.charts([_chart(uncertainty, drawn, j) for j in range(len(drawn.names))])
+    page.charts([_chart_draws(uncertainty, drawn, j) for j in range(len(drawn.names))])
     page.text(CAPTION)
     page.heading("Intervals")
     page.table(
@@ -60,17 +60,17 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
         ],
         words=(1,),
     )
-    a, b = _closest(drawn)
+    a, b = _find_closest_pair(drawn)
     page.heading(f"{drawn.names[a]} and {drawn.names[b]} depend on each other most")
     r = np.corrcoef(drawn.draws[:, [a, b]].T)[0, 1]
     page.chart(
-        _pair(uncertainty, drawn, a, b),
+        _chart_pair(uncertainty, drawn, a, b),
         f"{min(DOTS, len(drawn.draws))} of the draws; their correlation is {r:+.2f}.",
     )
     return page
 
 
-def _agreement(uncertainty: Uncertainty, drawn: PosteriorSample) -> str:
+def _tell_agreement(uncertainty: Uncertainty, drawn: PosteriorSample) -> str:
     """Whose intervals the posterior confirms."""
     off = np.abs(drawn.intervals - uncertainty.intervals).max(axis=1) / np.maximum(
         np.ptp(uncertainty.intervals, axis=1) / 2, 1e-300
@@ -96,7 +96,7 @@ def _describe_chain_length(drawn: PosteriorSample) -> str:
     )
 
 
-def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
+def _chart_draws(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
     """A parameter's draws as a histogram, with both intervals."""
     draws, value, half = drawn.draws[:, j], uncertainty.values[j], uncertainty.half[j]
     low, high = drawn.intervals[j]
@@ -114,7 +114,7 @@ def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
     return chart.edge(float(value), ACTIVE).limits(None, edges[0], edges[-1])
 
 
-def _closest(drawn: PosteriorSample) -> tuple[int, int]:
+def _find_closest_pair(drawn: PosteriorSample) -> tuple[int, int]:
     """The two parameters that go together most."""
     r = np.abs(np.atleast_2d(np.corrcoef(drawn.draws.T)))
     np.fill_diagonal(r, -1.0)
@@ -122,7 +122,7 @@ def _closest(drawn: PosteriorSample) -> tuple[int, int]:
     return int(min(a, b)), int(max(a, b))
 
 
-def _pair(uncertainty: Uncertainty, drawn: PosteriorSample, a: int, b: int) -> Chart:
+def _chart_pair(uncertainty: Uncertainty, drawn: PosteriorSample, a: int, b: int) -> Chart:
     """Draws of two parameters."""
     some = drawn.draws[:: max(1, len(drawn.draws) // DOTS)][:DOTS]
     chart = Chart(

@@ -36,7 +36,7 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
         page.text("No set has a steady state and survives the held-out events.")
         return
     page.chart(
-        _bars(findings, rows),
+        _chart_errors(findings, rows),
         "The model's error on the held-out events, in percent of the response, with the sets that"
         " predict them best (green: added, orange: tied with it, gray: the base model). All were"
         " fitted to the other events by least squares. Dashed: what a name, or each of the best"
@@ -49,13 +49,13 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
             [
                 _label(findings, row),
                 in_percent(row.held_out_prediction.error),
-                _number(
+                _format_factor(
                     np.sqrt(
                         evidence.base.held_out_prediction.excess / row.held_out_prediction.excess
                     )
                 ),
-                _status(findings, row),
-                "; ".join(map(str, _sizes(findings, row))),
+                _tell_status(findings, row),
+                "; ".join(map(str, _tell_sizes(findings, row))),
             ]
             for row in rows
         ],
@@ -67,7 +67,7 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
     )
 
 
-def _number(factor: float) -> str:
+def _format_factor(factor: float) -> str:
     """By what a set divides the base model's error; nothing where that has no size."""
     return f"{factor:.2f}" if np.isfinite(factor) else ""
 
@@ -92,7 +92,7 @@ def _label(findings: Findings, row: SetEvidence) -> str:
     return join_words(row.names) or "the base model"
 
 
-def _bars(findings: Findings, rows: Sequence[SetEvidence]) -> Chart:
+def _chart_errors(findings: Findings, rows: Sequence[SetEvidence]) -> Chart:
     """The error that each set leaves of the held-out events."""
     errors = [100 * row.held_out_prediction.error for row in rows]
     chart = Chart("model error, not fitted [%]", [""], pixels=130 + BAR * len(rows))
@@ -116,7 +116,7 @@ def _color(findings: Findings, row: SetEvidence) -> str:
     return TIED if row in findings.verdict.kept else OTHER
 
 
-def _status(findings: Findings, row: SetEvidence) -> str:
+def _tell_status(findings: Findings, row: SetEvidence) -> str:
     """A set's place in the verdict, in words."""
     if row is findings.evidence.base:
         return ""
@@ -127,7 +127,7 @@ def _status(findings: Findings, row: SetEvidence) -> str:
     return "not named"
 
 
-def _sizes(findings: Findings, row: SetEvidence) -> list[ParameterEstimate]:
+def _tell_sizes(findings: Findings, row: SetEvidence) -> list[ParameterEstimate]:
     """How large its effects are, with standard errors where they were reckoned."""
     if row is findings.evidence.term:
         return []

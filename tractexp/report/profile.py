@@ -57,10 +57,10 @@ def report(scan: Profiles, grade: str = "") -> Report:
         *graded,
         *sentences,
         *(finish_sentence(note) for note in scan.notes),
-        kind=_kind(verdicts, uncertainty.exact),
+        kind=_choose_kind(verdicts, uncertainty.exact),
     )
     titles = {name: f"{name}: {verdict.word}" for name, verdict in verdicts.items()}
-    page.charts([_chart(scan, profile, titles[profile.name]) for profile in scan.profiles])
+    page.charts([_chart_profile(scan, profile, titles[profile.name]) for profile in scan.profiles])
     page.text(CAPTION.format(threshold=scan.threshold))
     page.heading("Intervals")
     page.table(
@@ -73,7 +73,7 @@ def report(scan: Profiles, grade: str = "") -> Report:
             "95 % by profile",
             "what the profile says",
         ],
-        [_row(scan, profile, says[profile.name]) for profile in scan.profiles],
+        [_build_row(scan, profile, says[profile.name]) for profile in scan.profiles],
         words=(1, 6),
     )
     page.heading("What it rests on").items(
@@ -87,9 +87,9 @@ def report(scan: Profiles, grade: str = "") -> Report:
     return page
 
 
-def _row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[str]:
+def _build_row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[str]:
     """A profile's cells: value, both intervals, verdict."""
-    value, half = _curvature(scan, profile.name)
+    value, half = _compute_curvature(scan, profile.name)
     about = find_declared_parameter(scan.uncertainty, profile.name)
     by_curvature = span(value - half, value + half) if np.isfinite(half) else "none"
     return [
@@ -133,7 +133,7 @@ def _name_sides(profile: LikelihoodProfile, how: End) -> list[str]:
 
 def _compare_half_widths(scan: Profiles, profile: LikelihoodProfile) -> str:
     """Both sides closed, one minimum: whether ± half is enough."""
-    (low, high), (value, half) = profile.interval, _curvature(scan, profile.name)
+    (low, high), (value, half) = profile.interval, _compute_curvature(scan, profile.name)
     if not np.isfinite(half):
         return "the curvature gives no interval, the profile does"
     off = np.array([low - (value - half), high - (value + half)]) / half
@@ -167,7 +167,7 @@ def _explain_curvature(says: Mapping[str, str]) -> list[str]:
     return sentences
 
 
-def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
+def _choose_kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
     """ "good" where every parameter is identified, else "plain"."""
     return (
         "good"
@@ -186,15 +186,15 @@ def _list_unidentified(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
     return [finish_sentence("; ".join(poor)) if poor else "Every parameter is identified."]
 
 
-def _curvature(scan: Profiles, name: str) -> tuple[float, float]:
+def _compute_curvature(scan: Profiles, name: str) -> tuple[float, float]:
     """Estimate and half of the interval by curvature."""
     j = scan.uncertainty.names.index(name)
     return float(scan.uncertainty.values[j]), float(scan.uncertainty.half[j])
 
 
-def _chart(scan: Profiles, profile: LikelihoodProfile, title: str) -> Chart:
+def _chart_profile(scan: Profiles, profile: LikelihoodProfile, title: str) -> Chart:
     """One profile, with the parabola, the threshold, the interval and the estimate."""
-    value, half = _curvature(scan, profile.name)
+    value, half = _compute_curvature(scan, profile.name)
     top = ABOVE * scan.threshold
     x, y = _smooth(profile)
     chart = Chart(
@@ -209,12 +209,12 @@ def _chart(scan: Profiles, profile: LikelihoodProfile, title: str) -> Chart:
     chart.line("profile", x, y, CURVE).points("", profile.values, profile.deviance, CURVE, size=4)
     chart.points("", [value], [0.0], ACTIVE, size=9, hover=[f"estimate {value:.5g}"])
     chart.level(scan.threshold).ticks(
-        0, [0.0, scan.threshold, 2 * scan.threshold], _marks(scan.threshold)
+        0, [0.0, scan.threshold, 2 * scan.threshold], _label_marks(scan.threshold)
     )
     return chart.limits(0, -BELOW * scan.threshold, top).limits(None, x.min(), x.max())
 
 
-def _marks(threshold: float) -> list[str]:
+def _label_marks(threshold: float) -> list[str]:
     """Labels of a profile's axis: the threshold's multiples."""
     return [f"{times * threshold:.2f}".rstrip("0").rstrip(".") for times in range(3)]
 

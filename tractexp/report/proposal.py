@@ -55,10 +55,10 @@ def add_proposal_section(page: Report, findings: Findings) -> None:
             "It is not a function of the voltage: something happened by itself, and need not happen"
             " again."
         )
-    _numbers(page, proposal)
+    _add_numbers(page, proposal)
     _add_explanation(page, proposal)
     _plot_term(page, proposal)
-    _rivals(page, proposal)
+    _add_rivals(page, proposal)
     page.text(
         f"The file {PLUGIN} beside this page is the term as an effect. In that folder, this makes a"
         " package of it, and says how it is tested, installed and chosen:"
@@ -69,7 +69,7 @@ def add_proposal_section(page: Report, findings: Findings) -> None:
     _add_tried_terms(page, findings.proposed.tried)
 
 
-def _numbers(page: Report, proposal: Proposal) -> None:
+def _add_numbers(page: Report, proposal: Proposal) -> None:
     """Add the term's parameters."""
     rows = [
         [
@@ -158,7 +158,7 @@ def _plot_missed_part(judged: GapTest, e: int) -> Chart:
     return chart
 
 
-def _rivals(page: Report, proposal: Proposal) -> None:
+def _add_rivals(page: Report, proposal: Proposal) -> None:
     """Add the terms that cannot be told from it."""
     if proposal.ties:
         page.table(

@@ -74,7 +74,7 @@ def tabulate_loads(content: Mapping[str, Any]) -> Table:
             load["usability"],
             _tell_share(load),
             tell_error(load["error"]),
-            _percent(load["predicted"]["last_half"]),
+            _format_percent(load["predicted"]["last_half"]),
         ]
         for load in content["loads"]
         if "why" not in load
@@ -91,7 +91,7 @@ def _tell_share(load: Mapping[str, Any]) -> str:
     return f"{share['value']:.0%} ± {share['spread']:.1%}"
 
 
-def _percent(value: float | None) -> str:
+def _format_percent(value: float | None) -> str:
     return "" if value is None else in_percent(value)
 
 
@@ -209,7 +209,7 @@ def _tabulate_constants(load: Mapping[str, Any]) -> Table:
             row["value"],
             row["unit"],
             "{:.4g} .. {:.4g}".format(row["low"], row["high"]) if row["low"] is not None else "",
-            _percent(row["spread"]),
+            _format_percent(row["spread"]),
         ]
         for row in load["constants"]
     ]
@@ -241,8 +241,8 @@ def _tabulate_events(load: Mapping[str, Any]) -> Table:
             event["P"],
             f"{event['share']:.1%}",
             f"{event['low']:.1%} .. {event['high']:.1%}",
-            _percent(event["error"]),
-            _percent(event["predicted"]),
+            _format_percent(event["error"]),
+            _format_percent(event["predicted"]),
             "left out" if event["odd"] else "",
         ]
         for event in load["events"]
@@ -266,7 +266,7 @@ def _draw_years(load: Mapping[str, Any]) -> Chart:
     over the years; by the dip's number where times are not known, or span less than a year.
     """
     events = load["events"]
-    years = np.array([_year(each["when"]) if each["when"] else np.nan for each in events])
+    years = np.array([_compute_year(each["when"]) if each["when"] else np.nan for each in events])
     dated = bool(np.ptp(years) > LEAST_DATED_SPAN)  # nan is not
     x = years if dated else np.arange(1, len(events) + 1)
     label = "year" if dated else "dip, by its number"
@@ -335,7 +335,7 @@ def find_limits(errors: Sequence[float | None], odd: np.ndarray) -> np.ndarray:
     return limits
 
 
-def _year(when: str) -> float:
+def _compute_year(when: str) -> float:
     """A moment as a year with its fraction."""
     moment = datetime.fromisoformat(when)
     return moment.year + (moment.timetuple().tm_yday - 1 + moment.hour / 24) / DAYS_A_YEAR

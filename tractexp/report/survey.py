@@ -101,7 +101,7 @@ def report(content: Mapping[str, Any]) -> Report:
     return page.add(
         Markup(
             f"<style>{looks}</style>{SIEVE}<div"
-            f' class="wide"><table><thead><tr>{_heads()}</tr></thead>'
+            f' class="wide"><table><thead><tr>{_list_heads()}</tr></thead>'
             '<tbody id="body"></tbody></table></div><p><button id="more">more rows</button></p>'
             "<noscript><p>The table needs JavaScript; survey.csv holds the same"
             " rows.</p></noscript>"
@@ -119,7 +119,7 @@ SIEVE = (
 )
 
 
-def _heads() -> str:
+def _list_heads() -> str:
     """The table's heads."""
     heads = []
     for key, label, kind, _ in COLUMNS:

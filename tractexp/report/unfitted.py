@@ -36,10 +36,10 @@ def sentences(files: Sequence[Mapping[str, Any]]) -> list[str]:
     events = itertools.chain.from_iterable(feeder["events"] for feeder in feeders)
     if not loads or any(event["worth"] for event in events):
         return []
-    return [*itertools.chain.from_iterable(map(_exponents, loads)), DIPS, AMBIENT]
+    return [*itertools.chain.from_iterable(map(_list_exponents, loads)), DIPS, AMBIENT]
 
 
-def _exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
+def _list_exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
     """The static exponents that each lasting change of the voltage tells of a load."""
     for event in feeder["events"]:
         ratio = 1 - event["depth"]

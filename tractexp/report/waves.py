@@ -77,11 +77,11 @@ def wave_chart(
     )
     colors = style.PHASES if event.phases > 1 else (style.VOLTAGE,)
     for name, u, color in zip(
-        names, event.of_phases(_voltage(event))[:, part], colors, strict=False
+        names, event.of_phases(_stack_voltage(event))[:, part], colors, strict=False
     ):
         chart.samples(f"phase {name}" if name else "voltage", start, step, u, color)
     if deviation is not None and around is not None:
-        _noise_bands(chart, event, deviation, around)
+        _add_noise_bands(chart, event, deviation, around)
     for first, last in _merge_intervals(places):
         chart.shade(first, last, EXCESS, 1 + event.phases, "more than chance leaves", opacity=0.2)
     for k in range(event.phases):
@@ -119,7 +119,9 @@ def _show_units(
     chart.units(labels, [factor for _, factor in units])
 
 
-def _noise_bands(chart: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray) -> None:
+def _add_noise_bands(
+    chart: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray
+) -> None:
     """Where noise alone would let a sample lie: about each phase's current and, the widest of them,
     about zero.
     """
@@ -146,7 +148,7 @@ def _merge_intervals(places: Sequence[Any]) -> list[tuple[float, float]]:
     return covered
 
 
-def _voltage(event: WaveEvent) -> np.ndarray:
+def _stack_voltage(event: WaveEvent) -> np.ndarray:
     """The recorded voltage (3, N) in the stationary frame: alpha, beta and zero [pu]."""
     v = event.v * event.turn
     return np.stack([v.real, v.imag, event.v_zero])

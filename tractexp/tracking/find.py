@@ -83,7 +83,9 @@ def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
 def _read_logged_run(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> Logged:
     """A run as it was logged, with the curves asked for."""
     read = {
-        name: _curve(client, run.info.run_id, name) for name in curves if name in run.data.metrics
+        name: _read_curve(client, run.info.run_id, name)
+        for name in curves
+        if name in run.data.metrics
     }
     return Logged(
         run.info.run_id,
@@ -94,11 +96,11 @@ def _read_logged_run(client: Any, run: Any, experiment: str, curves: tuple[str, 
         dict(run.data.metrics),
         dict(run.data.tags),
         read,
-        _files(client, run.info.run_id),
+        _find_files(client, run.info.run_id),
     )
 
 
-def _files(client: Any, run_id: str) -> dict[str, str]:
+def _find_files(client: Any, run_id: str) -> dict[str, str]:
     """Artifacts lie by absolute path, so those of a folder that was moved are missing."""
     from mlflow.exceptions import MlflowException
 
@@ -112,7 +114,7 @@ def _files(client: Any, run_id: str) -> dict[str, str]:
     return texts
 
 
-def _curve(client: Any, run_id: str, name: str) -> tuple[np.ndarray, np.ndarray]:
+def _read_curve(client: Any, run_id: str, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Steps and values of a metric, in order."""
     points = np.array(
         [(m.step, m.value) for m in client.get_metric_history(run_id, name)], dtype=float

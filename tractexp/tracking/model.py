@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 RESULT = "result.json"
 
 
-def _columns(*names: str, optional: str = "") -> str:
+def _list_columns(*names: str, optional: str = "") -> str:
     """Columns of numbers as MLflow's format of models lists them."""
     return json.dumps(
         [{"type": "double", "name": name, "required": name != optional} for name in names]
@@ -30,8 +30,8 @@ def _columns(*names: str, optional: str = "") -> str:
 
 
 SIGNATURE = {
-    "inputs": _columns("t", "U", "f", optional="f"),
-    "outputs": _columns("P", "Q"),
+    "inputs": _list_columns("t", "U", "f", optional="f"),
+    "outputs": _list_columns("P", "Q"),
     "params": None,
 }
 

@@ -97,11 +97,11 @@ def flatten(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
         if isinstance(value, Mapping):
             flat |= flatten(value, f"{prefix}{key}.")
         else:
-            flat[f"{prefix}{key}"] = _text(value)
+            flat[f"{prefix}{key}"] = _shorten_text(value)
     return flat
 
 
-def _text(value: Any) -> str:
+def _shorten_text(value: Any) -> str:
     """A value as MLflow stores a parameter."""
     if isinstance(value, str):
         return value
@@ -154,9 +154,9 @@ def log(run: TrackedRun, uri: str, *, again: bool = False) -> str:
     run.check()
     client = open_store(uri)
     with sentences(uri):
-        if again and (whole := _whole_run(client, run)):
+        if again and (whole := _find_whole_run(client, run)):
             return whole
-        run_id, ended = _create(client, run, uri), _milliseconds(run.ended)
+        run_id, ended = _create(client, run, uri), _count_milliseconds(run.ended)
         try:
             _write(client, run_id, run)
             for child in run.children:
@@ -169,7 +169,7 @@ def log(run: TrackedRun, uri: str, *, again: bool = False) -> str:
     return run_id
 
 
-def _whole_run(client: Any, run: TrackedRun) -> str:
+def _find_whole_run(client: Any, run: TrackedRun) -> str:
     """The run of this key where the store has it whole, else ""; the rest of an earlier attempt is
     deleted.
     """
@@ -269,7 +269,7 @@ def tag_experiment(experiment: str, tags: Mapping[str, str], uri: str) -> str:
     """
     client = open_store(uri)
     with sentences(uri):
-        experiment_id = _experiment(client, experiment, uri)
+        experiment_id = _get_experiment(client, experiment, uri)
         for key, value in tags.items():
             client.set_experiment_tag(experiment_id, key, value)
     return experiment_id
@@ -278,7 +278,7 @@ def tag_experiment(experiment: str, tags: Mapping[str, str], uri: str) -> str:
 def _create(client: Any, run: TrackedRun, uri: str) -> str:
     """Create a run with its tags; its id."""
     tags = {
-        "mlflow.user": _user(),
+        "mlflow.user": _find_user(),
         "mlflow.source.name": "tractexp",
         "mlflow.source.type": "LOCAL",
         "mlflow.source.git.commit": provenance.find_commit(),
@@ -290,9 +290,9 @@ def _create(client: Any, run: TrackedRun, uri: str) -> str:
     tags = {key: value for key, value in tags.items() if value} | {
         k: str(v) for k, v in run.tags.items()
     }
-    started = _milliseconds(run.ended) - round(1000 * run.seconds)
+    started = _count_milliseconds(run.ended) - round(1000 * run.seconds)
     return client.create_run(
-        _experiment(client, run.experiment, uri), started, tags, run.name
+        _get_experiment(client, run.experiment, uri), started, tags, run.name
     ).info.run_id
 
 
@@ -300,7 +300,7 @@ def _write(client: Any, run_id: str, run: TrackedRun) -> None:
     """Write parameters, metrics and curves of a run."""
     from mlflow.entities import Metric, Param
 
-    now = _milliseconds(run.ended)
+    now = _count_milliseconds(run.ended)
     points = [(name, value, 0) for name, value in run.metrics.items() if not math.isinf(value)]
     for name, (steps, values) in run.curves.items():
         points += [(name, values[i], steps[i]) for i in choose_curve_points(len(steps))]
@@ -309,9 +309,13 @@ def _write(client: Any, run_id: str, run: TrackedRun) -> None:
         Metric(name, float(value), now, int(step), **of_model.get(name, {}))
         for name, value, step in points
     ]
-    parameters = [Param(key, _text(value)[:VALUE_LENGTH]) for key, value in run.parameters.items()]
+    parameters = [
+        Param(key, _shorten_text(value)[:VALUE_LENGTH]) for key, value in run.parameters.items()
+    ]
     chunks = zip_longest(
-        _chunks(metrics, BATCH_METRICS), _chunks(parameters, BATCH_PARAMETERS), fillvalue=[]
+        _cut_in_chunks(metrics, BATCH_METRICS),
+        _cut_in_chunks(parameters, BATCH_PARAMETERS),
+        fillvalue=[],
     )
     for some_metrics, some_parameters in chunks:
         client.log_batch(run_id, some_metrics, some_parameters)
@@ -323,14 +327,14 @@ def _log_inputs_and_model(client: Any, run_id: str, run: TrackedRun) -> dict[str
     """Log what a run has read and the model that it has made; by the names of the metrics that are
     the model's, whose they are and, where one record was fitted, of what.
     """
-    inputs = [_input(record) for record in run.records]
+    inputs = [_describe_input(record) for record in run.records]
     if inputs:
         _log_inputs(client, run_id, inputs)
     if run.model is None:
         return {}
     from tractexp.tracking.model import log_model
 
-    parameters = {k: _text(v) for k, v in run.parameters.items() if k.startswith("model.")}
+    parameters = {k: _shorten_text(v) for k, v in run.parameters.items() if k.startswith("model.")}
     whose = {"model_id": log_model(client, run_id, run.model, parameters, run.description)}
     fitted = [one.dataset for one in inputs if one.tags[0].value == FITTED]
     if len(fitted) == 1:
@@ -350,7 +354,7 @@ def _log_inputs(client: Any, run_id: str, datasets: list[Any]) -> None:
         client.log_inputs(run_id, datasets=datasets)
 
 
-def _input(record: Mapping[str, str]) -> Any:
+def _describe_input(record: Mapping[str, str]) -> Any:
     """One record as MLflow lists what a run has read: its digest is the SHA-256 of its channels,
     shortened.
     """
@@ -361,12 +365,12 @@ def _input(record: Mapping[str, str]) -> Any:
     return DatasetInput(dataset, [InputTag("mlflow.data.context", record["role"])])
 
 
-def _chunks(items: list[Any], size: int) -> list[list[Any]]:
+def _cut_in_chunks(items: list[Any], size: int) -> list[list[Any]]:
     """Items in lists of at most `size`."""
     return [items[i : i + size] for i in range(0, len(items), size)]
 
 
-def _experiment(client: Any, name: str, uri: str) -> str:
+def _get_experiment(client: Any, name: str, uri: str) -> str:
     """The id of the experiment `name`, created if need be; artifacts lie beside the database
     wherever this runs.
     """
@@ -401,12 +405,12 @@ def _create_experiment(client: Any, name: str, location: str | None) -> str:
     return experiment_id
 
 
-def _milliseconds(time_of: float | None = None) -> int:
+def _count_milliseconds(time_of: float | None = None) -> int:
     """A time, by default now, as MLflow counts it."""
     return round(1000 * (time.time() if time_of is None else time_of))
 
 
-def _user() -> str:
+def _find_user() -> str:
     """Who runs this; "" where the system does not know."""
     try:
         return getpass.getuser()

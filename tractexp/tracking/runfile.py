@@ -101,7 +101,7 @@ def read(folder: Path) -> RunFile | None:
     settle(folder)
     try:
         content = files.read_json(path)
-        uri, run_id = _texts(content, "uri", "run_id")
+        uri, run_id = _check_texts(content, "uri", "run_id")
         return RunFile(
             folder, _read_run(content["run"], folder), uri, run_id, bool(content["sweep"])
         )
@@ -129,9 +129,9 @@ def _describe_run(run: TrackedRun, folder: Path) -> dict[str, Any]:
     content["parameters"] = flatten(run.parameters)
     content["metrics"] = {name: float(value) for name, value in run.metrics.items()}
     content["curves"] = {name: _thin(*curve) for name, curve in run.curves.items()}
-    content["artifacts"] = [_relative(path, folder) for path in run.artifacts]
+    content["artifacts"] = [_make_relative(path, folder) for path in run.artifacts]
     content["model_metrics"] = list(run.model_metrics)
-    content["model"] = None if run.model is None else _relative(run.model, folder)
+    content["model"] = None if run.model is None else _make_relative(run.model, folder)
     content["records"] = [dict(record) for record in run.records]
     content["children"] = [_describe_run(child, folder) for child in run.children]
     return content
@@ -143,7 +143,7 @@ def _thin(steps: Line, values: Line) -> list[list[float]]:
     return [[float(line[k]) for k in points] for line in (steps, values)]
 
 
-def _relative(path: Path, folder: Path) -> str:
+def _make_relative(path: Path, folder: Path) -> str:
     """A path as it is called within a folder, else whole."""
     path = Path(path).absolute()
     return (
@@ -153,7 +153,7 @@ def _relative(path: Path, folder: Path) -> str:
     )
 
 
-def _texts(content: Mapping[str, Any], *names: str) -> list[str]:
+def _check_texts(content: Mapping[str, Any], *names: str) -> list[str]:
     """Entries that are texts; raises `TypeError` where one is none."""
     for name in names:
         if not isinstance(content[name], str):
@@ -164,7 +164,7 @@ def _texts(content: Mapping[str, Any], *names: str) -> list[str]:
 def _read_run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
     """The run that a file holds. Raises ValueError for what no run has."""
     content = {"model_metrics": [], **content}  # which earlier versions did not write
-    key, *_ = _texts(content, "key", "experiment", "name", "status", "description")
+    key, *_ = _check_texts(content, "key", "experiment", "name", "status", "description")
     if not KEY.fullmatch(key):
         raise ValueError(f"its key is {key!r:.60}")
     _check_shapes(content)

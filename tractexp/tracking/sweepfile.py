@@ -22,15 +22,15 @@ def folder_of(job: Path) -> Path:
 
 def parent_of(folder: Path) -> str | None:
     """The run id of the sweep in `folder`; None where it is not logged."""
-    return _content(folder).get("run")
+    return _read_content(folder).get("run")
 
 
 def waits(folder: Path) -> bool:
     """Whether the run of the sweep in `folder` is still to be logged: its jobs then wait, too."""
-    return "run" in (content := _content(folder)) and content["run"] is None
+    return "run" in (content := _read_content(folder)) and content["run"] is None
 
 
-def _content(folder: Path) -> dict[str, Any]:
+def _read_content(folder: Path) -> dict[str, Any]:
     """The content of the file of a sweep's folder; {} where it is none of ours."""
     try:
         content = files.read_json(folder / FILE, files.CONFIGURATION)

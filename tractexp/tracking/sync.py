@@ -159,7 +159,7 @@ def _send(one: RunFile, uri: str) -> str:
     if run_there is not None and run_there.info.lifecycle_stage == "deleted":
         return DELETED
     if one.sweep:
-        return _sweep(one, run_there, uri)
+        return _find_sweep_run(one, run_there, uri)
     if run_there is not None and run_there.info.status == one.run.status:
         _link_to_sweep(client, uri, run_there, one.run.parent)
         return THERE
@@ -178,7 +178,7 @@ def _is_same_run(one: RunFile, run_there: Any) -> bool:
     return tags.get(KEY) == one.run.key
 
 
-def _sweep(one: RunFile, run_there: Any, uri: str) -> str:
+def _find_sweep_run(one: RunFile, run_there: Any, uri: str) -> str:
     """The run of a sweep: it keeps its id where the store has it, for its jobs point to it."""
     if run_there is not None and run_there.info.status == one.run.status:
         return THERE

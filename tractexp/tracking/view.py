@@ -69,10 +69,10 @@ def _plot_comparison(metric_x: str, metric_y: str) -> dict[str, Any]:
         axis: {"key": key, "type": "METRIC"}
         for axis, key in (("xaxis", metric_x), ("yaxis", metric_y))
     }
-    return _chart("SCATTER", f"{metric_y} by {metric_x}", **axes)
+    return _describe_chart("SCATTER", f"{metric_y} by {metric_x}", **axes)
 
 
-def _chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
+def _describe_chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
     """A chart of a metric on MLflow's page of runs."""
     return {
         "type": kind,
@@ -93,7 +93,7 @@ def _list_charts() -> list[dict[str, Any]]:
     where searches ended, and what they cost.
     """
     curves = [
-        _chart(
+        _describe_chart(
             "LINE",
             metric,
             selectedMetricKeys=[metric],
@@ -102,7 +102,7 @@ def _list_charts() -> list[dict[str, Any]]:
         for metric, scale in (("fitness_by_simulations", "log"), ("fitness", "linear"))
     ]
     points = [
-        _chart(
+        _describe_chart(
             "LINE",
             metric,
             selectedMetricKeys=[metric],
@@ -113,13 +113,13 @@ def _list_charts() -> list[dict[str, Any]]:
     ]
     ends = _plot_comparison("search_simulations", "search_objective")
     costs = [
-        _chart("BAR", metric, dataAccessKey=metric)
+        _describe_chart("BAR", metric, dataAccessKey=metric)
         for metric in ("search_simulations", "search_seconds")
     ]
     return [*curves, *points, ends, *costs]
 
 
-def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
+def _build_state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     """The view of runs with these tags: one closed group for each variant, the fitness curves
     first.
 
@@ -205,7 +205,7 @@ def comparison_view(uri: str) -> str:
         runs = client.search_runs(
             [experiment_id], RUNS, max_results=1000, order_by=["start_time DESC"]
         )
-    state = _state([run.data.tags for run in runs])
+    state = _build_state([run.data.tags for run in runs])
     tag_experiment(names[experiment_id], {TAG: _pack_view(state)}, uri)
     return page(experiment_id, state["compareRunsMode"])
 
