@@ -342,14 +342,14 @@ class Chart:
                 "xref": "x",
                 "x0": start,
                 "x1": end,
-                **_measure_height(panel),
+                **_span_height(panel),
                 "fillcolor": color,
                 "opacity": opacity,
                 "line": {"width": 0},
                 "layer": "below",
             }
         )
-        self._note(text, _measure_height(panel)["yref"], x=start, y=1, bgcolor="#ffffffcc")
+        self._note(text, _span_height(panel)["yref"], x=start, y=1, bgcolor="#ffffffcc")
         if name and name not in self._in_legend:
             square = {
                 "color": color,
@@ -379,10 +379,10 @@ class Chart:
         """A vertical line, in one panel or through all, with a `text` below the panel
         (the first).
         """
-        self._note(text, _measure_height(panel or 0)["yref"], color, x=x, y=0)
+        self._note(text, _span_height(panel or 0)["yref"], color, x=x, y=0)
         line = {"color": color, "width": 1, "dash": dash}
         self._shapes.append(
-            {"type": "line", "xref": "x", "x0": x, "x1": x, **_measure_height(panel), "line": line}
+            {"type": "line", "xref": "x", "x0": x, "x1": x, **_span_height(panel), "line": line}
         )
         return self
 
@@ -549,7 +549,7 @@ def _name_axis(letter: str, panel: int) -> str:
     return letter + (str(panel + 1) if panel else "")
 
 
-def _measure_height(panel: int | None) -> dict[str, Any]:
+def _span_height(panel: int | None) -> dict[str, Any]:
     """All of a panel, or of the chart."""
     return {
         "yref": "paper" if panel is None else f"{_name_axis('y', panel)} domain",

@@ -143,27 +143,33 @@ def spell_marks(name: str, letters: str) -> tuple[str, bool]:
     bool
         Whether the name says that it is to ground.
     """
+    name = _say_phases_plainly(name, letters)
+    text = name.translate(CYRILLIC)
+    marks = (_find_mark(text, order) for order in (letters, DIGITS))
+    mark = next((mark for mark in marks if mark is not None), None)
+    if mark is None:
+        return name, False
+    begin = mark.begin
+    has_line_letter = re.search(rf"(?:(?<![a-z])|(?<=(?<![a-z])[{QUANTITY}pq]))l$", text[:begin])
+    if has_line_letter:  # the L of L1
+        begin -= 1
+    head = name[:begin]
+    if re.search(r"(?<![a-z])e$", text[:begin]):  # E is a voltage
+        head = f"{head[:-1]}u"
+    glue = "" if head[-1:].isascii() else " "
+    return f"{head}{glue}{mark.letters} {name[mark.end :]}", mark.ground
+
+
+def _say_phases_plainly(name: str, letters: str) -> str:
+    """A name in small letters, with "phase" where any language or standard says so before or after
+    a mark.
+    """
     name = unicodedata.normalize("NFKC", name).strip().lower()
     for pattern, word in SAID:
         name = re.sub(pattern, word, name)
     one = f"[{letters.lower()}{letters.lower().translate(LATIN)}123]"
     name = re.sub(rf"({PHASE})(?=[-_ ]?l?{one}(?![{LETTER}\d]))", " phase ", name)
-    name = re.sub(rf"(?<![a-z\d])(l?{one})\s*相", r" phase \1 ", name)
-    text = name.translate(CYRILLIC)
-    for order in (letters, DIGITS):
-        mark = _find_mark(text, order)
-        if mark is not None:
-            begin = mark.begin
-            if re.search(rf"(?:(?<![a-z])|(?<=(?<![a-z])[{QUANTITY}pq]))l$", text[:begin]):
-                begin -= 1
-            head = (
-                f"{name[: begin - 1]}u"
-                if re.search(r"(?<![a-z])e$", text[:begin])
-                else name[:begin]
-            )  # E is a voltage
-            glue = "" if head[-1:].isascii() else " "
-            return f"{head}{glue}{mark.letters} {name[mark.end :]}", mark.ground
-    return name, False
+    return re.sub(rf"(?<![a-z\d])(l?{one})\s*相", r" phase \1 ", name)
 
 
 def _find_mark(text: str, letters: str) -> PhaseMark | None:

@@ -31,8 +31,10 @@ BAR_ROOM = 1.2  # of the longest bar, for what stands beside the bars
 MOST_SETS = 12  # that are compared in a table
 
 
-def candidates(page: Report, findings: Findings) -> None:
-    """By the deviance that each lowers, or where names go by the model's error, by that."""
+def add_candidates(page: Report, findings: Findings) -> None:
+    """Add the table and the chart of all candidates: by the deviance that each lowers, or where
+    names go by the model's error, by that.
+    """
     if findings.evidence.is_predicted:
         return add_prediction_section(page, findings)
     rows = list_candidates(findings)

@@ -18,7 +18,7 @@ from tractexp.discrepancy.recommend import recommendation
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.inference.model_error import in_percent, tell_error
 from tractexp.record.identity import Identity, describe_identities, title
-from tractexp.report.candidates import candidates
+from tractexp.report.candidates import add_candidates
 from tractexp.report.disagreement import noise, places
 from tractexp.report.explained import answer_clicks
 from tractexp.report.extended import equations, interval, laws, parameters, value
@@ -184,7 +184,7 @@ def report(
         page.heading("What to record next").text(finish_sentence(chosen.sentence()))
         section(page, chosen)
     laws(page, findings)
-    candidates(page, findings)
+    add_candidates(page, findings)
     parameters(page, findings)
     if findings.names:
         equations(page, findings)

@@ -198,14 +198,14 @@ def _add_question_section(page: Report, planned: Planned) -> None:
     )
     page.table(
         ["symbol", "meaning", "value", "unit", "bounds"],
-        [*_assign_symbols(planned)],
+        [*_list_parameters(planned)],
         caption=f"Planned at {planned.origin}. P and Q are the active and reactive power; pu is per"
         " unit of the record's own base.",
         words=(1,),
     )
 
 
-def _assign_symbols(planned: Planned) -> Iterator[list[str]]:
+def _list_parameters(planned: Planned) -> Iterator[list[str]]:
     """A line for every parameter, and for the inertia constant that stands for M."""
     problem = planned.problem
     values = dict(zip(problem.space.names, planned.values, strict=True)) | dict(problem.fixed)

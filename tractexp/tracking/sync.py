@@ -159,7 +159,7 @@ def _send(one: RunFile, uri: str) -> str:
     if run_there is not None and run_there.info.lifecycle_stage == "deleted":
         return DELETED
     if one.sweep:
-        return _find_sweep_run(one, run_there, uri)
+        return _log_sweep_run(one, run_there, uri)
     if run_there is not None and run_there.info.status == one.run.status:
         _link_to_sweep(client, uri, run_there, one.run.parent)
         return THERE
@@ -178,8 +178,10 @@ def _is_same_run(one: RunFile, run_there: Any) -> bool:
     return tags.get(KEY) == one.run.key
 
 
-def _find_sweep_run(one: RunFile, run_there: Any, uri: str) -> str:
-    """The run of a sweep: it keeps its id where the store has it, for its jobs point to it."""
+def _log_sweep_run(one: RunFile, run_there: Any, uri: str) -> str:
+    """Log the run of a sweep, and return what became of it; it keeps its id where the store has it,
+    for its jobs point to it.
+    """
     if run_there is not None and run_there.info.status == one.run.status:
         return THERE
     run_id = one.run_id
