@@ -9,9 +9,10 @@ import pytest
 
 from tractexp.inference.blocks import blocks_of
 from tractexp.inference.interval import interval_factor
+from tractexp.record.periodic import Periodic
 from tractexp.record.record import Base
 from tractexp.record.synthetic import synthetic_event
-from tractexp.record.wave_event import Periodic, _scale
+from tractexp.record.wave_event import _scale
 from tractexp.record.waves import Waves
 
 RATE, FREQUENCY = 1000.0, 50.0

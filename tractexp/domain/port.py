@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tractexp.record import Event, WaveEvent
-from tractexp.record.wave_event import Periodic, stationary
+from tractexp.record.periodic import Periodic
+from tractexp.record.wave_event import stationary
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tractexp.errors import UserError
 from tractexp.record.event import Event
 from tractexp.record.noise_filter import NoiseFilter
+from tractexp.record.periodic import Periodic
 from tractexp.record.phasor import TURN
 from tractexp.record.record import Record
 from tractexp.record.waves import Waves
@@ -27,7 +28,6 @@ LEAST_UNBALANCE = 0.1  # of the voltage before
 FEWEST_CYCLES = 2  # before the event
 # cycles of the periodic voltage before the record, in which a simulation reaches its steady state
 LEAD = 6
-HIGHEST_HARMONIC = 25  # harmonic that is fitted
 # of the voltage: how far it leaves its periodic course where an event begins
 LARGEST_PERIODIC_DEPARTURE = 0.03
 NOISE_DEVIATIONS = 6.0  # standard deviations of its noise, if that is more
@@ -124,58 +124,6 @@ def stationary(
     return phases[0] + 1j * np.interp(at - rate / frequency / 4, at, phases[0]), np.zeros(
         phases.shape[1]
     )
-
-
-@dataclass(frozen=True, eq=False)
-class Periodic:
-    """Offset, fundamental and harmonics (2 H + 1, channels) of channels before an event, about the
-    time `origin`.
-    """
-
-    coefficients: np.ndarray
-    frequency: float
-    origin: float
-    rest: np.ndarray  # (channels,) standard deviation of what is not periodic
-
-    @classmethod
-    def from_samples(
-        cls, t: np.ndarray, x: np.ndarray, frequency: float, rate: float
-    ) -> "Periodic":
-        """Fitted to channels x (channels, n) at times t (n,) [s]."""
-        highest = max(
-            1, min(HIGHEST_HARMONIC, int(0.45 * rate / frequency), (len(t) // 3 - 1) // 2)
-        )
-        series = cls(np.zeros((2 * highest + 1, len(x))), frequency, float(t[0]), np.zeros(len(x)))
-        basis = series.basis(t)
-        coefficients = np.linalg.lstsq(basis, x.T, rcond=None)[0]
-        residual = x.T - basis @ coefficients
-        scale = np.sqrt((residual**2).sum(axis=0) / max(len(t) - len(coefficients), 1))
-        return replace(series, coefficients=coefficients, rest=scale)
-
-    def basis(self, t: np.ndarray) -> np.ndarray:
-        """(n, 2 H + 1): one, then cosine and sine of each harmonic."""
-        angle = (
-            2
-            * np.pi
-            * self.frequency
-            * np.outer(t - self.origin, 1 + np.arange(len(self.coefficients) // 2))
-        )
-        waves = np.stack([np.cos(angle), np.sin(angle)], axis=2).reshape(len(t), -1)
-        return np.concatenate([np.ones((len(t), 1)), waves], axis=1)
-
-    def evaluate_at(self, t: np.ndarray) -> np.ndarray:
-        """The channels (channels, n), without their offsets."""
-        return (self.basis(t)[:, 1:] @ self.coefficients[1:]).T
-
-    @property
-    def offsets(self) -> np.ndarray:
-        """The constant part of each channel."""
-        return self.coefficients[0]
-
-    @property
-    def fundamentals(self) -> np.ndarray:
-        """Peak phasors (channels,) about the origin."""
-        return self.coefficients[1] - 1j * self.coefficients[2]
 
 
 def convert_to_waves(event: Event) -> WaveEvent:
