@@ -105,9 +105,9 @@ def suggest_nearest(name: str, allowed: Iterable[str]) -> str:
 
     Examples
     --------
-    >>> nearest("torque_of_load", ["load_torque", "motor_voltage"])
+    >>> suggest_nearest("torque_of_load", ["load_torque", "motor_voltage"])
     "; did you mean 'load_torque'?"
-    >>> nearest("weather", ["load_torque"])
+    >>> suggest_nearest("weather", ["load_torque"])
     ''
     """
     ratios = {other: _measure_likeness(str(name), other) for other in allowed}

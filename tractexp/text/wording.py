@@ -123,9 +123,9 @@ def join_alternatives(sets: Sequence[Sequence[str]]) -> str:
 
     Examples
     --------
-    >>> alternatives([["lag"], ["trip", "stall"]])
+    >>> join_alternatives([["lag"], ["trip", "stall"]])
     'lag or trip and stall'
-    >>> alternatives([["lag", "b"], ["lag", "c"], ["lag", "d"]])
+    >>> join_alternatives([["lag", "b"], ["lag", "c"], ["lag", "d"]])
     'lag beside one more effect (b, c or d)'
     """
     if not sets:
