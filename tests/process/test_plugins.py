@@ -142,7 +142,8 @@ def test_a_motor_takes_what_its_sites_allow_and_says_why_not():
     assert {name: why for name, why in refusals.items() if why} == {
         "magnetic_saturation": "its equations have no C",
         "negative_sequence_braking": (
-            "its equations have no coupling ((X - X')/X, the rotor's share in the reactance)"
+            "its equations have no backward_impedance (impedance that meets a field turning"
+            " backwards, but for the rotor's resistance)"
         ),
         "rotor_flux": "its rotor flux moves already",
         "saturation_curve": "its equations have no C",
