@@ -80,18 +80,26 @@ def test_an_unbalance_tells_the_impedance_without_a_start():
     assert test.voltage == pytest.approx(110, rel=0.01)
 
 
-def solve_type_test(R_r, H, unbalance, folder):
-    """The test that `look` tells of a solved motor, its values by name, and what holds: T0' [s],
-    and what it draws running over the machine's power.
+def look_at_motor(V, I, folder):
+    """The test that `look` tells of a motor, and its values by name; voltage and current (n,) are
+    space vectors [pu].
     """
-    V, I, T0 = solve_motor(RATE, R_r, H, 4.0, 5.0, unbalance)
     turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
     waves = np.sqrt(2) * np.concatenate([KV * (V * turn).real, KA * (I * turn).real])
     waves += noise(waves.shape, 5e-4) * np.repeat([KV, KA], 3)[:, None]
     write(recording(waves, RATE), folder / "motor.cfg", "BINARY", 1999)
     (feeder,) = tractexp.look(folder / "motor.cfg").content["files"][0]["feeders"]
     test = feeder["type_test"]
-    return test, {row["name"]: row for row in test["values"]}, T0, test["power"] / (3 * KV * KA)
+    return test, {row["name"]: row for row in test["values"]}
+
+
+def solve_type_test(R_r, H, unbalance, folder):
+    """The test that `look` tells of a solved motor, its values by name, and what holds: T0' [s],
+    and what it draws running over the machine's power.
+    """
+    V, I, T0 = solve_motor(RATE, R_r, H, 4.0, 5.0, unbalance)
+    test, values = look_at_motor(V, I, folder)
+    return test, values, T0, test["power"] / (3 * KV * KA)
 
 
 @pytest.mark.parametrize(
@@ -116,13 +124,7 @@ def test_a_motor_that_is_tripped_before_it_runs_up_tells_its_impedance_in_ohm(
 ):
     """Its inertia is that of a rotor that is stuck; what it would draw running nobody knows."""
     V, I, _ = solve_motor(RATE, R_r, 1e3, 1.8, 2.4, unbalance)
-    turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
-    waves = np.sqrt(2) * np.concatenate([KV * (V * turn).real, KA * (I * turn).real])
-    waves += noise(waves.shape, 5e-4) * np.repeat([KV, KA], 3)[:, None]
-    write(recording(waves, RATE), tmp_path / "motor.cfg", "BINARY", 1999)
-    (feeder,) = tractexp.look(tmp_path / "motor.cfg").content["files"][0]["feeders"]
-    test = feeder["type_test"]
-    found = {row["name"]: row for row in test["values"]}
+    test, found = look_at_motor(V, I, tmp_path)
     rotor = 1 / (1 / (1j * X_M) + 1 / (R_r + 1j * X_LEAK))
     locked = abs(R_S + 1j * X_LEAK + rotor) * KV / KA
     assert found.keys() == ({"Z_locked", "X_2"} if unbalance else {"Z_locked"})

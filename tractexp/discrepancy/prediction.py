@@ -106,7 +106,7 @@ def predict_errors(explained: Explanations, grader: Grader) -> Evidence | None:
 
     def complete(table: Evidence, best: Sequence[SetEvidence]) -> Evidence:
         missing = _find_missing_subsets(table, best)
-        fits = refit(context, noise, missing, faults=()) if missing else []
+        fits = refit(context, noise, missing, faults=())
         return replace(table, rows=(*table.rows, *fill(fits)))
 
     (alone,) = fill([bare])
@@ -210,7 +210,7 @@ def _fit_without_faults(context: Context, noise: Noise, fits: Iterable[Refit]) -
     """
     at = context.coordinates
     wanted = [(fit.names, at.without_faults(fit.unit, ())) for fit in fits]
-    return refit(context, noise, wanted, faults=()) if wanted else []
+    return refit(context, noise, wanted, faults=())
 
 
 def _say(context: Context) -> Callable[[str], None]:

@@ -75,7 +75,11 @@ class UnrecordedInput(ABC):
     def is_unknown(self, problem: Problem) -> bool:
         """Whether some event of a problem says nothing of it, and may have had another."""
         shipped = any(event.record.is_shipped for event in problem.events)
-        return problem.domain.lacks(self.channel, problem.events) and not shipped
+        return self.is_lacking(problem) and not shipped
+
+    def is_lacking(self, problem: Problem) -> bool:
+        """Whether some event of a problem has no channel of it."""
+        return problem.domain.lacks(self.channel, problem.events)
 
     def act_on(self, problem: Problem) -> Problem:
         """The problem whose load it acts on, with the same free parameters; the input rests.
@@ -202,11 +206,10 @@ class UnrecordedWindow(UnrecordedInput):
         length = float(course[0])
         return {self.channel: make_mean_window(length) if length > 0 else None}
 
-    def is_unknown(self, problem: Problem) -> bool:
+    def is_lacking(self, problem: Problem) -> bool:
         """Whether the model would be looked at through the window of a record, and it says none."""
-        shipped = any(event.record.is_shipped for event in problem.events)
         looked_through = problem.domain.windowed and problem.model.motor.within_a_cycle
-        return looked_through and not problem.drive.windows and not shipped
+        return looked_through and not problem.drive.windows
 
 
 def list_unrecorded_inputs(

@@ -121,6 +121,8 @@ def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list
 
     What falls behind in the first iterations is given up. Parameters and result are as of `refit`.
     """
+    if not wanted:
+        return []
     begun = run_descents(
         context, noise, wanted, None, (fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1])
     )
@@ -197,6 +199,8 @@ def run_descents(
     `FITS_AT_ONCE` of them take their steps in the same calls, whatever the number of cores: the
     last bits of a fit hang on it.
     """
+    if not wanted:
+        return []
     at = context.coordinates
     spent = context.effort.total
     measured, prior = find_prior_columns(context, [names for names, _ in wanted], faults)

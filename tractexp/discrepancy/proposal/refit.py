@@ -151,10 +151,10 @@ def term_fits(
     best = {f.names[0] for f in fits[:AGAIN]}
     others = [*off_bounds(context, ground.unit, MIDDLE), *local_minima]
     again = _starts(context, [f for f in chosen if f.term.name in best], others)
-    fits = best_of([*fits, *(rough_refit(context, noise, again) if again else [])])
+    fits = best_of([*fits, *rough_refit(context, noise, again)])
     fits = _searched_anew(context, noise, fits, REGRIDDED)
     moved = [start for f in fits[:MOST_MOVED_TERMS] for start in elsewhere(context, noise, f)]
-    fits = best_of([*fits, *(rough_refit(context, noise, moved) if moved else [])])
+    fits = best_of([*fits, *rough_refit(context, noise, moved)])
     fits = _searched_anew(context, noise, fits, 1, scattered=True)
     near = fits[0].cost + max(EXACT_FIT_SHARE * (bare.deviance - fits[0].deviance), 20.0)
     exact = {
