@@ -20,7 +20,7 @@ LONGEST_FILES = (
     "process/test_lost.py",
     "process/test_export.py",
     "process/test_tutorial.py",
-    "study/test_prediction.py",
+    "study/test_inexact.py",
     "process/test_ten_minutes.py",
     "process/test_commands.py",
     "study/test_docs_run.py",

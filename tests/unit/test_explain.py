@@ -1,0 +1,89 @@
+"""The sentence behind a verdict, `explain`, where sets go by what they predict: rows of a few
+numbers in, words out.
+"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from made_sets import off, table
+
+from tractexp.discrepancy.evidence import Verdict
+from tractexp.discrepancy.explain import explain
+from tractexp.discrepancy.proposal.library import term
+from tractexp.inference.criteria import Criteria
+
+TERM = "answer:torque:slip"
+WORDS = f"the best term of the library ({term(TERM).words})"
+
+
+def sentence_on(evidence, word="unexplained", *kept):
+    """The sentence where these rows are kept, of effects a, b, c that are told by their names."""
+    effects = SimpleNamespace(candidates="abc", label_effect=str)
+    context = SimpleNamespace(
+        criteria=Criteria(), catalogue=effects, records=SimpleNamespace(window=None)
+    )
+    return explain(Verdict(word, kept, False), evidence, None, context)
+
+
+def test_a_name_is_told_beside_what_the_base_model_the_next_set_and_the_best_term_miss():
+    one = off("a", error=0.2)
+    sets = table(off(error=1.0), one, off("b", error=0.9), term=off(TERM, error=0.3))
+    told = sentence_on(sets, "named", replace(one, replicated_share=0.9))
+    assert told.startswith(
+        "a predicts the held-out events within 20 % of the response, where the base model misses"
+        f" 100 %, the next best of 1 other sets (b) 90 % and {WORDS} 30 %;"
+    )
+    assert told.endswith("; each event, left out in turn, confirms it")
+
+
+def test_a_name_that_the_best_term_takes_is_told_with_what_both_miss():
+    sets = table(off(error=1.0), off("a", error=0.3), term=off(TERM, error=0.1))
+    assert sentence_on(sets) == (
+        "a would be named, but misses 30 % of the response of the held-out events,"
+        f" and {WORDS} 10 %"
+    )
+
+
+def test_a_set_that_divides_the_error_by_too_little_is_the_nearest():
+    assert sentence_on(table(off(error=1.0), off("a", error=0.6))) == (
+        "the model and the records disagree, and none of the 3 effects tested predicts the held-out"
+        " events well enough to be named: a, the nearest, misses 60 % of the response there, where"
+        " the base model misses 100 %; a name must divide that by 2.25"
+    )
+
+
+def test_a_lead_of_few_blocks_is_said_to_be_chance():
+    bare, one = off(error=1.0), off("a", error=0.3)
+    bare.prediction.squares[3] += 60.0
+    one.prediction.squares[4] += 3.0
+    assert sentence_on(table(bare, one)).endswith("; that may be chance in so few blocks")
+
+
+def test_a_pair_that_hardly_needs_its_second_is_said_to_do_so():
+    bare, one, pair = off(error=1.0), off("a", error=0.3), off("a", "b", error=0.4)
+    bare.prediction.squares[3] += 60.0
+    one.prediction.squares[4] += 3.0
+    told = sentence_on(table(bare, one, pair))
+    assert "none of the 3 effects tested, alone or up to 2 together," in told
+    assert "a and b, the nearest, miss" in told
+    assert told.endswith("; one of them alone does hardly worse")
+
+
+def test_where_no_set_beats_the_base_model_none_is_near():
+    assert sentence_on(table(off(error=0.1), off("a", error=0.2))) == (
+        "the model and the records disagree, and none of the 3 effects tested predicts the held-out"
+        " events better than the base model, which misses 10 % of the response there"
+    )
+
+
+@pytest.mark.parametrize(("error", "is_told"), [(0.5, True), (0.4, False)])
+def test_what_does_not_divide_the_error_by_itself_is_told_with_the_best_set_that_has_it(
+    error, is_told
+):
+    one, pair = off("a", error=error), off("a", "b", error=0.35)
+    sets = table(off(error=1.0), one, pair, term=off(TERM, error=0.9))
+    told = sentence_on(sets, "named", replace(one, replicated_share=0.9))
+    assert ("; a and b miss 35 %, the least, and all sets that come near have it;" in told) == (
+        is_told
+    )
