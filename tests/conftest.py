@@ -119,12 +119,10 @@ def planted():
     """An investigation that names the stator resistance in two of three generated events: of a few
     effects.
     """
-    from test_discrepancy import FEW, base, events
-
-    from tractexp.discrepancy.investigate import investigate
+    from made_dips import events, investigate
 
     dips = events("stator_resistance", size=2.0, count=3)
-    return investigate(base(), dips[:2], dips[2:], {}, {}, only=FEW)
+    return investigate(dips[:2], dips[2:])
 
 
 @contextlib.contextmanager

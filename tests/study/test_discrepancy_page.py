@@ -9,8 +9,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_dips import FEW, base, events
 from pages import charts, read, unpacked
-from test_discrepancy import FEW, base, events
 
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
@@ -33,7 +33,7 @@ from tractexp.text.wording import join_words
 
 @pytest.fixture
 def named(planted):
-    return planted
+    return planted.steps
 
 
 @pytest.fixture(scope="module")

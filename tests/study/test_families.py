@@ -8,8 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_context import bench
+from made_dips import FAST, LOUD, base, events
 from scipy.optimize import least_squares
-from test_discrepancy import FAST, LOUD, base, bench, events
 
 import tractexp.discrepancy.investigate as investigating
 from tractexp.configuration.plugin import discover, get

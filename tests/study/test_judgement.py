@@ -131,11 +131,11 @@ def test_sparse_regression_keeps_what_is_there_and_little_else():
 def test_a_row_is_counted_of_an_investigation(monkeypatch, planted):
     """What the study reads of an investigation is there, clean curves' error included."""
     monkeypatch.setattr(study.baselines, "sparse", lambda found: [])
-    made = study._counted(planted)
-    assert (made["verdict"], made["names"]) == (planted.verdict.word, ["stator_resistance"])
-    assert made["gain_held"][0] == planted.validate.gain
-    assert made["left_of_all"] == planted.verdict.chosen.p_of_all
-    assert made["grade"] == planted.final_grade.adequacy.grade
+    made = study._counted(planted.steps)
+    assert (made["verdict"], made["names"]) == (planted.verdict, ["stator_resistance"])
+    assert made["gain_held"][0] == planted.steps.validate.gain
+    assert made["left_of_all"] == planted.steps.verdict.chosen.p_of_all
+    assert made["grade"] == planted.fit.grade
     assert made["reason"] == planted.reason
 
 
@@ -156,11 +156,11 @@ def test_an_unused_event_is_a_further_dip_of_the_same_load(effect):
 def test_a_name_closes_most_of_an_unused_event(planted, monkeypatch):
     """The effect is there in the event, and with nothing kept there is nothing to judge."""
     trial = SimpleNamespace()
-    record = planted.withheld[0].record
+    record = planted.question.validate[0].record
     columns = {name: getattr(record, name) for name in ("t", "U", "P", "Q")}
     monkeypatch.setattr(study, "make_unused", lambda trial: columns)
-    assert study.find_share_unused(planted, trial) == pytest.approx(
-        planted.validate.closed_share, abs=0.02
+    assert study.find_share_unused(planted.steps, trial) == pytest.approx(
+        planted.steps.validate.closed_share, abs=0.02
     )
     nothing = SimpleNamespace(verdict=SimpleNamespace(chosen=None))
     assert study.find_share_unused(nothing, trial) is None

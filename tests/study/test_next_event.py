@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import next_event as study
 import numpy as np
 import pytest
-from test_discrepancy import base
+from made_dips import base
 
 import tractexp
 from hidden_effects import Case, Noise

@@ -4,7 +4,8 @@ them would.
 
 import numpy as np
 import pytest
-from test_discrepancy import FAST, LOUD, base, bench, events
+from made_context import bench
+from made_dips import FAST, LOUD, base, events
 
 from tractexp.discrepancy.disagreement import disagreement
 from tractexp.inference import fit_effort, fitting

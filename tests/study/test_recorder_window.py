@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from made_dips import FAST, base, events
 from scipy.integrate import quad
-from test_discrepancy import FAST, base, events
 
 import tractexp
 from tractexp.configuration.plugin import build_chosen
@@ -195,7 +195,7 @@ def test_a_window_must_show_whether_or_not_the_records_say_it(gained, said, beli
 
 def test_no_window_is_found_where_there_is_none(planted):
     """Nor where no effect is (test_discrepancy)."""
-    assert content(planted)["phasor_window"] is None
+    assert planted.content["phasor_window"] is None
     assert planted.names == ("stator_resistance",)
 
 

@@ -4,7 +4,7 @@ nothing.
 
 import numpy as np
 import pytest
-from test_discrepancy import FAST, events
+from made_dips import FAST, events
 
 from tractexp.discrepancy.remainder import MOST_SHAPES, remainders
 from tractexp.noise import Autoregression, Noise

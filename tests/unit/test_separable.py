@@ -77,11 +77,19 @@ def test_coordinates_on_a_bound_take_nothing():
 def test_differences_and_normal_equations_are_those_of_every_coordinate_by_itself(differences):
     central = differences == "central"
     unit, lanes = RNG.uniform(0.2, 0.8, (2, K + M * E)), np.arange(2)
-    rows = lambda x, lanes: np.sin(x @ DENSE.T)  # noqa: E731
+    simulated = []
+
+    def rows(x, lanes):
+        simulated.append(len(x))
+        return np.sin(x @ DENSE.T)
+
     base = rows(unit, lanes)
     alone, together = (
         normal(rows, unit, base, lanes, a, central=central) for a in (NOT_SEPARABLE, APART)
     )
+    _, each, shared = simulated
+    lanes_and_sides = 2 * (1 + central)
+    assert each - shared == lanes_and_sides * M * (E - 1)
     np.testing.assert_allclose(together[0], alone[0], rtol=1e-7, atol=1e-7)
     np.testing.assert_allclose(
         dense_normal(together[1]), dense_normal(alone[1]), rtol=1e-7, atol=1e-7

@@ -1,0 +1,17 @@
+"""What is fitted in an investigation, for the analytic tests of its steps."""
+
+from made_dips import FEW
+
+from tractexp.inference.catalogue import catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.criteria import Criteria
+from tractexp.inference.effort import Effort
+from tractexp.inference.records import Records
+
+
+def bench(model, made, only=FEW, bounds=None):
+    """The free numbers of a model and of some effects beside these events."""
+    missing = catalogue(model, made, only)
+    return Context.from_records(
+        model, missing, Records.from_events(made), bounds or {}, {}, Criteria(), Effort()
+    )
