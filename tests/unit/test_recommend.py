@@ -1,0 +1,71 @@
+"""The sentence behind a verdict, `explain`, and what to do next, `recommendation`, of evidence
+written by hand.
+"""
+
+from types import SimpleNamespace
+
+import pytest
+from made_evidence import CONFIRMED, DENIED, MILD, row, table
+
+from tractexp.discrepancy.decide import decide
+from tractexp.discrepancy.explain import explain
+from tractexp.discrepancy.recommend import recommendation
+from tractexp.inference.criteria import Criteria
+
+CONTEXT = SimpleNamespace(
+    catalogue=SimpleNamespace(label_effect=lambda name: name, candidates=range(3)),
+    criteria=Criteria(),
+    records=SimpleNamespace(window=None),
+)
+
+
+def tell(evidence):
+    """The word of the verdict, and the sentence behind it."""
+    verdict = decide(evidence, Criteria())
+    return verdict.word, explain(verdict, evidence, None, CONTEXT)
+
+
+@pytest.mark.parametrize(
+    ("columns", "word", "doubt"),
+    [
+        ({"gap": CONFIRMED}, "named", ""),
+        ({}, "candidate", "; no event was held out to confirm it"),
+        ({"gap": MILD}, "candidate", "; the held-out events are too mild to show it"),
+        (
+            {"gap": CONFIRMED, "grade": "wrong_model"},
+            "candidate",
+            "; the model with it does not describe this load, so it is no name",
+        ),
+    ],
+)
+def test_a_name_says_what_it_was_set_against_and_why_it_is_no_more_than_a_candidate(
+    columns, word, doubt
+):
+    told = "a explains the disagreement, and none of the 2 other effects tested does"
+    assert tell(table(row("a", **columns))) == (word, f"{told}{doubt}")
+
+
+def test_what_only_all_events_show_is_told():
+    evidence = table(row(), base_p=0.5, p_of_all=1e-4)
+    told = "the fitted events alone show no disagreement, but all events together do"
+    assert tell(evidence) == ("unexplained", told)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "told"),
+    [
+        (table(row("a", gap=MILD), p_of_all=1e-4), "hold out a deeper dip"),
+        (table(row("a", gap=DENIED), p_of_all=1e-4), "fit the held-out events, too (data.train)"),
+        (table(row("a", gap=DENIED)), "look at what is left (unexplained.csv)"),
+    ],
+)
+def test_what_to_do_where_nothing_explains_follows_from_the_held_out_events(evidence, told):
+    findings = SimpleNamespace(
+        next_event=None,
+        unrecorded_course={},
+        verdict=SimpleNamespace(word="unexplained"),
+        proposed=SimpleNamespace(proposal=None),
+        by_likelihood=evidence,
+        context=CONTEXT,
+    )
+    assert recommendation(findings).startswith(told)
