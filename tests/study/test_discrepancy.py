@@ -113,15 +113,6 @@ def test_a_name_gains_on_held_out_events_what_both_curves_are_apart(planted):
     assert abs(held_out["gain"] - held_out["expected"]) < 6 * np.sqrt(held_out["expected"])
 
 
-def test_a_small_effect_that_the_held_out_dip_is_too_mild_to_show_is_a_candidate():
-    made = events("stator_resistance", size=0.12, count=3)
-    told = investigate([made[0], made[2]], [made[1]])
-    assert (told.verdict, told.names) == ("candidate", ("stator_resistance",))
-    assert told.reason.endswith("the held-out events are too mild to show it")
-    assert "hold it out" in told.recommendation or told.recommendation.startswith("hold out event")
-    assert told.proposal is None
-
-
 def test_an_effect_is_looked_for_from_all_over_the_base_model_s_box():
     """A large capacitor draws the base fit to another leakage and dispersion, where none of any
     size would help.

@@ -84,3 +84,14 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
     assert stepped.gap.outcome == "shown"
     assert needs_all_events([stepped], criteria)
     assert not holds(stepped, criteria)
+
+
+def test_of_a_small_effect_the_held_out_dips_show_nothing_and_deny_nothing(planted):
+    """Of a resistance of 0.0005 pu both curves are about as far apart as noise is large."""
+    steps = planted.steps
+    large, place = steps.extended_fit, steps.context.coordinates.place_values
+    small = replace(large, unit=place(large.unit, {"R_s": 0.0005}))
+    bare = replace(large, names=(), unit=place(large.unit, {"R_s": 0.0}))
+    (dip,) = events("stator_resistance", size=0.05, count=3)[2:]
+    told = compare_on(steps.context, [dip], bare, [small])[small.names]
+    assert told.outcome == "mild"

@@ -9,7 +9,7 @@ from made_evidence import CONFIRMED, DENIED, MILD, row, table
 
 from tractexp.discrepancy.decide import decide
 from tractexp.discrepancy.explain import explain
-from tractexp.discrepancy.recommend import recommendation
+from tractexp.discrepancy.recommend import recommend_confirmation, recommendation
 from tractexp.inference.criteria import Criteria
 
 CONTEXT = SimpleNamespace(
@@ -49,6 +49,27 @@ def test_what_only_all_events_show_is_told():
     evidence = table(row(), base_p=0.5, p_of_all=1e-4)
     told = "the fitted events alone show no disagreement, but all events together do"
     assert tell(evidence) == ("unexplained", told)
+
+
+@pytest.mark.parametrize(
+    ("by_event", "told"),
+    [
+        ((20.0, 400.0), "hold out deep, or a further dip as deep: a, if right, gains"),
+        ((400.0,), "record a further dip as deep as mild and hold it out: a, if right, gains"),
+        ((3.0, 5.0), "record a deeper dip than those fitted and hold it out: none of them shows a"),
+    ],
+)
+def test_a_candidate_is_confirmed_by_the_event_that_shows_most_of_it(by_event, told):
+    """What each of the fitted events would gain, were the candidate right."""
+    events = [SimpleNamespace(record=SimpleNamespace(name=name)) for name in ("mild", "deep")]
+    findings = SimpleNamespace(
+        names=("a",),
+        evidence=table(row("a")),
+        context=SimpleNamespace(events=events, criteria=Criteria()),
+        train=SimpleNamespace(by_event=by_event),
+        all_fitted=False,
+    )
+    assert recommend_confirmation(findings).startswith(told)
 
 
 @pytest.mark.parametrize(
