@@ -1,11 +1,9 @@
-"""The sentence behind a verdict, `explain`, and what to do next, `recommendation`, of evidence
-written by hand.
-"""
+"""What to do next, `recommendation`, and the sentence behind a verdict, of rows of few numbers."""
 
 from types import SimpleNamespace
 
 import pytest
-from made_evidence import CONFIRMED, DENIED, MILD, row, table
+from made_sets import CONFIRMED, DENIED, MILD, beside_base, row
 
 from tractexp.discrepancy.decide import decide
 from tractexp.discrepancy.explain import explain
@@ -42,11 +40,11 @@ def test_a_name_says_what_it_was_set_against_and_why_it_is_no_more_than_a_candid
     columns, word, doubt
 ):
     told = "a explains the disagreement, and none of the 2 other effects tested does"
-    assert tell(table(row("a", **columns))) == (word, f"{told}{doubt}")
+    assert tell(beside_base(row("a", **columns))) == (word, f"{told}{doubt}")
 
 
 def test_what_only_all_events_show_is_told():
-    evidence = table(row(), base_p=0.5, p_of_all=1e-4)
+    evidence = beside_base(row(), base_p=0.5, p_of_all=1e-4)
     told = "the fitted events alone show no disagreement, but all events together do"
     assert tell(evidence) == ("unexplained", told)
 
@@ -64,7 +62,7 @@ def test_a_candidate_is_confirmed_by_the_event_that_shows_most_of_it(by_event, t
     events = [SimpleNamespace(record=SimpleNamespace(name=name)) for name in ("mild", "deep")]
     findings = SimpleNamespace(
         names=("a",),
-        evidence=table(row("a")),
+        evidence=beside_base(row("a")),
         context=SimpleNamespace(events=events, criteria=Criteria()),
         train=SimpleNamespace(by_event=by_event),
         all_fitted=False,
@@ -75,9 +73,12 @@ def test_a_candidate_is_confirmed_by_the_event_that_shows_most_of_it(by_event, t
 @pytest.mark.parametrize(
     ("evidence", "told"),
     [
-        (table(row("a", gap=MILD), p_of_all=1e-4), "hold out a deeper dip"),
-        (table(row("a", gap=DENIED), p_of_all=1e-4), "fit the held-out events, too (data.train)"),
-        (table(row("a", gap=DENIED)), "look at what is left (unexplained.csv)"),
+        (beside_base(row("a", gap=MILD), p_of_all=1e-4), "hold out a deeper dip"),
+        (
+            beside_base(row("a", gap=DENIED), p_of_all=1e-4),
+            "fit the held-out events, too (data.train)",
+        ),
+        (beside_base(row("a", gap=DENIED)), "look at what is left (unexplained.csv)"),
     ],
 )
 def test_what_to_do_where_nothing_explains_follows_from_the_held_out_events(evidence, told):
