@@ -69,6 +69,15 @@ class UserError(Exception):
     """Wrong input. The message is a complete sentence for the user; no traceback is shown."""
 
 
+class RefusedEffect(UserError):
+    """An effect does not fit a model, and why."""
+
+    def __init__(self, effect: str, reason: str):
+        """An effect, and why it cannot be added, as the end of a sentence."""
+        super().__init__(f"the effect '{effect}' cannot be added to this model: {reason}")
+        self.effect, self.reason = effect, reason
+
+
 class Unfit(UserError):
     """Why an effect makes no sense for a model: what it asks for is not there. Raised by what it
     asks `eq` for.

@@ -25,7 +25,7 @@ from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import assess
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.recommend import recommendation
-from tractexp.errors import UserError
+from tractexp.errors import RefusedEffect, UserError
 from tractexp.extend import Effect, Parameter, plugin
 from tractexp.inference import fit_effort, wide_fit
 from tractexp.inference.catalogue import catalogue
@@ -36,7 +36,6 @@ from tractexp.inference.injection import PUSHES
 from tractexp.inference.kernels import Family, Kernels
 from tractexp.inference.linearization import tangent
 from tractexp.inference.wide_fit import scatter_starts
-from tractexp.model.declaration import Refused
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")
 
@@ -79,7 +78,7 @@ class Narrow(Family):
 
         def compiled():
             if clashes(()):
-                raise Refused("m", "the model has a state 'x' already")
+                raise RefusedEffect("m", "the model has a state 'x' already")
 
         def acceptance(effect):
             return SimpleNamespace(

@@ -6,10 +6,9 @@ and which parameters go with it, where it leaves less before the dips than strai
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import sympy
 
 from tractexp.identification.fit import Fit, play
 from tractexp.identification.load_drift import find_load_drifts
@@ -18,10 +17,14 @@ from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import model_error
 from tractexp.inference.multistart import explore_minima
 from tractexp.inference.problem import Problem
-from tractexp.model.equations import OWN, Equations
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 from tractexp.record import Event
+
+if TYPE_CHECKING:
+    import sympy
+
+    from tractexp.model.equations import Equations
 
 START_SOURCE = "between standstill and somewhat above synchronous speed"
 START_UNSEEN = 4  # samples within which the start is set: they are not compared
@@ -48,12 +51,16 @@ class UnsteadyStart(Effect):
 
     def edit(  # type: ignore[override]
         self,
-        eq: Equations,
-        start_speed: sympy.Expr,
-        start_flux_d: sympy.Expr,
-        start_flux_q: sympy.Expr,
+        eq: "Equations",
+        start_speed: "sympy.Expr",
+        start_flux_d: "sympy.Expr",
+        start_flux_q: "sympy.Expr",
     ) -> None:
         """Add the offsets to what moves speed and flux in the first two samples."""
+        import sympy  # where no kernel is stored yet: it takes as long as NumPy and SciPy together
+
+        from tractexp.model.equations import OWN
+
         push = sympy.Max(0, 1 - sympy.Abs(eq.t / eq.step - 1)) / eq.step
         offsets = {
             "speed": start_speed * eq.omega_n,

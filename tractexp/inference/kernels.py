@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.domain import domain_of
+from tractexp.errors import RefusedEffect
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.fit_problem import FitProblem
 from tractexp.inference.injection import PUSHES, Injection
 from tractexp.inference.problem import Problem
-from tractexp.model.declaration import Refused
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.model.parts import Effect
@@ -101,7 +101,7 @@ class Family:
         try:
             if tested:
                 model.compile()
-        except Refused:
+        except RefusedEffect:
             beside = set(names)
             for name in sorted(tested):
                 if self.with_effects(beside).acceptance(self._effect(name)).refusal is None:

@@ -10,7 +10,7 @@ from typing import Any
 import sympy
 from sympy import conjugate, im, re
 
-from tractexp.errors import Unfit, UserError
+from tractexp.errors import RefusedEffect, Unfit, UserError
 from tractexp.model import sites
 from tractexp.model.drive import PHASORS
 from tractexp.model.equations import Equations
@@ -22,19 +22,10 @@ from tractexp.text.wording import join_words
 LAW_ROUNDING = 1e-9  # how far from 1 a law may be before the event
 
 
-class Refused(UserError):
-    """An effect does not fit a model, and why."""
-
-    def __init__(self, effect: str, reason: str):
-        """An effect, and why it cannot be added, as the end of a sentence."""
-        super().__init__(f"the effect '{effect}' cannot be added to this model: {reason}")
-        self.effect, self.reason = effect, reason
-
-
 def declare_equations(
     motor: Motor, static: Static, effects: Sequence[Effect], title: str, domain: str = PHASORS
 ) -> Equations:
-    """The equations of a load. Raises `Refused` for an effect that does not fit, `UserError` for
+    """The equations of a load. Raises `RefusedEffect` for an effect that does not fit, `UserError` for
     parts that do not.
     """
     eq = Equations(domain)
@@ -64,11 +55,11 @@ def declare_equations(
 
 @contextmanager
 def _refuse(effect: Effect) -> Iterator[None]:
-    """Raise `Refused` where an effect does not fit."""
+    """Raise `RefusedEffect` where an effect does not fit."""
     try:
         yield
     except Unfit as why:
-        raise Refused(effect.name, str(why)) from why
+        raise RefusedEffect(effect.name, str(why)) from why
 
 
 def _foreign(eq: Equations, part: Part) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.cache.texts import get_text_of_parts
-from tractexp.errors import MODEL, UserError, check_choice
+from tractexp.errors import MODEL, RefusedEffect, UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel
 from tractexp.kernel.layout import EVENT, INPUTS, LANES
@@ -205,13 +205,11 @@ class Model:
 
     def _try_effect(self, effect: Effect) -> str:
         """Whether an effect can be added, as JSON: the sites it edits, or why not."""
-        from tractexp.model.declaration import Refused
-
         try:
             eq = compose(
                 self.motor, self.static, [*self.effects, effect], domain=self.domain
             ).equations
-        except Refused as refused:
+        except RefusedEffect as refused:
             return json.dumps(
                 {"refusal": refused.reason if refused.effect == effect.name else str(refused)}
             )

@@ -9,12 +9,14 @@ import functools
 import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tractexp.discrepancy.proposal import balances, shapes
 from tractexp.model import sites
-from tractexp.model.equations import Equations
 from tractexp.parameter import Parameter
+
+if TYPE_CHECKING:
+    from tractexp.model.equations import Equations
 
 SOURCE = "a term proposed by the data; see docs/missing-effects.md"
 # kinds of signals: functions of voltage and states, functions of time, and what these count by
@@ -122,7 +124,7 @@ class Balance:
         """The function that adds a signal to it."""
         return getattr(balances, self.name)
 
-    def places_in(self, eq: Equations) -> tuple[sites.Site, ...]:
+    def places_in(self, eq: "Equations") -> tuple[sites.Site, ...]:
         """The sites it edits in equations of phasors or of waves."""
         return self.places if self.in_waves is None or not eq.waves else self.in_waves
 
