@@ -101,11 +101,17 @@ class AllEvents:
         return each_apart(lambda fit: self._measure(fit, by_name[fit.names], seed), fits, effort)
 
     def compare(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
-        """Sets fitted to all events from where they were; what leaves something there is fitted
-        from every setting, too.
+        """Sets fitted to all events from where they were; what leaves something there, or less than
+        another does, is fitted from every setting, too.
         """
         joint = {t.fit.names: t for t in self.fit_jointly(alone, seed)}
-        doubtful = [f for f in alone if joint[f.names].p_left < self.fitted.criteria.false_alarms]
+        least = min(t.fit.cost for t in joint.values())
+        criteria = self.fitted.criteria
+        doubtful = [
+            fit
+            for fit, t in zip(alone, (joint[f.names] for f in alone), strict=True)
+            if t.p_left < criteria.false_alarms or criteria.rejects(t.fit.cost - least)
+        ]
         better = [
             t
             for t in self.fit_jointly(doubtful, seed, anew=True)

@@ -1,0 +1,48 @@
+"""Explanations fitted to all events: `AllEvents`."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from tractexp.discrepancy.all_events import AllEvents, JointFit
+from tractexp.inference.criteria import Criteria
+
+ONE, TWO = ("undervoltage_trip",), ("two_stage_trip",)
+
+
+class Stuck(AllEvents):
+    """Fits whose costs are given: from where the sets were, and from every setting."""
+
+    def __init__(self, near, everywhere, p_left):
+        super().__init__(SimpleNamespace(criteria=Criteria()), (), None, (), None)
+        object.__setattr__(self, "told", (near, everywhere, p_left))
+
+    def fit_jointly(self, alone, seed, *, anew=False):
+        near, everywhere, p_left = self.told
+        costs = everywhere if anew else near
+        return [
+            JointFit(SimpleNamespace(names=fit.names, cost=costs[fit.names]), 0.0, p_left)
+            for fit in alone
+        ]
+
+
+def compare(near, everywhere, p_left=0.7):
+    alone = [SimpleNamespace(names=ONE), SimpleNamespace(names=TWO)]
+    joint = Stuck(near, everywhere, p_left).compare(alone, seed=0)
+    return {one.fit.names: one.fit.cost for one in joint}
+
+
+@pytest.mark.parametrize(("behind", "ahead"), [(ONE, TWO), (TWO, ONE)])
+def test_what_another_set_would_reject_is_fitted_from_every_setting_first(behind, ahead):
+    near = {ahead: 6150.0, behind: 6880.0}
+    assert compare(near, {behind: 6152.0})[behind] == 6152.0
+
+
+def test_what_is_as_good_as_the_best_is_not_fitted_again():
+    near = {ONE: 6150.0, TWO: 6153.0}
+    assert compare(near, {ONE: 0.0, TWO: 0.0}) == near
+
+
+def test_what_leaves_more_than_chance_does_is_fitted_again_and_keeps_the_better_fit():
+    near = {ONE: 6150.0, TWO: 6153.0}
+    assert compare(near, {ONE: 6140.0, TWO: 6160.0}, p_left=1e-6) == {ONE: 6140.0, TWO: 6153.0}
