@@ -17,7 +17,7 @@ from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import model_error
 from tractexp.inference.multistart import explore_minima
 from tractexp.inference.problem import Problem
-from tractexp.model.parts import Effect
+from tractexp.model.parts import OWN, Effect
 from tractexp.parameter import Parameter
 from tractexp.record import Event
 
@@ -58,8 +58,6 @@ class UnsteadyStart(Effect):
     ) -> None:
         """Add the offsets to what moves speed and flux in the first two samples."""
         import sympy  # where no kernel is stored yet: it takes as long as NumPy and SciPy together
-
-        from tractexp.model.equations import OWN
 
         push = sympy.Max(0, 1 - sympy.Abs(eq.t / eq.step - 1)) / eq.step
         offsets = {

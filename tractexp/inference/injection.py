@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tractexp.inference.residual_statistics import windows
-from tractexp.model.parts import Effect
+from tractexp.model.parts import OWN, Effect
 from tractexp.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Injection(Effect):
         """Add pushes to the balances of flux, speed, P and Q between two instants [s], each with an
         edge of `EDGE_SECONDS`.
         """
-        from tractexp.model.equations import OWN, I, sympy
+        from tractexp.model.equations import I, sympy
 
         ramp = lambda at: sympy.Max(0, sympy.Min(1, (eq.t - at) / EDGE_SECONDS))  # noqa: E731
         gate = ramp(window_on) - ramp(window_off)

@@ -25,8 +25,8 @@ LAW_ROUNDING = 1e-9  # how far from 1 a law may be before the event
 def declare_equations(
     motor: Motor, static: Static, effects: Sequence[Effect], title: str, domain: str = PHASORS
 ) -> Equations:
-    """The equations of a load. Raises `RefusedEffect` for an effect that does not fit, `UserError` for
-    parts that do not.
+    """The equations of a load. Raises `RefusedEffect` for an effect that does not fit, and
+    `UserError` for parts that do not.
     """
     eq = Equations(domain)
     for what, part in (("motor", motor), ("static load", static)):

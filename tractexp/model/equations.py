@@ -20,6 +20,7 @@ from tractexp.model.apart import Apart
 from tractexp.model.drive import OUTPUTS, PHASORS, WAVES
 from tractexp.model.graph import replace_symbols
 from tractexp.model.names import check_name
+from tractexp.model.parts import OWN
 from tractexp.model.real_form import RealForm, expand_definitions
 from tractexp.model.sites import Site
 from tractexp.model.states import UNSAID, Memory, Requirement, State
@@ -35,7 +36,6 @@ NOTHING = sympy.Integer(0)
 LOWEST = sympy.Rational(1, 20)
 # resistance over reactance of a reactive load of which nothing else is said
 DAMPING = sympy.Rational(1, 20)
-OWN = "motor"  # who writes the states that are pushed, and the speed that effects ask for
 
 
 class Equations:

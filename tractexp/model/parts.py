@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 # recorded channels that not every record has; I0 of waveforms, where there is some
 CHANNELS = ("f", "U2", "I0")
 LEFT = ("P_s0", "Q_s0")  # what the other parts leave to the static load before the event
+OWN = "motor"  # who writes the states that are pushed, and the speed that effects ask for
 COMPARED = ("I0",)  # of these, what is compared and drives nothing: an event may be without
 
 
