@@ -1,7 +1,8 @@
 """What is fitted in an investigation, for the analytic tests of its steps."""
 
-from made_dips import FEW
+from made_dips import FEW, base
 
+from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
@@ -15,3 +16,8 @@ def bench(model, made, only=FEW, bounds=None):
     return Context.from_records(
         model, missing, Records.from_events(made), bounds or {}, {}, Criteria(), Effort()
     )
+
+
+def fitted_base(made, only=FEW):
+    """The base model as it fits these events by itself."""
+    return base_fit(bench(base(), made, only))
