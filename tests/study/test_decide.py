@@ -8,32 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_sets import CONFIRMED, DENIED, MILD, beside_base, fitted, held_out, off, row, table
 
 from tractexp.discrepancy.decide import decide
-from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
-from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.ranking import beats, find_nearest, rank_sets
 from tractexp.inference.criteria import Criteria
-from tractexp.inference.fitting import Refit
 
 
-def held_out(gain, expected):
-    return GapTest(None, None, gain, 0.0, expected, Criteria().shown, None)
-
-
-def row(*names, deviance=0.0, **columns):
-    """A set that leaves nothing of the fitted events, unless columns say otherwise."""
-    fit = Refit(names, np.zeros(0), deviance, len(names))
-    return SetEvidence(fit, names, names, **{"behind": 0.0, "p_left": 1.0} | columns)
-
-
-def word(*rows, base_p=0.0, **base):
+def word(*rows, **base):
     """The verdict on these sets beside a base model that leaves something."""
-    verdict = decide(Evidence(row(deviance=100.0, p_left=base_p, **base), rows), Criteria())
+    verdict = decide(beside_base(*rows, **base), Criteria())
     return verdict.word, verdict.sets
-
-
-CONFIRMED, MILD, DENIED = held_out(50.0, 55.0), held_out(3.0, 6.0), held_out(-2.0, 60.0)
 
 
 @pytest.mark.parametrize(
@@ -65,6 +50,20 @@ def test_a_word_follows_from_the_numbers_of_the_sets(rows, told):
     assert word(*rows)[0] == told
 
 
+@pytest.mark.parametrize(
+    ("chosen", "rival", "kept"),
+    [
+        (1.0, 0.03, (("a",), ("b",))),
+        (1.0, 0.0008, (("a",),)),  # it leaves something of all events
+        (0.0008, 0.03, (("b",),)),
+        (0.0008, 0.0008, ()),
+    ],
+)
+def test_an_explanation_is_kept_by_what_it_leaves_of_all_events(chosen, rival, kept):
+    rows = [row(name, gap=CONFIRMED, p_of_all=p) for name, p in (("a", chosen), ("b", rival))]
+    assert word(*rows)[1] == kept
+
+
 def test_where_no_set_is_kept_the_base_model_decides():
     assert word(row(p_left=0.5), base_p=0.5)[0] == "none"
     assert word(row(p_left=0.5), base_p=0.5, p_of_all=1e-4)[0] == "unexplained"
@@ -87,9 +86,8 @@ def test_a_base_model_that_leaves_less_than_matters_of_all_events_lacks_nothing(
     fitted, held_out, told
 ):
     """A held-out dip too mild for what the fitted ones show does not hide that."""
-    base = off(error=held_out, deviance=100.0)
-    base = replace(base, fitted_error=off(error=fitted, deviance=0.0).prediction)
-    verdict = decide(Evidence(base, ()), Criteria())
+    base = replace(off(error=held_out), fitted_error=off(error=fitted).prediction)
+    verdict = decide(table(base), Criteria())
     assert (verdict.word, verdict.complete) == (told, False)
 
 
@@ -98,22 +96,14 @@ def test_of_one_family_the_best_member_is_kept():
     assert word(row("a", gap=CONFIRMED), member) == ("named", (("a",),))
 
 
-def off(*names, error, deviance):
-    """A set by what it leaves of held-out events in twenty blocks, and of the fitted events."""
-    blocks = np.ones(20)
-    prediction = PredictedError(error**2 * blocks, 0 * blocks, blocks, np.zeros(0))
-    return replace(row(*names, deviance=deviance), behind=np.nan, prediction=prediction)
-
-
 @pytest.mark.parametrize(
     ("share", "told"),
     [(0.9, "named"), (0.49, "candidate"), (np.nan, "candidate"), (None, "candidate")],
 )
 def test_what_held_out_events_chose_is_named_if_each_event_left_out_in_turn_shows_it(share, told):
     """Whatever the fitted events alone put first."""
-    a = replace(off("a", error=0.1, deviance=50.0), replicated_share=share)
-    sets = a, off("b", error=0.9, deviance=40.0)
-    verdict = decide(Evidence(off(error=1.0, deviance=100.0), sets), Criteria())
+    a = replace(off("a", error=0.1), replicated_share=share)
+    verdict = decide(table(off(error=1.0), a, off("b", error=0.9)), Criteria())
     assert (verdict.word, verdict.names, verdict.complete) == (told, ("a",), False)
 
 
@@ -152,18 +142,15 @@ def test_the_page_s_own_numbers_give_the_verdict_that_it_tells():
 
 def test_however_much_a_set_that_survives_leaves_it_is_ahead_of_one_that_stalls():
     """A set that stalls leaves all: no fit brings it before one that does not."""
-    blocks = np.ones(10)
 
-    def predicted(*names, squares, deviance, stalls=()):
-        error = PredictedError(squares, 0.01 * blocks, blocks, np.zeros(1), stalls)
-        return row(*names, deviance=deviance, prediction=error)
+    def stall(row):
+        return replace(row, prediction=replace(row.prediction, stalls=("dip3",)))
 
-    stalling = predicted("a", squares=np.inf * blocks, deviance=1.0, stalls=("dip3",))
-    surviving = predicted("b", squares=1e6 * blocks, deviance=1e6)
-    base = predicted(squares=np.inf * blocks, deviance=1e9, stalls=("dip3",))
-    table, criteria = Evidence(base, (stalling, surviving)), Criteria()
-    assert rank_sets(table, criteria) == [surviving, stalling]
-    assert find_nearest(table, criteria) is surviving
+    stalling, base = stall(off("a", error=np.inf)), stall(off(error=np.inf))
+    surviving = replace(off("b", error=1e3), fit=fitted(1e6, 1, "b"))
+    sets, criteria = table(base, stalling, surviving), Criteria()
+    assert rank_sets(sets, criteria) == [surviving, stalling]
+    assert find_nearest(sets, criteria) is surviving
     assert beats(surviving, stalling, criteria)
     assert beats(surviving, base, criteria)
     assert not beats(stalling, base, criteria)

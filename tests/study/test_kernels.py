@@ -2,13 +2,17 @@
 steps as short as a fit asks for.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from made_context import bench
 from made_dips import FAST, base, events, investigate
 
+from tractexp.errors import RefusedEffect
 from tractexp.inference import kernels
 from tractexp.inference.injection import PUSHES
+from tractexp.inference.kernels import Family
 from tractexp.inference.problem import Problem
 
 
@@ -74,3 +78,47 @@ def test_what_changes_nothing_is_exactly_zero():
     assert not made.changes(unit, np.array([unit] * 3), ("stator_resistance",), names).any()
     moved = at.place_values(unit, {"X_f": 0.02})
     assert made.changes(unit, moved[None], ("stator_resistance",), ("feeder_impedance",)).any()
+
+
+class Narrow(Family):
+    """A family in which effects `b` and `m` do not go together."""
+
+    def with_effects(self, names):
+        names = {*names}
+        clashes = lambda more: {"b", "m"} <= {*names, *more}  # noqa: E731
+
+        def compiled():
+            if clashes(()):
+                raise RefusedEffect("m", "the model has a state 'x' already")
+
+        def acceptance(effect):
+            return SimpleNamespace(
+                refusal="the model has a state 'x' already" if clashes([effect.name]) else None
+            )
+
+        return SimpleNamespace(names=names, compile=compiled, acceptance=acceptance)
+
+
+def narrow():
+    some = type("", (dict,), {"of_load": ("a", "b", "c", "i"), "of_measurement": ()})
+    effects = {
+        n: SimpleNamespace(effect=SimpleNamespace(name=n, iterates=n == "i")) for n in "abcim"
+    }
+    return Narrow(None, some(effects))
+
+
+def test_what_a_member_does_not_take_beside_it_is_not_tested_there():
+    here = narrow()
+    for names, tested in (((), "abc"), (("a", "b"), "abc"), (("m",), "acm")):
+        assert here.build_model(here.key(names, beside="c")).names == {*tested}
+    assert here.build_model(here.key(("m",), beside=PUSHES)).names == {"m", PUSHES}
+    assert here.build_model(here.key(("m", "a"))).names == {"m", "a"}
+
+
+def test_an_effect_that_iterates_and_the_pushes_are_simulated_by_themselves():
+    """One such effect beside all others made each of their columns thirty times as dear."""
+    here = narrow()
+    assert here.key(("a",), beside="i") == ({"a"}, {"i"})
+    assert here.key(("a", "i"), beside=PUSHES) == ({"a", "i"}, {PUSHES})
+    # the same for all sets of cheap effects
+    assert here.key(("a", "i"), beside="b") == ({"i"}, {"a", "b", "c"})

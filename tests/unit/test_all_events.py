@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from tractexp.discrepancy.all_events import AllEvents, JointFit
@@ -46,3 +47,8 @@ def test_what_is_as_good_as_the_best_is_not_fitted_again():
 def test_what_leaves_more_than_chance_does_is_fitted_again_and_keeps_the_better_fit():
     near = {ONE: 6150.0, TWO: 6153.0}
     assert compare(near, {ONE: 6140.0, TWO: 6160.0}, p_left=1e-6) == {ONE: 6140.0, TWO: 6153.0}
+
+
+def test_nothing_is_asked_of_all_events_where_the_base_model_cannot_run_before_the_held_out_ones():
+    stalled = SimpleNamespace(plain=SimpleNamespace(deviance=np.inf))
+    assert AllEvents.p_left(stalled, (), 0) == 1.0

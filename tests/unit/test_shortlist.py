@@ -1,10 +1,14 @@
-"""Which sets are fitted next, `shortlist`: made scores in, names out."""
+"""Which sets are fitted next, `shortlist`, and whether any is, `worth_another`: made scores in,
+names out.
+"""
 
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
+from made_sets import fitted
 
-from tractexp.discrepancy.explanations import shortlist
+from tractexp.discrepancy.explanations import shortlist, worth_another
 from tractexp.inference.fitting import Refit
 
 TEXTBOOK = {"a_of_other_law": "a"}
@@ -25,3 +29,21 @@ def test_single_effects_are_fitted_in_the_order_of_what_they_lower():
 def test_beside_a_law_of_another_form_its_own_textbook_is_not_sought():
     last = step(("a_of_other_law", "b"), {"a": 30.0, "b": 20.0, "c": 10.0})
     assert shortlist([step((), {}), last], 3) == [("a_of_other_law", "b", "c")]
+
+
+@pytest.mark.parametrize(
+    ("sets", "another"),
+    [
+        (((),), True),
+        (((), ("a",)), True),
+        (((), ("a",), ("a", "b")), False),
+        # the pair led back to the same one: what follows would be the same search
+        (((), ("a",), ("a",)), False),
+        (((), ("a",), ("b",)), True),
+    ],
+)
+def test_a_second_effect_is_tried_and_no_third(sets, another):
+    assert (
+        worth_another([SimpleNamespace(fit=fitted(0.0, len(names), *names)) for names in sets])
+        == another
+    )
