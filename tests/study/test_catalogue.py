@@ -1,9 +1,15 @@
-"""The effects that some events can show, `catalogue`, with the members of their families."""
+"""The effects that some events can show, `catalogue`, with the members of their families, and what
+an event lacks, `missing_channel`.
+"""
 
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
 from made_dips import base, events
 
-from tractexp.configuration.plugin import discover
-from tractexp.inference.catalogue import catalogue
+from tractexp.configuration.plugin import discover, get
+from tractexp.inference.catalogue import catalogue, missing_channel
 
 MEMBERS = {name for name, cls in discover()["effect"].items() if cls.family}
 
@@ -23,3 +29,12 @@ def test_a_member_is_no_candidate_of_the_first_search():
         "magnetic_saturation",
         "load_change",
     )
+
+
+@pytest.mark.parametrize(("swing", "is_enough"), [(0.045, False), (0.055, True)])
+def test_an_effect_of_the_frequency_is_tested_where_that_swings(swing, is_enough):
+    """By a twentieth of a Hz."""
+    record = SimpleNamespace(channels={"f": np.linspace(50.0, 50.0 + swing, 10)})
+    event = SimpleNamespace(record=record, channels=("f",))
+    told = missing_channel(get("effect", "frequency_dependence")(), [event])
+    assert ("moves by less than" not in (told or "")) == is_enough

@@ -1,9 +1,16 @@
-"""Where the setting of an effect rests, `is_end_of_range`."""
+"""What follows of `Findings`: whether a name closes a share of the error, and where the setting of
+an effect rests, `is_end_of_range`.
+"""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from tractexp.configuration.plugin import get
-from tractexp.discrepancy.findings import is_end_of_range
+from tractexp.discrepancy.findings import Findings, is_end_of_range
+from tractexp.inference.criteria import Criteria
+from tractexp.inference.model_error import Change
 
 
 @pytest.mark.parametrize(
@@ -20,3 +27,28 @@ def test_a_setting_rests_at_the_end_of_its_range_unless_nature_ends_there(name, 
     """The level of a relay at the end of what was tried is no level; a delay of 0 is one."""
     own = {p.name: p for p in get("effect", "undervoltage_trip")().parameters}
     assert is_end_of_range(own[name], value) == ends
+
+
+@pytest.mark.parametrize(
+    ("kept", "closed", "ahead", "told"),
+    [
+        (1, 0.9, 1.5, True),
+        (2, 0.9, 1.5, False),
+        (1, 0.54, 1.5, False),
+        (1, 0.54, 1.45, True),
+        (1, np.nan, 1.5, False),
+    ],
+)
+def test_what_only_all_events_show_closes_a_share_of_the_error_and_has_no_rival(
+    kept, closed, ahead, told
+):
+    """A name closed 7 % of the gap once, because its deviance was beyond a hundred."""
+    before, after = (
+        SimpleNamespace(error=SimpleNamespace(square=square)) for square in (1.0, 1.0 - closed)
+    )
+    found = SimpleNamespace(
+        context=SimpleNamespace(criteria=Criteria(ahead=ahead)),
+        graded_change=Change(before, after),
+        verdict=SimpleNamespace(kept=("one",) * kept),
+    )
+    assert Findings.closes_share.fget(found) == told

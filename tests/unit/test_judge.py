@@ -1,5 +1,6 @@
 """Why a fitted term is not proposed, `TermAssessment`."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -32,3 +33,17 @@ def test_a_term_is_proposed_unless_held_out_events_or_chance_object(term, object
     told = term.objections(Criteria())
     assert len(told) == len(objections)
     assert all(why.startswith(start) for why, start in zip(told, objections, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("name", "looser", "term"),
+    [
+        ("ahead", 1.45, assessed(gain=54.0, left=46.0)),
+        ("shown", 9.0, assessed(gain=10.0, left=1.0, expected=11.0)),
+    ],
+)
+def test_a_looser_criterion_proposes_what_the_usual_one_does_not(name, looser, term):
+    criteria = Criteria.from_choices({name: looser})
+    there = replace(term.validate, shown=criteria.shown)
+    assert term.objections(Criteria())
+    assert not replace(term, validate=there).objections(criteria)

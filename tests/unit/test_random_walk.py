@@ -3,6 +3,7 @@ left of them.
 """
 
 import numpy as np
+import pytest
 
 from tractexp.noise.random_walk import Load, Rest, find
 
@@ -44,3 +45,21 @@ def test_a_load_that_seems_steady_before_the_events_may_wander_within_them():
     )
     explained = [rest(white(1000) + 5 * columns[0]) for _ in range(3)]
     assert find(calm, 0.002, steady(1000), explained) is None
+
+
+def wandering_within():
+    """What is left of an event shows a little more than the stretch before it."""
+    rng = np.random.default_rng(24)
+    left = rng.normal(size=(2, 1000)) + np.cumsum(
+        rng.normal(size=(2, 1000)) * np.array([[0.012], [0.0]]), axis=1
+    )
+    return [Rest(left, np.zeros((1, 2, 1000)), np.ones(1000))]
+
+
+@pytest.mark.parametrize("rests", [list, wandering_within])
+def test_a_lower_likelihood_lets_a_load_wander(rests, monkeypatch):
+    """Of noise in which no walk is, and of a walk that is hardly one."""
+    before = [np.random.default_rng(73).normal(size=(2, 250))]
+    assert find(before, 0.002, steady(1000), rests()) is None
+    monkeypatch.setattr("tractexp.noise.random_walk.LEAST_WANDERING", 1.5)
+    assert find(before, 0.002, steady(1000), rests()) is not None
