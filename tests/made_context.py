@@ -10,11 +10,12 @@ from tractexp.inference.effort import Effort
 from tractexp.inference.records import Records
 
 
-def bench(model, made, only=FEW, bounds=None):
+def bench(model, made, only=FEW, bounds=None, **settings):
     """The free numbers of a model and of some effects beside these events."""
     missing = catalogue(model, made, only)
+    records = Records.from_events(made)
     return Context.from_records(
-        model, missing, Records.from_events(made), bounds or {}, {}, Criteria(), Effort()
+        model, missing, records, bounds or {}, {}, Criteria(), Effort(), **settings
     )
 
 

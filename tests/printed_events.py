@@ -1,8 +1,13 @@
-"""Events of the printed equations with noise."""
+"""Events of the printed equations with noise, and the least squares of a likelihood."""
 
 import numpy as np
 import uncertainty as study
 from written_out import printed_dip
+
+from tractexp.inference.least_squares import descend
+from tractexp.inference.problem import Problem
+
+NOISE = 0.004  # of a single dip
 
 
 def records(depths, deviation, seed=1, truth=study.TYPICAL, correlation=0.0, Q_s0=0.35):
@@ -18,3 +23,19 @@ def records(depths, deviation, seed=1, truth=study.TYPICAL, correlation=0.0, Q_s
             )
         )
     return made
+
+
+def one_dip(error=None, depth=0.5, seed=5, Q_s0=0.35, bounds=None):
+    """The problem of one dip with white noise, and an `error` (2, N) besides."""
+    t, U = study.Shape(depth).voltage()
+    power = printed_dip(depth, tuple(study.TYPICAL), Q_s0)
+    power = power + NOISE * np.random.default_rng(seed).standard_normal(power.shape)
+    event = study.event(t, U, power + (0 if error is None else error))
+    return Problem(study.model(), [event], bounds)
+
+
+def minimum(likelihood, start, held=None, **settings):
+    """The coordinates (d,) near those of the start where the rows of a likelihood are least."""
+    frozen = None if held is None else np.isin(np.arange(len(start)), held)[None]
+    settings = {"tolerance": 1e-8, **settings}
+    return descend(likelihood.rows, start[None], frozen, **settings).unit[0]

@@ -1,5 +1,5 @@
-"""What each event tells and which does not belong, `compare_events` and `find_disagreeing_events`:
-planted faults, and what they cost.
+"""What each event tells and which does not belong, `agreement`: planted faults, and what they
+cost.
 """
 
 from dataclasses import replace
@@ -11,7 +11,6 @@ from printed_events import records
 from written_out import dense
 
 from tractexp.identification import agreement
-from tractexp.identification.agreement import compare_events
 from tractexp.inference.information import Information
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
@@ -38,14 +37,14 @@ def mixed():
 
 
 def test_each_event_is_credited_with_what_it_tells(alike):
-    told = compare_events(alike)
+    told = agreement.compare_events(alike)
     assert told["odd_events"] == []
     assert all(ratio >= 1 for gain in told["gains"].values() for ratio in gain.values())
     assert told["gains"]["dip 4"]["M"] > told["gains"]["dip 1"]["M"]
 
 
 def test_the_event_that_does_not_belong_is_named(mixed):
-    told = compare_events(mixed)
+    told = agreement.compare_events(mixed)
     assert told["odd_events"] == ["changed"]
     assert "changed does not fit with the rest: deviance higher by" in told["notes"][0]
 
@@ -100,7 +99,7 @@ def test_a_jacobian_takes_as_many_simulations_for_many_events(alike, monkeypatch
 
 def test_the_gain_of_an_event_is_that_of_all_rows_against_those_without_its_own(alike):
     """Over every row and every P0 and Q0 at once, as the least squares of the whole have them."""
-    known, likelihood, gains = alike, alike.likelihood, compare_events(alike)["gains"]
+    known, likelihood, gains = alike, alike.likelihood, agreement.compare_events(alike)["gains"]
     J = dense(likelihood.jacobian(known.unit)[1])
 
     def errors(rows):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import uncertainty as study
-from printed_events import records
+from printed_events import NOISE, one_dip, records
 from written_out import dense_normal
 
 from tractexp.inference.least_squares import normal
@@ -52,3 +52,36 @@ def test_the_normal_equations_of_the_likelihood_are_those_of_every_column_by_its
     for one, other in (alone[0], together[0]), (dense_normal(alone[1]), dense_normal(together[1])):
         assert other == pytest.approx(one, rel=1e-6, abs=1e-6 * np.abs(one).max())
     assert (dense_normal(together[1]) == np.swapaxes(dense_normal(together[1]), 1, 2)).all()
+
+
+def test_eq_8_is_the_sum_of_squares_and_holds_the_power_before():
+    case = one_dip()
+    squares = Likelihood.of_squares(case, 0.01)
+    unit = squares.to_unit(study.TYPICAL)
+    assert unit.shape == (1, 7)
+    rows = squares.rows(unit)[0]
+    assert rows @ rows * 0.01**2 / case.drive.samples == pytest.approx(
+        case.objective(study.TYPICAL[None])[0], rel=1e-9
+    )
+    assert squares.separable_columns.count == 0
+    assert squares.with_initial_power.place_parameters(unit).shape == (1, 9)
+
+
+def test_the_power_before_is_free_around_what_was_measured_and_stands_there_at_first():
+    case = one_dip()
+    free = Likelihood.from_problem(case).free_set
+    (P, Q), reach = case.drive.before[0], 0.2 * np.linalg.norm(case.drive.before[0])
+    assert free.names[-2:] == ("P0[1]", "Q0[1]")
+    assert free.box.lower[free.before] == pytest.approx([P - reach, Q - reach])
+    assert free.box.upper[free.before] == pytest.approx([P + reach, Q + reach])
+    moved = np.full(free.dimension, 0.25)
+    stood = free.at_measured_power(moved)
+    assert stood[: free.parameter_count].tolist() == [0.25] * 7
+    assert free.box.from_unit(stood)[free.before] == pytest.approx([P, Q])
+
+
+def test_where_the_power_before_is_held_only_the_parameters_are_free():
+    case = one_dip()
+    free = Likelihood.of_squares(case, NOISE).free_set
+    assert free.names == case.space.names
+    assert not len(free.before)

@@ -1,28 +1,17 @@
-"""Weak priors, by `departures` and `held_to_usual`: what machines usually are holds what records do
-not tell, and moves nothing that they do.
-"""
+"""What machines usually are, `departures`: its numbers, and rows beside those of the records."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from printed_events import minimum
 
 import tractexp
 from tractexp.configuration.plugin import get
-from tractexp.identification.estimate import held_to_usual
-from tractexp.inference.blocks import blocks_of
-from tractexp.inference.catalogue import catalogue
-from tractexp.inference.context import Context
-from tractexp.inference.criteria import Criteria
-from tractexp.inference.effort import Effort
-from tractexp.inference.least_squares import descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.prior import departures, held_in_words
 from tractexp.inference.problem import Problem
-from tractexp.inference.records import Records
 from tractexp.inference.sandwich import scatter
-from tractexp.noise import Noise
 
 # R_s, X_s, X_m, R_r, X_r, H, load factor of the seven types of the source
 TYPES = (
@@ -113,64 +102,10 @@ def test_a_parameter_that_the_prior_alone_holds_scatters_as_it_says(problem):
     """
     for prior in (1e4, 1e5):
         held = replace(Likelihood.of_squares(problem, 0.01), prior=prior)
-        start = problem.space.to_unit(problem.defaults)[None]
-        unit = descend(held.rows, start, iterations=200, tolerance=1e-9, central=True).unit[0]
+        start = problem.space.to_unit(problem.defaults)
+        unit = minimum(held, start, iterations=200, tolerance=1e-9, central=True)
         information = scatter(held, unit).information
         values = dict(zip(problem.space.names, information.values, strict=True))
         errors = dict(zip(problem.space.names, information.standard_errors, strict=True))
         assert errors["C"] == pytest.approx((1 - values["C"]) * np.log(1.33), rel=0.05)
         assert errors["T_prime"] == pytest.approx(values["T_prime"] * np.log(5.2), rel=0.05)
-
-
-def test_a_block_of_samples_counts_as_one_row_of_the_prior(problem):
-    squares = Likelihood.of_squares(problem, 0.01)
-    held = held_to_usual(squares)
-    blocks = blocks_of(problem.events, problem.drive, problem.space.dimension)
-    assert held.prior**2 * len(blocks) == pytest.approx(squares.samples)
-    assert (
-        held.of_records.rows(np.full((1, 5), 0.4)).tolist()
-        == squares.rows(np.full((1, 5), 0.4)).tolist()
-    )
-
-
-def read_contactors():
-    """Two dips that the plain model misses by far, and the model that is asked of them."""
-    folder = Path(tractexp.__file__).parent / "data"
-    dips = [tractexp.read(folder / f"contactors_{depth}pct.csv")[0] for depth in (50, 30, 65)]
-    return dips, tractexp.compose().with_(priors=True)
-
-
-def test_an_investigation_holds_the_motor_by_the_rows_of_an_identification():
-    """Eq. (8) with what machines usually are: the same rows at the same parameters."""
-    dips, model = read_contactors()
-    lacks = catalogue(model.model, dips, ["stator_resistance"])
-    records = Records.from_events(dips)
-    context = Context.from_records(
-        model.model, lacks, records, {}, {}, Criteria(), Effort(), None, priors=True
-    ).with_measured_power.held_to_usual
-    squares = held_to_usual(Likelihood.of_squares(context.kernels.bare, 0.02))
-    at, free = context.coordinates, np.linspace(0.3, 0.6, squares.free)[None]
-    unit = at.null[None].copy()
-    unit[:, at.base] = free
-    level = Noise(Noise.white(0.02, 0.02).pairs, np.eye(2))
-    ours, theirs = context.rows(unit, level, (), [()]), squares.rows(free)
-    assert context.prior > 1
-    assert ours.shape == theirs.shape
-    np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
-    held = squares.prior_rows(free)
-    np.testing.assert_allclose(ours[:, -held.shape[1] :], held)
-
-
-def test_an_investigation_without_priors_or_motor_has_no_such_rows():
-    dips, model = read_contactors()
-    context = Context.from_records(
-        model.model,
-        catalogue(model.model, dips, ["stator_resistance"]),
-        Records.from_events(dips),
-        {},
-        {},
-        Criteria(),
-        Effort(),
-    )
-    assert context.held_to_usual is context
-    assert context.prior == 0.0
