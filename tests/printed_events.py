@@ -10,6 +10,11 @@ from tractexp.inference.problem import Problem
 NOISE = 0.004  # of a single dip
 
 
+def problem(events, bounds=None):
+    """That of the model of third order."""
+    return Problem(study.model(), events, bounds)
+
+
 def records(depths, deviation, seed=1, truth=study.TYPICAL, correlation=0.0, Q_s0=0.35):
     """One event a depth; the noise deviates by so much and is correlated from sample to sample."""
     rng = np.random.default_rng(seed)
@@ -30,8 +35,7 @@ def one_dip(error=None, depth=0.5, seed=5, Q_s0=0.35, bounds=None):
     t, U = study.Shape(depth).voltage()
     power = printed_dip(depth, tuple(study.TYPICAL), Q_s0)
     power = power + NOISE * np.random.default_rng(seed).standard_normal(power.shape)
-    event = study.event(t, U, power + (0 if error is None else error))
-    return Problem(study.model(), [event], bounds)
+    return problem([study.event(t, U, power + (0 if error is None else error))], bounds)
 
 
 def minimum(likelihood, start, held=None, **settings):

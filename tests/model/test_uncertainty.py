@@ -228,3 +228,20 @@ def test_the_deviance_rises_to_its_limit_where_the_interval_ends():
     rise = np.sum(known.likelihood.rows(end[None]) ** 2) - known.deviance
     assert rise == pytest.approx(known.limits[j], rel=0.25)
     assert known.limits[j] != pytest.approx(threshold(), rel=0.01)
+
+
+def test_correlated_noise_of_p_and_q_is_seen_and_used():
+    t, U = study.Shape(0.5).voltage()
+    rng = np.random.default_rng(4)
+    common = 0.004 * rng.standard_normal(len(t))
+    power = printed_dip(0.5, tuple(study.TYPICAL), 0.35) + common
+    power += 0.0005 * rng.standard_normal(power.shape)
+    known = study.judged(
+        Problem(study.model(), [study.event(t, U, power)]), study.TYPICAL
+    ).uncertainty
+    assert known.noise[0]["between_P_and_Q"] > 0.95
+    apart = Likelihood.of_squares(known.likelihood.problem, 0.004).with_initial_power
+    J = dense(apart.jacobian(known.unit)[1])
+    loose = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))[: apart.free] * (known.upper - known.lower)
+    assert (known.information.standard_errors < loose).all()
+    assert np.median(known.information.standard_errors / loose) < 0.6
