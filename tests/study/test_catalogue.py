@@ -6,10 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import wave_records
 from made_dips import base, events
+from wave_records import case
 
 from tractexp.configuration.plugin import discover, get
 from tractexp.inference.catalogue import catalogue, missing_channel
+from tractexp.model.model import compose
+from tractexp.record import convert_to_waves
 
 MEMBERS = {name for name, cls in discover()["effect"].items() if cls.family}
 
@@ -38,3 +42,12 @@ def test_an_effect_of_the_frequency_is_tested_where_that_swings(swing, is_enough
     event = SimpleNamespace(record=record, channels=("f",))
     told = missing_channel(get("effect", "frequency_dependence")(), [event])
     assert ("moves by less than" not in (told or "")) == is_enough
+
+
+def test_an_effect_that_makes_no_sense_of_waveforms_says_why():
+    motor, static = get("model/motor", "stator_flux")(), get("model/static", "branch")()
+    seed = 4, 0
+    made = [convert_to_waves(event) for event in wave_records.events(case(seed, 1), seed)]
+    named = "stator_resistance", "speed_dependent_torque"
+    refused = catalogue(compose(motor, static, domain="waves"), made, named).untestable
+    assert "R_s" in refused["stator_resistance"]

@@ -5,21 +5,14 @@ against another.
 import html
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from made_dips import FEW, base, events
+from conftest import no_term_is_searched
+from made_dips import FEW, events, investigate
 from pages import charts, read, unpacked
 
-from tractexp.discrepancy.discrepancy_json import content
-from tractexp.discrepancy.evidence import Evidence, SetEvidence
-from tractexp.discrepancy.explain import explain_rest
-from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.proposal.propose import ProposalResult
-from tractexp.inference.model_error import in_percent
-from tractexp.record.identity import Identity
-from tractexp.report import candidates, discrepancy, overlay
+from tractexp.report import candidates, overlay
 from tractexp.report.candidate_rows import (
     CHOSEN,
     chance_level,
@@ -33,28 +26,25 @@ from tractexp.text.wording import join_words
 
 @pytest.fixture
 def named(planted):
-    return planted.steps
+    return planted
 
 
 @pytest.fixture(scope="module")
 def silent():
-    return investigate(base(), events(count=2)[:1], events(count=2)[1:], {}, {}, only=FEW)
+    made = events(count=2)
+    return investigate(made[:1], made[1:])
 
 
 @pytest.fixture(scope="module")
 def unexplained():
     made = events("load_step", size=2.0, count=3)
-    none = ProposalResult(why="none is searched here: that takes as long as all else")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("tractexp.discrepancy.investigate.propose", lambda *_: none)
-        return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+    with no_term_is_searched():
+        return investigate(made[:2], made[2:])
 
 
 def page(found, folder):
     """The words of the page, and what its charts draw."""
-    path = discrepancy.report(
-        found, content(found), [Identity.from_record(e.record) for e in found.context.events]
-    ).save(folder / "discrepancy.html")
+    path = found.report().save(folder / "discrepancy.html")
     return words_of(path), charts(path.read_text(encoding="utf-8"))
 
 
@@ -85,7 +75,7 @@ def test_a_click_tells_that_the_planted_effect_explains_what_is_left(named, tmp_
     _, drawn = page(named, tmp_path)
     first, _, held, _ = drawn
     assert "answers" not in held  # nothing was fitted there
-    loudest = named.places[0]
+    loudest = named.steps.places[0]
     (told,) = (
         a["text"]
         for a in first["answers"]
@@ -99,7 +89,8 @@ def test_a_click_tells_that_the_planted_effect_explains_what_is_left(named, tmp_
 
 def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
     words, charts = page(named, tmp_path)
-    assert [e.record.name for e in named.context.events] == ["event1", "event2"]
+    (event, other), _ = named.question.train, named.question.validate
+    assert (event.record.name, other.record.name) == ("event1", "event2")
     assert (
         words.index("Measured, before, after")
         < words.index("event1, fitted")
@@ -116,8 +107,8 @@ def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
         band,
     }
     assert names(held) == {"measured", "base model", "extended model", band}
-    event = named.context.records.recorded[0]
-    calculated = named.graded_overlays[0].after  # of the model that is graded
+    response = named.predict(event)  # of the model that is graded
+    calculated = response.P, response.Q
     for c, (channel, axis, below) in enumerate((("P", "y2", "y3"), ("Q", "y4", "y5"))):
         measured = getattr(event.record, channel)
         for name, panel, expected in (
@@ -133,23 +124,24 @@ def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
     edges = [s["x0"] for s in first["layout"]["shapes"] if s["type"] == "line"]
     assert edges == [event.t_start, event.t_end]
     shaded = sorted((s["x0"], s["x1"]) for s in first["layout"]["shapes"] if s["type"] == "rect")
-    here = [p for p in named.places if p.event == "event1"]
+    here = [place for place in named.content["where"] if place["event"] == "event1"]
     # in the power's panel and in that below it
-    assert shaded == sorted(2 * [(p.start, p.end) for p in here])
+    assert shaded == sorted(2 * [(place["start"], place["end"]) for place in here])
     assert bars["data"][0]["type"] == "bar"
 
 
 def test_the_noise_band_holds_what_the_extended_model_leaves(named):
-    shown = named.overlays[0]
+    overlays = named.steps.overlays
+    shown = overlays[0]
     off = (shown.measurements - shown.after) / shown.deviation
     assert 0.93 < np.mean(np.abs(off) < BAND_DEVIATIONS) < 0.98
-    assert [o.held_out for o in named.overlays] == [False, False, True]
+    assert [o.held_out for o in overlays] == [False, False, True]
 
 
 def test_many_events_are_folded_and_none_is_left_out(named, tmp_path):
     from tractexp.blocks import Report
 
-    many = named.overlays[:2] * 3
+    many = named.steps.overlays[:2] * 3
     path = overlay.overlaid(Report("many"), many).save(tmp_path / "many.html")
     words = words_of(path)
     assert len(re.findall(r"event[12], fitted event[12]: dip of", words)) == 6
@@ -162,14 +154,15 @@ def test_many_events_are_folded_and_none_is_left_out(named, tmp_path):
 
 
 def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
-    rows = list_candidates(named)
+    steps = named.steps
+    rows = list_candidates(steps)
     assert rows[0].names == ("stator_resistance",)
     assert rows[0].status == CHOSEN
-    assert rows[0].drop == pytest.approx(named.evidence.rows[0].lowered)
+    assert rows[0].drop == pytest.approx(steps.evidence.rows[0].lowered)
     (size,) = rows[0].sizes
     assert size.parameter.name == "R_s"
     assert size.error == pytest.approx(
-        next(e for e in named.final_estimates if e.parameter.name == "R_s").error
+        next(e for e in steps.final_estimates if e.parameter.name == "R_s").error
     )
     drops = [row.drop for row in rows[1:] if np.isfinite(row.drop)]
     assert drops == sorted(drops, reverse=True)
@@ -183,36 +176,37 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
     bars = charts[-1]["data"][0]
     assert bars["y"] == [row.names[0] for row in rows if np.isfinite(row.drop)]
     assert bars["marker"]["color"][0] == candidates.COLORS[CHOSEN]
-    assert charts[-1]["layout"]["shapes"][0]["x0"] == chance_level(named)
-    assert describe_untestable_beside(named) in words
+    assert charts[-1]["layout"]["shapes"][0]["x0"] == chance_level(steps)
+    assert describe_untestable_beside(steps) in words
 
 
-def promising(named, score):
+def promising(steps, score):
     """The investigation with another score first."""
-    first = replace(named.first)
-    vars(first)["scores"] = [score, *named.first.scores]
-    base = replace(named.evidence.base, tests=first)
-    return replace(named, evidence=replace(named.evidence, base=base))
+    first = replace(steps.first)
+    vars(first)["scores"] = [score, *steps.first.scores]
+    base = replace(steps.evidence.base, tests=first)
+    return replace(steps, evidence=replace(steps.evidence, base=base))
 
 
 def test_where_a_linear_step_favours_another_effect_one_sentence_says_why(named):
-    assert explain_other_than_steepest(named) == ""
-    other = next(s for s in named.first.scores if s.name == "speed_dependent_torque")
+    steps = named.steps
+    assert explain_other_than_steepest(steps) == ""
+    other = next(s for s in steps.first.scores if s.name == "speed_dependent_torque")
     favoured = replace(other, drop=1e6, p=0.0)
-    told = explain_other_than_steepest(promising(named, favoured))
+    told = explain_other_than_steepest(promising(steps, favoured))
     assert told.startswith(
         "speed_dependent_torque promises most in one linear step from the base model"
     )
     assert "yet the verdict is stator_resistance, which lowers the deviance by" in told
     assert "speed_dependent_torque" in told
-    assert explain_other_than_steepest(promising(named, replace(favoured, drop=1.0))) == ""
+    assert explain_other_than_steepest(promising(steps, replace(favoured, drop=1.0))) == ""
 
 
 def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdict(named, tmp_path):
     words, _ = page(named, tmp_path)
     assert "parameter meaning unit before after 95 % interval verdict" in words
     assert "R_s stator resistance on the record's base pu not in it" in words
-    graded = named.base_grade.parameters, named.graded_parameters
+    graded = named.steps.base_grade.parameters, named.steps.graded_parameters
     before, after = ({e.parameter.name: e for e in group} for group in graded)
     assert before.keys() == after.keys() - {"R_s"}
     for e in after.values():
@@ -220,7 +214,7 @@ def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdic
         assert low < e.value < high
         assert e.verdict.split()[0].rstrip(":") in ("identified", "weakly", "not")
         assert f"{low:.4g} to {high:.4g}" in words
-    told = content(named)["parameters"]
+    told = named.content["parameters"]
     assert told == {n: {"value": e.value, "standard_error": e.error} for n, e in after.items()}
 
 
@@ -228,15 +222,16 @@ def test_what_is_drawn_and_told_is_of_the_graded_model(named):
     """The fits by which effects are ranked weigh otherwise: their curves and parameters are near,
     and not the same.
     """
-    known = named.final_grade.uncertainty
+    steps = named.steps
+    known = steps.final_grade.uncertainty
     values = dict(zip(known.names, known.values, strict=True))
     assert {
-        e.parameter.name: e.value for e in named.graded_parameters
-    } == values | named.undetermined_values
-    for ranked, graded in zip(named.overlays, named.graded_overlays, strict=True):
+        e.parameter.name: e.value for e in steps.graded_parameters
+    } == values | steps.undetermined_values
+    for ranked, graded in zip(steps.overlays, steps.graded_overlays, strict=True):
         (fit,) = (
             one
-            for one in named.final_grade.fits
+            for one in steps.final_grade.fits
             if one.event.record.name == graded.event.record.name
         )
         assert np.array_equal(graded.after, np.stack([fit.P, fit.Q]))
@@ -249,93 +244,58 @@ def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_
         (unexplained, "The base model is graded "),
     ):
         words, _ = page(found, tmp_path)
-        grade = found.final_grade.adequacy
-        told = f"{whose}{grade.grade.replace('_', ' ')}: {grade.sentence}"
+        grade = found.content["adequacy"]
+        told = f"{whose}{grade['grade'].replace('_', ' ')}: {grade['sentence']}"
         assert words.index(told) < words.index("; the next dip of 40 %") < words.index("Next: ")
-    assert named.final_grade.adequacy.grade == "adequate" != unexplained.final_grade.adequacy.grade
+    assert named.fit.grade == "adequate" != unexplained.fit.grade
 
 
 def test_what_is_not_extended_is_not_called_so(silent, unexplained, tmp_path):
     for found, word in ((silent, "none"), (unexplained, "unexplained")):
-        assert found.verdict.word == word
+        assert found.verdict == word
         words, charts = page(found, tmp_path)
         assert "extended" not in words.lower()
         assert "Parameters of the base model" in words
         assert "before after" not in words
-        assert [o.held_out for o in found.overlays].count(True) == 1
         assert all("extended model" not in names(chart) for chart in charts)
         shown = [names(chart) for chart in charts if "measured" in names(chart)]
-        assert len(shown) == len(found.overlays)
+        assert len(shown) == len([*found.question.train, *found.question.validate])
         assert all("base model" in of_event for of_event in shown)
-        assert content(found)["extended"] is None
+        assert found.content["extended"] is None
 
 
 def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path):
     words, _ = page(unexplained, tmp_path)
-    shapes = unexplained.rest.of_base
-    assert {(s.channel, s.kind) for s in shapes} >= {("P", "step")}
-    assert unexplained.headline.startswith(
+    remainder = unexplained.content["remainder"]
+    assert ("P", "step") in {(shape["channel"], shape["kind"]) for shape in remainder["of_base"]}
+    headline = remainder["sentence"]
+    assert headline.startswith(
         ("the base model misses this: ", "the nearest candidates miss this: ")
     )
-    assert unexplained.headline[1:] in words[: words.index("Measured and calculated")]
+    assert headline[1:] in words[: words.index("Measured and calculated")]
     assert "Missed by the base model" in words
-    made = content(unexplained)
-    assert made["remainder"]["of_base"][0]["channel"] in "PQ"
-    assert made["remainder"]["sentence"] == unexplained.headline
-
-
-@pytest.mark.parametrize(
-    ("names", "faults", "told"),
-    [
-        (
-            ("dc_link_lag", "inrush"),
-            ("load_change",),
-            "dc_link_lag and inrush beside load_change, the nearest, close 66% of the gap",
-        ),
-        (
-            ("dc_link_lag",),
-            ("load_change",),
-            "dc_link_lag beside load_change, the nearest, closes 66%",
-        ),
-        ((), ("load_change", "time_skew"), "load_change and time_skew, the nearest, close 66%"),
-        (("dc_link_lag",), (), "dc_link_lag, the nearest, closes 66%"),
-    ],
-)
-def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(names, faults, told):
-    catalogue = SimpleNamespace(label_effect=lambda name: name, candidates=range(19))
-    context = SimpleNamespace(catalogue=catalogue)
-    tests = SimpleNamespace(loudest="pushes into the balances")
-    best = SetEvidence(SimpleNamespace(names=names), names, names, p_left=0.001, tests=tests)
-    evidence = Evidence(None, (best,), faults=faults)
-    assert told in explain_rest(evidence, SimpleNamespace(closed_shares=(0.66, 0.5)), context)
-    assert "nan" not in explain_rest(
-        evidence, SimpleNamespace(closed_shares=(np.nan, np.nan)), context
-    )
 
 
 def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):
     """It says what was tested, not what the catalogue holds, and numbers that can be pictured."""
     reason = unexplained.reason
-    tested = len(unexplained.catalogue.candidates)
-    assert tested == len(FEW) + 3
+    tested = len(FEW) + 3  # and what may be wrong with the measurement
     assert f"none of the {tested} effects tested" in reason
     assert "catalogue" not in reason
     assert not re.search(r"e-\d\d", reason)
-    near = unexplained.nearest
-    assert near is not None
-    before, after = (
-        in_percent(unexplained.evidence.row_of(names).prediction.error)
-        for names in ((), near.names)
-    )
-    assert re.search(
-        rf"the nearest, miss(es)? {after} of the response there, where the base model misses"
-        rf" {before}",
+    near, row_of = unexplained.content["nearest"], unexplained.steps.evidence.row_of
+    told = re.search(
+        r"the nearest, miss(?:es)? (\S+) % of the response there,"
+        r" where the base model misses (\S+) %",
         reason,
     )
-    assert join_words(near.names) in reason, (
+    errors = [row_of(tuple(names)).prediction.error for names in (near["effects"], ())]
+    assert [*map(float, told.groups())] == pytest.approx(
+        [100 * error for error in errors], rel=0.05
+    )
+    assert join_words(near["effects"]) in reason, (
         "the sentence and what is told of the nearest name the same effects"
     )
-    told = content(unexplained)["nearest"]["parameters"]
-    assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()
+    assert {"value", "standard_error", "interval"} == next(iter(near["parameters"].values())).keys()
     words, _ = page(unexplained, tmp_path)
     assert not re.search(r"\d\.\d+e-\d\d\d", words)

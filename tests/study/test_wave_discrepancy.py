@@ -14,17 +14,12 @@ import pytest
 from wave_records import case, events
 
 import tractexp
-from tractexp.configuration.plugin import get
 from tractexp.discrepancy.next_event.choose import next_event
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.proposal.propose import propose
 from tractexp.discrepancy.remainder import remainders
 from tractexp.errors import UserError
-from tractexp.inference.catalogue import catalogue
-from tractexp.inference.injection import Injection
-from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
-from tractexp.record import convert_to_waves
 from tractexp.report import overlay
 
 # Nothing but noise is left. Its level is estimated from quiet stretches; the later ones are louder
@@ -176,23 +171,6 @@ def test_an_event_that_would_decide_is_found_in_waveforms(planted):
     assert chosen.sentence()
 
 
-def test_a_push_of_waveforms_is_the_terminal_current(given):
-    static = get("model/static", "constant_impedance")()
-    model = compose(get("model/motor", "none")(), static, [Injection()], domain="waves")
-    problem = Problem(model, given[:1], substeps=1)
-    pushes = [
-        {"window_on": -500.0, "window_off": 500.0, **push}
-        for push in ({}, {"push_P": 0.1}, {"push_Q": 0.1})
-    ]
-    values = np.array([[push.get(name, 0.0) for name in problem.space.names] for push in pushes])
-    drawn = model.simulate(problem.drive, values, 1).outputs
-    moved = (drawn[0] + 1j * drawn[1] - drawn[0, 0] - 1j * drawn[1, 0]) * convert_to_waves(
-        given[0]
-    ).turn.conj()
-    assert np.abs(moved[1] - 0.1).max() < 1e-9
-    assert np.abs(moved[2] + 0.1j).max() < 1e-9
-
-
 def test_what_is_left_of_a_current_is_told_by_its_shape(silent):
     (event,), noise = silent.steps.context.events, silent.steps.last.noise
     t = event.record.t - event.t_end
@@ -216,11 +194,3 @@ def test_a_record_without_samples_is_refused_in_a_sentence(given, role):
     train, held = ([bare], []) if role == "records" else (given[1:], [bare])
     with pytest.raises(UserError, match=r"magnitudes|has no waveforms: domain=waves needs"):
         tractexp.investigate(train, validate=held, domain="waves", effects=FEW, progress=False)
-
-
-def test_an_effect_that_makes_no_sense_of_waveforms_says_why(given):
-    motor, static = get("model/motor", "stator_flux")(), get("model/static", "branch")()
-    made = tuple(map(convert_to_waves, given))
-    named = "stator_resistance", "speed_dependent_torque"
-    refused = catalogue(compose(motor, static, domain="waves"), made, named).untestable
-    assert "R_s" in refused["stator_resistance"]

@@ -5,11 +5,12 @@ numbers in, words out.
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
-from made_sets import off, table
+from made_sets import beside_base, off, row, table
 
 from tractexp.discrepancy.evidence import Verdict
-from tractexp.discrepancy.explain import explain
+from tractexp.discrepancy.explain import explain, explain_rest
 from tractexp.discrepancy.proposal.library import term
 from tractexp.inference.criteria import Criteria
 
@@ -86,4 +87,33 @@ def test_what_does_not_divide_the_error_by_itself_is_told_with_the_best_set_that
     told = sentence_on(sets, "named", replace(one, replicated_share=0.9))
     assert ("; a and b miss 35 %, the least, and all sets that come near have it;" in told) == (
         is_told
+    )
+
+
+@pytest.mark.parametrize(
+    ("names", "faults", "told"),
+    [
+        (
+            ("dc_link_lag", "inrush"),
+            ("load_change",),
+            "dc_link_lag and inrush beside load_change, the nearest, close 66% of the gap",
+        ),
+        (
+            ("dc_link_lag",),
+            ("load_change",),
+            "dc_link_lag beside load_change, the nearest, closes 66%",
+        ),
+        ((), ("load_change", "time_skew"), "load_change and time_skew, the nearest, close 66%"),
+        (("dc_link_lag",), (), "dc_link_lag, the nearest, closes 66%"),
+    ],
+)
+def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(names, faults, told):
+    catalogue = SimpleNamespace(label_effect=lambda name: name, candidates=range(19))
+    context = SimpleNamespace(catalogue=catalogue)
+    tests = SimpleNamespace(loudest="pushes into the balances")
+    best = row(*names, p_left=0.001, tests=tests)
+    evidence = replace(beside_base(best), faults=faults)
+    assert told in explain_rest(evidence, SimpleNamespace(closed_shares=(0.66, 0.5)), context)
+    assert "nan" not in explain_rest(
+        evidence, SimpleNamespace(closed_shares=(np.nan, np.nan)), context
     )
