@@ -1,5 +1,5 @@
-"""Likelihood along one parameter, `profiles`: a parabola where theory says so, open sides, two
-minima, better optima, and the posterior beside them.
+"""Likelihood along one parameter, `profiles`: a parabola where theory says so, open sides, better
+optima, and their page.
 """
 
 import re
@@ -9,40 +9,31 @@ import numpy as np
 import pytest
 import uncertainty as study
 from pages import charts, read, unpacked
-from written_out import printed_dip
+from printed_events import minimum, problem, records
 
-from tractexp.errors import UserError
-from tractexp.identification.posterior import PosteriorSample
-from tractexp.identification.profile import check_by_profiles, profiles, revise_verdict
-from tractexp.identification.profile_lanes import End, LikelihoodProfile, find_outermost
+from tractexp.identification.profile import check_by_profiles, profiles
+from tractexp.identification.profile_lanes import End
 from tractexp.identification.uncertainty import conclude, threshold
-from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict, brief
-from tractexp.inference.least_squares import descend
-from tractexp.inference.problem import Problem
-from tractexp.report import posterior
 from tractexp.report.profile import meaning, report
-
-
-def events(depths, deviation, seed=1, Q_s0=0.35):
-    rng, made = np.random.default_rng(seed), []
-    for depth in depths:
-        t, U = study.Shape(depth).voltage()
-        clean = printed_dip(depth, tuple(study.TYPICAL), Q_s0)
-        made.append(study.event(t, U, clean + study.noise(rng, len(t), deviation, 0.0)))
-    return made
 
 
 @pytest.fixture(scope="module")
 def quiet():
-    return study.judged(Problem(study.model(), events((0.5,), 0.001)), study.TYPICAL).uncertainty
+    return study.judged(problem(records((0.5,), 0.001)), study.TYPICAL).uncertainty
 
 
 def test_the_threshold_is_chi_squared_of_one_degree():
     assert threshold() == pytest.approx(1.959963985**2, rel=1e-6)
 
 
-def test_with_little_noise_a_profile_is_the_parabola_of_the_information_matrix(quiet):
-    found = profiles(quiet)
+@pytest.fixture(scope="module")
+def along(quiet):
+    """The profiles of all parameters."""
+    return profiles(quiet)
+
+
+def test_with_little_noise_a_profile_is_the_parabola_of_the_information_matrix(quiet, along):
+    found = along
     assert found.restarts == 0
     for profile, value, half in zip(found.profiles, quiet.values, quiet.half, strict=True):
         np.testing.assert_allclose(
@@ -52,7 +43,7 @@ def test_with_little_noise_a_profile_is_the_parabola_of_the_information_matrix(q
         assert profile.minima == ()
         parabola = found.threshold * ((profile.values - value) / half) ** 2
         np.testing.assert_allclose(profile.deviance, parabola, atol=0.25 + 0.1 * parabola.max())
-    assert {v.word for v in found.verdicts.values()} == {IDENTIFIED}
+    assert {v.word for v in found.verdicts.values()} == {study.IDENTIFIED}
 
 
 def test_a_point_of_a_profile_is_the_constrained_optimum(quiet):
@@ -77,22 +68,22 @@ def test_a_shallow_dip_leaves_c_open_on_both_sides_of_a_crest_and_the_verdict_sa
     """At C = 0.75 the deviance is up by 16, at 0.3 by 0.3: a lane from the estimate alone ends at
     the crest.
     """
-    known = study.judged(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL).uncertainty
-    made = {p.name: p for p in profiles(known).profiles}
-    assert made["C"].ends == (End.BOUND, End.BOUND)
-    assert made["C"].interval == pytest.approx((0.3, 0.99))
-    assert made["C"].deviance.max() > 10
+    known = study.judged(problem(records((0.15,), 0.01)), study.TYPICAL).uncertainty
+    (of_C,) = profiles(known, names=["C"]).profiles
+    assert of_C.ends == (End.BOUND, End.BOUND)
+    assert of_C.interval == pytest.approx((0.3, 0.99))
+    assert of_C.deviance.max() > 10
     judged = check_by_profiles(known)
-    assert judged.verdicts["C"].word == UNIDENTIFIED
+    assert judged.verdicts["C"].word == study.UNIDENTIFIED
     assert "open upwards" in judged.verdicts["C"].detail
-    assert judged.profiled["C"] == pytest.approx(made["C"].interval, rel=1e-3)
+    assert judged.profiled["C"] == pytest.approx(of_C.interval, rel=1e-3)
     assert set(judged.profiled) >= {"C", "X_prime", "q_v"}
     narrow = {
         n for n, v, h in zip(known.names, known.values, known.half, strict=True) if h <= 0.05 * v
     }
     assert narrow  # a parabola anyway
     assert not narrow & set(judged.profiled)
-    assert judged.verdicts["T_m"].word == IDENTIFIED
+    assert judged.verdicts["T_m"].word == study.IDENTIFIED
 
 
 @pytest.mark.parametrize(("deviation", "seed", "Q_s0"), [(0.01, 2, 0.02), (0.005, 3, 0.05)])
@@ -106,17 +97,17 @@ def test_an_interval_holds_what_the_records_do_not_rule_out_whatever_its_profile
     enough to the optimum.
     """
     known = study.judged(
-        Problem(study.model(), events((0.3,), deviation, seed, Q_s0)), study.TYPICAL
+        problem(records((0.3,), deviation, seed, Q_s0=Q_s0)), study.TYPICAL
     ).uncertainty
     judged = check_by_profiles(known)
     likelihood = judged.likelihood
-    start = np.repeat(likelihood.to_unit(np.array(study.TYPICAL)), len(judged.names), axis=0)
-    held = np.eye(len(judged.names), start.shape[1], dtype=bool)
-    ends = descend(likelihood.rows, start, held, apart=likelihood.separable_columns)
-    close = ends.deviance - judged.deviance < threshold()
+    truth = likelihood.to_unit(study.TYPICAL)[0]
+    ends = np.array([minimum(likelihood, truth, held=[j]) for j in range(len(judged.names))])
+    rows = likelihood.rows(ends)
+    close = np.einsum("nr,nr->n", rows, rows) - judged.deviance < threshold()
     assert close.sum() >= 2
     low, high = judged.intervals.T
-    values, slack = likelihood.values(ends.unit[close]), 1e-3 * (high - low)
+    values, slack = likelihood.values(ends[close]), 1e-3 * (high - low)
     assert ((values > low - slack) & (values < high + slack)).all()
 
 
@@ -131,51 +122,10 @@ def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
     assert found.uncertainty.deviance == pytest.approx(quiet.deviance, abs=0.05)
 
 
-def test_two_minima_and_open_sides_change_the_verdict():
-    good = ParameterVerdict(IDENTIFIED, "± 3 %")
-    base = LikelihoodProfile(
-        "C",
-        np.array([0.4, 0.5, 0.6]),
-        np.array([5.0, 0, 5.0]),
-        (0.48, 0.52),
-        (End.CLOSED, End.CLOSED),
-        (),
-    )
-    assert revise_verdict(good, base, 0, 1).word == IDENTIFIED
-    twice = revise_verdict(good, replace(base, minima=(0.58,)), 0, 1)
-    assert (twice.word, "two minima, another at 0.58" in twice.detail) == (WEAK, True)
-    upwards = revise_verdict(good, replace(base, ends=(End.CLOSED, End.BOUND)), 0, 1)
-    assert (upwards.word, "open upwards" in upwards.detail) == (WEAK, True)
-    assert (
-        revise_verdict(good, replace(base, ends=(End.BOUND, End.BOUND)), 0, 1).word == UNIDENTIFIED
-    )
-    assert revise_verdict(good, replace(base, interval=(0.3, 0.7)), 0, 1).word == WEAK
-
-
-def test_the_posterior_confirms_the_intervals(quiet):
-    pytest.importorskip("emcee", reason="the optional extra [posterior] is not installed")
-    from tractexp.identification.posterior import sample
-
-    drawn = sample(quiet, walkers=40, steps=600, seed=1)
-    again = sample(quiet, walkers=40, steps=600, seed=1)
-    np.testing.assert_array_equal(drawn.draws, again.draws)
-    for (low, high), value, half in zip(drawn.intervals, quiet.values, quiet.half, strict=True):
-        assert (high - low) / 2 == pytest.approx(half, rel=0.3)
-        assert (high + low) / 2 == pytest.approx(value, abs=0.3 * half)
-
-
-def test_too_few_walkers_are_refused(quiet):
-    pytest.importorskip("emcee", reason="the optional extra [posterior] is not installed")
-    from tractexp.identification.posterior import sample
-
-    with pytest.raises(
-        UserError, match=r"task.walkers=10 is too few: 9 coordinates need at least 18"
-    ):
-        sample(quiet, walkers=10, steps=100, seed=0)
-
-
-def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(quiet, tmp_path):
-    found = profiles(quiet)
+def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(
+    quiet, along, tmp_path
+):
+    found = along
     path = report(found).save(tmp_path / "profile.html")
     told, drawn = read(path), charts(path.read_text(encoding="utf-8"))
     for chart, profile, value, half in zip(
@@ -199,13 +149,13 @@ def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(qu
 
 
 def test_the_page_of_a_model_that_lacks_something_says_what_its_intervals_hold(tmp_path):
-    (event,) = events((0.5,), 0.002)
+    (event,) = records((0.5,), 0.002)
     # a load that is switched on: nothing of the model can do that
     step = 0.02 * (event.record.t > 0.85)
     spoiled = study.event(
         event.record.t, event.record.U, np.array([event.record.P + step, event.record.Q])
     )
-    known = study.judged(Problem(study.model(), [spoiled]), study.TYPICAL).uncertainty
+    known = study.judged(problem([spoiled]), study.TYPICAL).uncertainty
     assert not known.exact
     found = profiles(known, names=["M", "p_v"])
     told = read(report(found, "an effect is missing").save(tmp_path / "profile.html"))
@@ -215,29 +165,6 @@ def test_the_page_of_a_model_that_lacks_something_says_what_its_intervals_hold(t
         profile.interval[0] < value < profile.interval[1]
         for profile, value in zip(found.profiles, (known.values[3], known.values[5]), strict=True)
     )
-
-
-def test_the_page_of_a_posterior_shows_its_draws_beside_the_fit(quiet, tmp_path):
-    rng = np.random.default_rng(1)
-    error = quiet.information.standard_errors
-    draws = quiet.values + error * rng.standard_normal((20_000, len(error)))
-    draws[:, 1] += 1.5 * error[1]  # of one parameter they lie elsewhere
-    # as C does, so does q_v
-    draws[:, 6] = quiet.values[6] + error[6] * (draws[:, 2] - quiet.values[2]) / error[2]
-    path = posterior.report(quiet, PosteriorSample(quiet.names, draws, 2000, 50.0, 0.3, 1)).save(
-        tmp_path / "posterior.html"
-    )
-    told, drawn = read(path).words, charts(path.read_text(encoding="utf-8"))
-    assert "but those of X_prime: take the posterior's." in told
-    assert "The chain lasts 40 autocorrelation times; 50 are asked for: raise steps." in told
-    assert "C and q_v depend on each other most" in told
-    assert len(drawn) == len(quiet.names) + 1
-    first = drawn[0]
-    edges, density = (unpacked(first["data"][-1][axis]).astype(float) for axis in "xy")
-    assert np.sum(np.diff(edges) * density[:-1]) == pytest.approx(1, rel=1e-4)
-    shaded, estimate = first["layout"]["shapes"]
-    assert (shaded["x0"], shaded["x1"]) == pytest.approx(np.quantile(draws[:, 0], [0.025, 0.975]))
-    assert estimate["x0"] == quiet.values[0]
 
 
 def test_the_page_says_where_curvature_misleads(quiet):
@@ -259,30 +186,3 @@ def test_the_page_says_where_curvature_misleads(quiet):
         ({"minima": (0.02,)}, r"0\.02 fits about as well as the estimate"),
     ):
         assert re.fullmatch(sentence + r"\.", meaning(found, replace(profile, **changes))), sentence
-
-
-def test_a_verdict_repeats_no_interval():
-    """The table has the one interval that holds: a half-width of the curvature beside it would be
-    another.
-    """
-    by_curvature = ParameterVerdict(WEAK, "trades against T_m (correlation 0.98)")
-    profile = LikelihoodProfile(
-        "C",
-        np.array([0.3, 0.5, 0.9]),
-        np.array([5.0, 0.0, 5.0]),
-        (0.31, 0.88),
-        (End.CLOSED, End.CLOSED),
-        (),
-    )
-    verdict = str(revise_verdict(by_curvature, profile, 0.0, 1.0))
-    assert verdict == "weakly identified: trades against T_m (correlation 0.98)"
-    assert brief(verdict) == "weakly identified"
-    assert brief("identified") == "identified"
-
-
-def test_places_that_fit_are_looked_for_beside_an_interval_without_ends():
-    points = np.array([[0.2], [0.9]]), np.array([[0.5], [2.0]])
-    with np.errstate(all="raise"):
-        assert find_outermost(*points, 0, (-np.inf, np.inf)) == []
-    assert find_outermost(*points, 0, (0.3, 0.4)) == [0]
-    assert find_outermost(*points, 0, (0.0, 0.1)) == [0]
