@@ -10,9 +10,9 @@ from tractexp.inference.problem import Problem
 NOISE = 0.004  # of a single dip
 
 
-def problem(events, bounds=None):
-    """That of the model of third order."""
-    return Problem(study.model(), events, bounds)
+def problem(events, bounds=None, load=None):
+    """That of a load model, by default that of third order."""
+    return Problem(load or study.model(), events, bounds)
 
 
 def records(depths, deviation, seed=1, truth=study.TYPICAL, correlation=0.0, Q_s0=0.35):

@@ -17,10 +17,7 @@ from screens import LINES, count_rows
 from written_out import printed_dip
 
 import tractexp as public
-from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
-from tractexp.identification.adequacy import Adequacy, Grade
-from tractexp.identification.advice import advise
 from tractexp.identification.plan import (
     DipShape,
     add_information,
@@ -30,13 +27,10 @@ from tractexp.identification.plan import (
     forecast,
     over_depth,
 )
-from tractexp.identification.profile import check_by_profiles
-from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
+from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
-from tractexp.model.model import compose
 from tractexp.report.plan import marks
 
-GOOD = Adequacy(Grade.ADEQUATE, "the model describes this load: use it", 0.5)
 SHAPE = DipShape(depth=0.4, duration=0.2, rate=500.0, noise_P=0.004, noise_Q=0.004, P0=1.0, Q0=1.0)
 
 
@@ -130,59 +124,6 @@ def test_a_plan_stands_on_the_numbers_of_the_identification():
     for name in ("T_prime", "M", "T_m", "p_v"):  # the plan's edges are straight and shorter
         low, high = fit.parameters[name].interval
         assert there[name] == pytest.approx((high - low) / 2 / fit.parameters[name].value, rel=0.3)
-
-
-def test_a_further_dip_as_advised_gives_what_was_promised_and_a_repetition_does_not():
-    """C is ± 8 % by curvature and weak only because its profile runs into the bound."""
-    one = recorded(0.2, 0.006, seed=1, name="one")
-
-    def judged(*others):
-        events = [recorded(depth, 0.006, seed, name="other") for depth, seed in others]
-        return check_by_profiles(
-            study.judged(Problem(study.model(), [one, *events]), study.TYPICAL).uncertainty
-        )
-
-    known = judged()
-    (said,) = [sentence for sentence in advise(known, GOOD) if sentence.startswith("for C:")]
-    assert 0.07 < known.half[2] / known.values[2] < 0.1
-    assert known.profiled["C"][1] == 0.99
-    low, high, goal = re.search(
-        r"dip of (\S+) to (\S+) % for 234 ms.* ± (\S+) % or better", said
-    ).groups()
-    assert 20 < float(low) < 60 < float(high)  # as deep as the one recorded is not among them
-    assert (
-        "its interval now reaches its bound 0.99, and if it does so then, ask whether"
-        " model.bounds.C" in said
-    )
-    advised, repeated = judged((0.6, 13)), judged((0.2, 12))
-    assert advised.verdicts["C"].word == IDENTIFIED
-    assert advised.half[2] / advised.values[2] < 1.1 * float(goal) / 100
-    assert repeated.half[2] / repeated.values[2] > 1.3 * float(goal) / 100
-
-
-def test_advice_for_a_model_that_no_planned_dip_can_hold_has_no_figures():
-    """Such a model reads more than the voltage, so that nothing can be forecast; what is open must
-    be said still.
-    """
-    static, f = get("model/static", "exponential_frequency")(), np.full(1000, 50.0)
-    event = recorded(0.2, 0.015)
-    event = replace(event, record=replace(event.record, f=f + 0.2 * (event.record.t > 0.3)))
-    problem = Problem(compose(get("model/motor", "electromechanical")(), static), [event])
-    known = study.judged(problem, np.array([*study.TYPICAL, 0.0, 0.0])).uncertainty
-    said = advise(known, GOOD)[-1]
-    poor = [
-        name for name, verdict in known.verdicts.items() if verdict.word in (WEAK, UNIDENTIFIED)
-    ]
-    assert "q_f" in poor
-    assert said.startswith(
-        f"for {', '.join(poor)}: record a dip of another depth and fit it together"
-    )
-    sentence = (
-        "a voltage alone, but of this model the model/static 'exponential_frequency' reads f:"
-        " nothing can be planned"
-    )
-    with pytest.raises(UserError, match=sentence):
-        forecast(problem, known.values, SHAPE)
 
 
 def test_shapes_that_cannot_be_recorded_are_refused():
@@ -302,8 +243,6 @@ def test_a_dip_in_which_the_model_diverges_tells_nothing(problem, monkeypatch):
     """A motor that stalls: sensitivities beyond all numbers overflow nowhere, and add nothing to
     what is known.
     """
-    from tractexp.inference.likelihood import Likelihood
-
     (known,) = each(problem, study.TYPICAL)
     computed = Likelihood.jacobian
 

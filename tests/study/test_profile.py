@@ -33,17 +33,16 @@ def along(quiet):
 
 
 def test_with_little_noise_a_profile_is_the_parabola_of_the_information_matrix(quiet, along):
-    found = along
-    assert found.restarts == 0
-    for profile, value, half in zip(found.profiles, quiet.values, quiet.half, strict=True):
+    assert along.restarts == 0
+    for profile, value, half in zip(along.profiles, quiet.values, quiet.half, strict=True):
         np.testing.assert_allclose(
             profile.interval, (value - half, value + half), atol=0.06 * half, err_msg=profile.name
         )
         assert profile.ends == (End.CLOSED, End.CLOSED)
         assert profile.minima == ()
-        parabola = found.threshold * ((profile.values - value) / half) ** 2
+        parabola = along.threshold * ((profile.values - value) / half) ** 2
         np.testing.assert_allclose(profile.deviance, parabola, atol=0.25 + 0.1 * parabola.max())
-    assert {v.word for v in found.verdicts.values()} == {study.IDENTIFIED}
+    assert {v.word for v in along.verdicts.values()} == {study.IDENTIFIED}
 
 
 def test_a_point_of_a_profile_is_the_constrained_optimum(quiet):
@@ -122,26 +121,23 @@ def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
     assert found.uncertainty.deviance == pytest.approx(quiet.deviance, abs=0.05)
 
 
-def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(
-    quiet, along, tmp_path
-):
-    found = along
-    path = report(found).save(tmp_path / "profile.html")
+def test_the_page_draws_each_profile_with_its_parabola_and_interval(quiet, along, tmp_path):
+    path = report(along).save(tmp_path / "profile.html")
     told, drawn = read(path), charts(path.read_text(encoding="utf-8"))
     for chart, profile, value, half in zip(
-        drawn, found.profiles, quiet.values, quiet.half, strict=True
+        drawn, along.profiles, quiet.values, quiet.half, strict=True
     ):
         assert chart["layout"]["title"]["text"] == f"{profile.name}: identified"
         curves = {trace["name"]: trace for trace in chart["data"] if trace["name"]}
         x, y = (unpacked(curves["profile"][axis]) for axis in "xy")
         np.testing.assert_allclose(np.interp(profile.values, x, y), profile.deviance, atol=1e-4)
         for end in profile.interval:  # the interval is where the curve drawn crosses the threshold
-            assert np.interp(end, x, y) == pytest.approx(found.threshold, rel=0.02)
+            assert np.interp(end, x, y) == pytest.approx(along.threshold, rel=0.02)
         x, y = (unpacked(curves["curvature"][axis]) for axis in "xy")
-        assert np.interp(value + half, x, y) == pytest.approx(found.threshold, rel=0.02)
+        assert np.interp(value + half, x, y) == pytest.approx(along.threshold, rel=0.02)
         shaded, level = chart["layout"]["shapes"]
         assert (shaded["x0"], shaded["x1"]) == profile.interval
-        assert level["y0"] == found.threshold
+        assert level["y0"] == along.threshold
     assert "For every parameter the curvature's interval is enough" in told.words
     assert "Every parameter is identified." in told.words
     for part in ("transient reactance on the record's base", "pu s²/rad", "is enough."):

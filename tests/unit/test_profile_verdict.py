@@ -1,5 +1,5 @@
-"""What a profile makes of a verdict, `revise_verdict`, and where other places that fit are looked for,
-`find_outermost`.
+"""What a profile makes of a verdict, `revise_verdict`, and where other places that fit are looked
+for, `find_outermost`.
 """
 
 from dataclasses import replace
