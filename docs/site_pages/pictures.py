@@ -13,7 +13,7 @@ from tractexp.kernel.layout import INPUTS
 from tractexp.model.drive import WAVES, Drive
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect, Motor, Part
-from tractexp.testing import drives, loads
+from tractexp.testing import drives, models
 
 DEPTH = 0.4  # pu
 WIDTH, HEIGHT = 4.8, 1.4  # inches, the height of a panel: legible on a phone
@@ -41,13 +41,13 @@ def pair(cls: type[Part]) -> tuple[Model, Model]:
     base, own = usual(), cls()
     if isinstance(own, Effect):
         if cls.waves_only or base.acceptance(own).refusal is not None:
-            return loads.build_base_model(cls), loads.with_part(cls)
+            return models.build_base_model(cls), models.with_part(cls)
         return base, compose(base.motor, base.static, [own])
     of = compose(own, base.static) if isinstance(own, Motor) else compose(base.motor, own)
     try:
         _ = of.equations
     except UserError:
-        of = loads.with_part(cls)
+        of = models.with_part(cls)
     return base, of
 
 
@@ -55,7 +55,7 @@ def values(of: Model) -> dict[str, float]:
     """Every parameter at its default, the sizes of an effect clearly beyond what matters."""
     own = {p.name for effect in of.effects for p in effect.parameters}
     return {
-        p.name: loads.choose_active_size(p) if p.name in own else p.default for p in of.parameters
+        p.name: models.choose_active_size(p) if p.name in own else p.default for p in of.parameters
     }
 
 
@@ -64,7 +64,7 @@ def played(of: Model, drive: Drive) -> np.ndarray | None:
     before the dip.
     """
     try:
-        return loads.play(of, drive, np.array([*values(of).values()]))[:, 0]
+        return models.play(of, drive, np.array([*values(of).values()]))[:, 0]
     except AssertionError:
         return None
 

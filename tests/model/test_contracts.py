@@ -21,7 +21,7 @@ from tractexp.extend import (
     sites,
 )
 from tractexp.record.phasor import Averager
-from tractexp.testing import channels, loads, readers, searches
+from tractexp.testing import channels, loads, models, readers, searches
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")
 
@@ -49,7 +49,7 @@ def stranger():
         return plugin(type("Stranger", (base,), body | size | attributes))
 
     yield register
-    for remembered in (loads.model, loads.partners, loads._base):
+    for remembered in (models.model, models.partners, models.find_base_parts):
         remembered.cache_clear()
 
 
@@ -205,7 +205,7 @@ def test_an_effect_that_nothing_takes_fails_with_the_reason(stranger):
 )
 def test_a_law_that_is_none_is_refused_when_the_model_is_composed(stranger, law, sentence):
     with pytest.raises(UserError, match=sentence):
-        _ = loads.with_part(stranger(Static, law=law)).equations
+        _ = models.with_part(stranger(Static, law=law)).equations
 
 
 def test_a_law_with_parameters_that_returns_nothing_is_refused(stranger):
@@ -213,7 +213,7 @@ def test_a_law_with_parameters_that_returns_nothing_is_refused(stranger):
     slope = Parameter(1.0, (0.0, 3.0), "1", "slope", "here")
     made = stranger(Static, slope=slope, law=lambda self, u, slope: None)
     with pytest.raises(UserError, match="returns nothing, so that no equation has its slope"):
-        _ = loads.with_part(made).equations
+        _ = models.with_part(made).equations
 
 
 @pytest.mark.parametrize(
@@ -264,9 +264,9 @@ def test_a_law_with_parameters_that_returns_nothing_is_refused(stranger):
     ],
 )
 def test_what_an_edit_does_wrong_is_a_sentence(stranger, edit, sentence):
-    motor, static = loads.partners()
+    motor, static = models.partners()
     with pytest.raises(UserError, match=sentence):
-        _ = loads.model(motor, static, stranger(Effect, edit=edit)).equations
+        _ = models.model(motor, static, stranger(Effect, edit=edit)).equations
 
 
 def test_a_law_is_evaluated_at_a_state_by_substitution(stranger):
@@ -275,10 +275,10 @@ def test_a_law_is_evaluated_at_a_state_by_substitution(stranger):
         eq.moves(late, (eq[sites.static_voltage] - late) / 0.1, 1)
         eq.edit(sites.Q_static, lambda Q: (1 - a) * Q + a * Q.subs(eq[sites.static_voltage], late))
 
-    motor, static = loads.partners()
+    motor, static = models.partners()
     bare, eq = (
-        loads.model(motor, static).equations,
-        loads.model(motor, static, stranger(Effect, edit=edit)).equations,
+        models.model(motor, static).equations,
+        models.model(motor, static, stranger(Effect, edit=edit)).equations,
     )
     law, edited = bare.expression(sites.Q_static), eq.expression(sites.Q_static)
     u, late, a = bare[sites.static_voltage], eq["late_voltage"], eq["a"]
@@ -287,14 +287,14 @@ def test_a_law_is_evaluated_at_a_state_by_substitution(stranger):
 
 
 def test_two_effects_with_one_name_of_a_state_are_refused_and_the_owner_is_named(stranger):
-    motor, static = loads.partners()
+    motor, static = models.partners()
     second = stranger(Effect, edit=lambda self, eq, a: eq.lag("link_power", "x"))
     with pytest.raises(UserError, match="'link_power' already, declared by the effect dc_link_lag"):
-        _ = loads.model(motor, static, get("effect", "dc_link_lag"), second).equations
+        _ = models.model(motor, static, get("effect", "dc_link_lag"), second).equations
 
 
 def test_a_static_load_with_a_parameter_of_the_motor_is_refused(stranger):
-    motor, _ = loads.partners()
+    motor, _ = models.partners()
     taken = motor.parameters[0]
     law = eval(f"lambda self, u, {taken.name}: (1, 1)")
     static = stranger(Static, law=law, **{taken.name: taken})
@@ -302,7 +302,7 @@ def test_a_static_load_with_a_parameter_of_the_motor_is_refused(stranger):
         UserError,
         match=f"static load 'stranger' do not compose: .* a parameter '{taken.name}' already",
     ):
-        _ = loads.model(motor, static).equations
+        _ = models.model(motor, static).equations
 
 
 def test_a_package_without_plugins_is_refused():

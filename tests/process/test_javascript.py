@@ -14,7 +14,7 @@ from tractexp.kernel.layout import PHASOR_INPUTS
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.lowering import lower
 from tractexp.model.model import compose
-from tractexp.testing.loads import choose_active_size
+from tractexp.testing.models import choose_active_size
 
 NODE = shutil.which("node")
 STEP, SUBSTEPS = 0.002, 2

@@ -124,11 +124,11 @@ def test_sections_of_numpydoc_become_lists_and_blocks():
 
 def test_the_symbols_of_all_equations_have_one_index_and_one_exponent():
     """TeX refuses `t_b_1`; the equations of a page and of a notebook must be set."""
-    from tractexp.testing import loads
+    from tractexp.testing import models
 
     for group in ("model/motor", "model/static", "effect"):
         for name, cls in discover()[group].items():
-            for line in loads.with_part(cls).latex():
+            for line in models.with_part(cls).latex():
                 assert not re.search(r"_(\{[^{}]*\}|\\?\w+)_", line), f"{name}: {line}"
 
 

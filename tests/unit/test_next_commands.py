@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -11,7 +12,7 @@ from tractexp.api.next_commands import list_next_commands
 def tell(grade, better="look at the waveforms"):
     """The commands of an extended model of this grade, where waveforms may tell more."""
     domain = SimpleNamespace(better=lambda event: better)
-    result = SimpleNamespace(
+    result: Any = SimpleNamespace(
         question=SimpleNamespace(model=SimpleNamespace(domain="phasors")),
         content={"adequacy": {"grade": grade}},
         gap=SimpleNamespace(fitted_to_both=False),

@@ -1,161 +1,39 @@
 """What motors, static loads, effects of the load and effects of the measurement must satisfy."""
 
-import functools
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from tractexp.configuration.plugin import discover
 from tractexp.errors import UserError, list_allowed
-from tractexp.kernel.layout import INPUTS
 from tractexp.model import sites
-from tractexp.model.drive import PHASORS, WAVES, Drive
-from tractexp.model.model import Model, compose
+from tractexp.model.drive import WAVES, Drive
+from tractexp.model.model import compose
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
-from tractexp.parameter import Parameter
 from tractexp.testing import drives
+from tractexp.testing.models import (
+    SUBSTEPS,
+    build_base_model,
+    choose_active_size,
+    explain_refused_base,
+    list_bases,
+    list_registered,
+    model,
+    play,
+    select_still_outputs,
+    values,
+    with_part,
+)
 
 EQUATION_ROUNDING = 1e-12  # pu: what rounding leaves between equal equations
 LARGEST_STEADY_DRIFT = 1e-9  # pu: what a steady state solved to rounding drifts by
 LEAST_VISIBLE_CHANGE = 1e-5  # pu: what a record can show at all
 SCALED = 1e-8  # of the largest power: what two bases of power may differ by
 LARGEST = 30.0  # pu: no load draws more
-SUBSTEPS = 4
 # Runge-Kutta steps a sample, of which those in the asymptotic range count
 COUNTS = (2, 4, 8, 16, 32, 64, 128, 256)
 ASYMPTOTIC = (1e-11, 1e-6)  # pu: errors of the fourth order, above rounding
-
-
-# Models to put a part into
-
-
-@functools.cache
-def partners() -> tuple[type[Motor], type[Static]]:
-    """The registered motor and static load a contract is played with: few parameters, a flux and a
-    speed that move.
-    """
-    motors = [cls for cls in _all("model/motor") if cls.parameters and _moves(cls)]
-    statics = [cls for cls in _all("model/static") if cls.parameters and not cls.reads]
-    if not (motors and statics):
-        raise UserError(
-            "contracts need a registered motor with flux and speed and a static load with"
-            " parameters"
-        )
-    return tuple(
-        min(classes, key=lambda cls: (len(cls.parameters), cls.name))
-        for classes in (motors, statics)
-    )  # type: ignore[return-value]
-
-
-def _moves(cls: type[Motor]) -> bool:
-    """Whether a motor has a flux and a speed that move."""
-    from tractexp.model.declaration import motor_alone
-
-    return {"flux", "speed"} <= {
-        s.role for s in motor_alone(cls()).states.values() if s.derivative != 0
-    }
-
-
-def _all(group: str) -> list[type]:
-    """The plugins of a group, in order of name."""
-    return [cls for _, cls in sorted(discover().get(group, {}).items())]
-
-
-@functools.cache
-def model(motor: type[Motor], static: type[Static], *effects: type[Effect]) -> Model:
-    """A load of these parts with default settings."""
-    return compose(
-        motor(), static(), [cls() for cls in effects], domain=_domain(motor, static, *effects)
-    )
-
-
-def _domain(*parts: type[Part]) -> str:
-    """The domain in which parts are tried: waveforms where one of them makes sense only there."""
-    return WAVES if any(cls.waves_only for cls in parts) else PHASORS
-
-
-def with_part(cls: type[Part]) -> Model:
-    """The model a motor, a static load or an effect is tried in."""
-    motor, static = partners()
-    if issubclass(cls, Motor):
-        return model(cls, static)
-    if issubclass(cls, Static):
-        return model(motor, cls)
-    return model(*_base(cls), cls)
-
-
-@functools.cache
-def build_base_model(cls: type[Effect]) -> Model:
-    """The base model of an effect, in its domain."""
-    motor, static = _base(cls)
-    return compose(motor(), static(), domain=with_part(cls).domain)
-
-
-@functools.cache
-def _base(cls: type[Effect]) -> tuple[type[Motor], type[Static]]:
-    """The parts of the base model of an effect: the usual partners, or the first pair that takes
-    it.
-    """
-    for motor, static in _bases():
-        if _explain_refused_base(motor, static, cls) is None:
-            return motor, static
-    raise AssertionError(f"no registered motor and static load take the effect '{cls.name}'")
-
-
-def _bases() -> Iterator[tuple[type[Motor], type[Static]]]:
-    """The usual partners, then each registered part beside the other of them."""
-    motor, static = partners()
-    yield motor, static
-    yield from ((other, static) for other in _all("model/motor") if other is not motor)
-    yield from ((motor, other) for other in _all("model/static") if other is not static)
-
-
-def _explain_refused_base(
-    motor: type[Motor], static: type[Static], cls: type[Effect]
-) -> str | None:
-    """Why a base model refuses an effect, None where it takes it. Anything but a sentence is
-    raised.
-    """
-    return compose(motor(), static(), domain=_domain(motor, static, cls)).acceptance(cls()).refusal
-
-
-def values(
-    of: Model, pick: Callable[[Parameter], float] = lambda p: p.default, only: Part | None = None
-) -> np.ndarray:
-    """The defaults (d,), but `pick` for the parameters of `only`, or of all."""
-    chosen = of.parameters if only is None else only.parameters
-    return np.array([pick(p) if p in chosen else p.default for p in of.parameters])
-
-
-def choose_active_size(p: Parameter) -> float:
-    """A size halfway to its farther bound; anything else at its default."""
-    null = p.null
-    return p.default if null is None else (null + max(p.bounds, key=lambda b: abs(b - null))) / 2
-
-
-def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) -> np.ndarray:
-    """P and Q (2, n, N) [pu], or the current in its frame and of zero sequence (3, n, N); fails at
-    no rest.
-    """
-    response = of.simulate(drive, chosen, substeps)
-    if (response.miss != 0).any():
-        missed = np.atleast_2d(chosen)[int(np.argmax((response.miss != 0).any(axis=0)))]
-        why = of.refusal(missed, drive)
-        raise AssertionError(
-            f"{of.title} has no steady state at"
-            f" {dict(zip(of.names, missed.tolist(), strict=True))}: {why}"
-        )
-    return _select_still_outputs(of, drive, response.outputs)
-
-
-def _select_still_outputs(of: Model, drive: Drive, outputs: np.ndarray) -> np.ndarray:
-    """The outputs that stand still where the voltage turns steadily."""
-    if not of.waves:
-        return outputs
-    rows = dict(zip(INPUTS, drive.inputs, strict=True))
-    still = (outputs[0] + 1j * outputs[1]) * (rows["turn_re"] - 1j * rows["turn_im"])
-    return np.stack([still.real, still.imag, outputs[2]])
 
 
 # What every part must satisfy
@@ -284,7 +162,7 @@ def composes_with_every_other(cls: type[Part]) -> None:
     """Every registered static load or motor beside it gives a model, or is refused
     in a sentence.
     """
-    for other in _all("model/static" if issubclass(cls, Motor) else "model/motor"):
+    for other in list_registered("model/static" if issubclass(cls, Motor) else "model/motor"):
         try:
             _ = (model(cls, other) if issubclass(cls, Motor) else model(other, cls)).equations
         except UserError:
@@ -294,7 +172,7 @@ def composes_with_every_other(cls: type[Part]) -> None:
 def takes_or_refuses_every_effect(cls: type[Part]) -> None:
     """Every registered effect is an edit of it, or is refused with a reason."""
     of = with_part(cls)
-    for effect in _all("effect"):
+    for effect in list_registered("effect"):
         assert of.acceptance(effect()).refusal != "", (
             f"'{effect.name}' refuses '{cls.name}' without a reason"
         )
@@ -406,7 +284,7 @@ def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
         outputs = np.repeat(bare.simulate(drive, values(bare), SUBSTEPS).outputs, len(rows), axis=1)
         picked = dict(zip(of.names, np.transpose(rows), strict=True))
         columns = {p.name: np.tile(picked[p.name], (drive.events, 1)) for p in own.parameters}
-        played = _select_still_outputs(of, drive, own.observe(outputs, drive, columns))
+        played = select_still_outputs(of, drive, own.observe(outputs, drive, columns))
     else:
         played = play(of, drive, np.array(rows))
     off = np.abs(played - plain).max()
@@ -445,7 +323,7 @@ def is_taken_or_refused_by_every_model(cls: type[Effect]) -> None:
     """Every registered motor and static load takes it, or refuses it with a reason;
     one takes it.
     """
-    reasons = [_reason(motor, static, cls) for motor, static in _bases()]
+    reasons = [_reason(motor, static, cls) for motor, static in list_bases()]
     assert None in reasons, f"no model takes '{cls.name}': {reasons[0]}"
     assert "" not in reasons, f"'{cls.name}' is refused without a reason"
 
@@ -453,7 +331,7 @@ def is_taken_or_refused_by_every_model(cls: type[Effect]) -> None:
 def _reason(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
     """Why an effect does not fit a motor and a static load; None where it does."""
     try:
-        return _explain_refused_base(motor, static, cls)
+        return explain_refused_base(motor, static, cls)
     except UserError as error:
         return str(error)
 
