@@ -19,8 +19,9 @@ from tractexp.model.model import compose
 GOOD = Adequacy(Grade.ADEQUATE, "the model describes this load: use it", 0.5)
 
 
-def replace_name(event, seed):
-    """The event under a name of its own."""
+def dip(depth, seed):
+    """One with noise of 0.6 %, under a name of its own."""
+    (event,) = records((depth,), 0.006, seed)
     return replace(event, record=replace(event.record, name=f"dip {seed}"))
 
 
@@ -28,8 +29,8 @@ def test_a_further_dip_as_advised_gives_what_was_promised_and_a_repetition_does_
     """C is ± 8 % by curvature and weak only because its profile runs into the bound."""
 
     def judged(*dips):
-        events = [replace_name(*records((depth,), 0.006, seed), seed) for depth, seed in dips]
-        return check_by_profiles(study.judged(problem(events), study.TYPICAL).uncertainty)
+        fitted = problem([dip(*one) for one in dips])
+        return check_by_profiles(study.judged(fitted, study.TYPICAL).uncertainty)
 
     known = judged((0.2, 1))
     (said,) = [sentence for sentence in advise(known, GOOD) if sentence.startswith("for C:")]
@@ -59,11 +60,8 @@ def test_advice_for_a_model_that_no_planned_dip_can_hold_has_no_figures():
     case = problem([event], load=compose(get("model/motor", "electromechanical")(), static))
     known = study.judged(case, np.array([*study.TYPICAL, 0.0, 0.0])).uncertainty
     said = advise(known, GOOD)[-1]
-    poor = [
-        name
-        for name, verdict in known.verdicts.items()
-        if verdict.word in (study.WEAK, study.UNIDENTIFIED)
-    ]
+    words = {name: verdict.word for name, verdict in known.verdicts.items()}
+    poor = [name for name, word in words.items() if word in (study.WEAK, study.UNIDENTIFIED)]
     assert "q_f" in poor
     assert said.startswith(
         f"for {', '.join(poor)}: record a dip of another depth and fit it together"

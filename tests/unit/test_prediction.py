@@ -11,7 +11,7 @@ from made_sets import off
 from tractexp.discrepancy import prediction
 from tractexp.inference.fitting import Refit
 
-# three effects of the load, a law of the first by another form, and a fault of the measurement
+# five effects of the load, a law of the first by another form, and a fault of the measurement
 CATALOGUE = SimpleNamespace(
     of_load=("a", "b", "c", "d", "e"),
     textbook=lambda names: tuple({"a_of_other_law": "a"}.get(name, name) for name in names),
