@@ -11,7 +11,7 @@ import tractexp
 from tractexp.inference.blocks import LENGTH, blocks_of
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
-from tractexp.inference.sandwich import scatter
+from tractexp.inference.sandwich import moves_without_blocks, robust_root, scatter
 
 
 def least_squares(case, deviation=NOISE):
@@ -34,6 +34,25 @@ def test_blocks_hold_every_sample_once_and_begin_with_the_dip():
     assert later[0].start == event.start
     many = blocks_of(case.events, case.drive, 60)  # three for each parameter
     assert len(many) > 2.5 * 60
+
+
+def test_of_a_linear_model_leaving_out_a_block_moves_it_as_a_refit_does():
+    rng = np.random.default_rng(1)
+    J, rows = rng.standard_normal((1, 60, 3)), 0.01 * rng.standard_normal((1, 60))
+    blocks = [slice(k, k + 20) for k in (0, 20, 40)]
+    whole = np.linalg.lstsq(J[0], -rows[0])[0]
+    moves = moves_without_blocks(J, rows + J @ whole, blocks, J[0].T @ J[0])
+    for block, move in zip(blocks, moves, strict=True):
+        rest = np.setdiff1d(np.arange(60), np.arange(60)[block])
+        assert np.linalg.lstsq(J[0, rest], -rows[0, rest])[0] - whole == pytest.approx(move)
+
+
+def test_no_error_is_less_than_that_of_independent_residuals():
+    """Where blocks hardly move the estimate, as by chance a few may."""
+    J = np.random.default_rng(2).standard_normal((40, 3))
+    root, ratio, spread = robust_root(J, np.zeros((4, 3)))
+    assert root.T @ root == pytest.approx(J.T @ J)
+    assert [*ratio, spread] == pytest.approx([1.0] * 4)
 
 
 def test_leaving_out_a_block_is_what_a_refit_without_it_gives():

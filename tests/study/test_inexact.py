@@ -12,6 +12,7 @@ from conftest import MOTOR
 
 import tractexp
 from tractexp.blocks import Report
+from tractexp.discrepancy.investigate import _complete_row as complete_row
 from tractexp.discrepancy.precision import standard_errors
 from tractexp.discrepancy.prediction import SHARING, predict_held_out
 from tractexp.identification.verdict import UNIDENTIFIED
@@ -127,10 +128,13 @@ def test_a_size_that_is_known_no_better_than_its_bounds_is_told(found):
     assert blind.open_sizes == ("of R_s the events know no more than the bounds",)
 
 
-def test_what_rests_on_a_bound_is_told_of_the_effects_alone(found, monkeypatch):
+def test_an_effect_whose_size_rests_on_a_bound_is_a_candidate(found, monkeypatch):
     monkeypatch.setattr("tractexp.discrepancy.findings.at_bound", lambda *_: ["R_s", "T_m"])
     (told,) = replace(found.steps).open_sizes
     assert told.startswith("R_s rests on its bound, 0.0")
+    again = complete_row(replace(found.steps), found.steps.withheld)
+    assert again.verdict.word == "candidate"
+    assert again.reason.endswith(f"{told}: so it is no name")
 
 
 def test_the_files_say_what_is_left(found, tmp_path):

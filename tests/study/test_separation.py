@@ -42,6 +42,18 @@ def test_a_rival_is_linearised_as_its_refit_moves():
     assert float(linear[0]) - truth.deviance == pytest.approx(refitted, rel=0.15, abs=1.0)
 
 
+def test_rivals_that_no_event_tells_apart_do_not_spoil_the_chance_of_the_others():
+    """Of three rivals, each event denies the third and nothing else."""
+    denied = np.zeros((3, 3, 10), bool)
+    denied[np.arange(3), np.arange(3)] = True  # the truth itself, for want of a rival
+    denied[:2, 2] = denied[2, :2] = True
+    ignored = np.zeros((3, 3), bool)
+    event = ImaginedDip(0.4, 0.2)
+    assert EventTrial.from_draws(event, denied, ignored).least == 0.0
+    ignored[0, 1] = ignored[1, 0] = True
+    assert EventTrial.from_draws(event, denied, ignored).least == 1.0
+
+
 def test_rows_are_reduced_without_loss():
     rng = np.random.default_rng(1)
     blocks = [rng.normal(size=(3, 40)), rng.normal(size=(5, 40))]

@@ -38,6 +38,15 @@ def test_a_name_is_told_beside_what_the_base_model_the_next_set_and_the_best_ter
     assert told.endswith("; each event, left out in turn, confirms it")
 
 
+def test_sets_that_predict_alike_are_told_as_alternatives_with_their_errors():
+    one, other = off("a", error=0.2), off("b", error=0.21)
+    sets = table(off(error=1.0), one, other, term=off(TERM, error=0.9))
+    assert sentence_on(sets, "tied", one, other).startswith(
+        "a or b: they predict the held-out events within 20 % and 21 % of the response, which"
+        " cannot tell them apart, where the base model misses 100 %"
+    )
+
+
 def test_a_name_that_the_best_term_takes_is_told_with_what_both_miss():
     sets = table(off(error=1.0), off("a", error=0.3), term=off(TERM, error=0.1))
     assert sentence_on(sets) == (
