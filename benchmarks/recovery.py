@@ -21,7 +21,7 @@ import tractexp
 from tractexp.configuration.plugin import build
 from tractexp.exchange.format import Identified
 from tractexp.record import Event, Record, detect
-from tractexp.record.phasor import measure
+from tractexp.record.phasor_measurement import measure
 from tractexp.record.record import Base
 from tractexp.record.waves import Waves
 from tractexp.recording.estimator import estimator_of

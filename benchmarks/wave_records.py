@@ -142,7 +142,7 @@ def record(x: np.ndarray, rate: float, name: str):
     beside them.
     """
     from tractexp.record import Record
-    from tractexp.record.phasor import measure
+    from tractexp.record.phasor_measurement import measure
     from tractexp.record.record import Base
     from tractexp.record.waves import Waves
     from tractexp.recording.estimator import estimator_of

@@ -20,7 +20,7 @@ from tractexp.extend import (
     plugin,
     sites,
 )
-from tractexp.record.phasor import Averager
+from tractexp.record.phasor_measurement import Averager
 from tractexp.testing import channels, loads, models, readers, searches
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")

@@ -7,7 +7,7 @@ from test_phasor import three_phase, waves
 from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import UserError
 from tractexp.record import Window
-from tractexp.record.phasor import measure
+from tractexp.record.phasor_measurement import measure
 
 ESTIMATORS = ["one_cycle", "p_class", "m_class", {"name": "m_class", "reporting": 100}]
 RATE = 4000.0

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
-from tractexp.record.phasor import fundamental, measure, one_cycle, sequences, track
+from tractexp.record.phasor import sequences
+from tractexp.record.phasor_measurement import fundamental, measure, one_cycle, track
 from tractexp.recording.estimator import estimator_of
 
 PHASES = np.array([100, 80 * np.exp(-2.2j), 95 * np.exp(2.0j)])  # unbalanced on purpose

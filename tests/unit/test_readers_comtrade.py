@@ -8,7 +8,7 @@ from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.record import detect, find_dips
-from tractexp.record.phasor import measure
+from tractexp.record.phasor_measurement import measure
 
 KILOVOLT, KILOAMPERE, LAG = 110 / np.sqrt(3), 0.2, np.deg2rad(30)
 S0 = 3 * KILOVOLT * KILOAMPERE * np.exp(1j * LAG)  # MVA

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.record import Event, Record, WaveEvent
-from tractexp.record.phasor import Phasors, measure
+from tractexp.record.phasor import Phasors
+from tractexp.record.phasor_measurement import measure
 from tractexp.recording.estimator import estimator_of
 
 # Times the recorded apparent power, and that before the dip, which a load draws at a record's end

@@ -17,7 +17,7 @@ from tractexp.model import sites
 from tractexp.model.parts import Curve, Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
 from tractexp.record import Base, Events, Reader, Record
-from tractexp.record.phasor import Averager, one_cycle
+from tractexp.record.phasor_measurement import Averager, one_cycle
 from tractexp.recording import Channel, Connection, Estimator, Recording, Segment, Writer
 from tractexp.recording.connection import SINGLE
 from tractexp.recording.reader import WaveformReader

@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.configuration.plugin import Plugin, build_chosen, discover
 from tractexp.errors import UserError
-from tractexp.record.phasor import Averager, make_weighted_averager
+from tractexp.record.phasor_measurement import Averager, make_weighted_averager
 from tractexp.record.window import Window
 
 SPACING = 1e-3  # s between the weights that a record stores, as phasors are a millisecond apart
@@ -18,8 +18,8 @@ class Estimator(Plugin):
     """Base of the phasor estimators, chosen by `data.estimator=NAME`, or by name and settings.
 
     An estimator is the window over which the least-squares sinusoid of the frequency really present
-    is taken (`tractexp.record.phasor.fundamental`), so that any is exact in steady state; they
-    differ in what they do to changes, harmonics and noise.
+    is taken (`tractexp.record.phasor_measurement.fundamental`), so that any is exact in steady
+    state; they differ in what they do to changes, harmonics and noise.
     """
 
     group: ClassVar[str] = "estimator"

@@ -8,7 +8,8 @@ import numpy as np
 
 from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import DATA, UserError
-from tractexp.record.phasor import Phasors, measure
+from tractexp.record.phasor import Phasors
+from tractexp.record.phasor_measurement import measure
 from tractexp.recording.bridge import find_bridged
 from tractexp.recording.estimator import estimator_of
 from tractexp.recording.feeder import Feeder
@@ -122,7 +123,8 @@ def phasors_of(
     harmonics : ints
         Measured besides the fundamental.
     tracked : dict or None
-        Frequencies that the loads of a bus share, as in `tractexp.record.phasor.measure`.
+        Frequencies that the loads of a bus share, as in
+        `tractexp.record.phasor_measurement.measure`.
 
     Returns
     -------

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.record.phasor import BLOCK, Phasors, WaveSource, frame
+from tractexp.record.phasor import Phasors
+from tractexp.record.phasor_measurement import BLOCK, WaveSource, frame
 from tractexp.record.record import Record
 
 

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.record.change import runs
-from tractexp.record.phasor import FASTEST, SLOWEST, Phasors
+from tractexp.record.phasor import Phasors
+from tractexp.record.phasor_measurement import FASTEST, SLOWEST
 from tractexp.record.record import Record
 from tractexp.record.regression import fit_line
 

@@ -12,7 +12,7 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, MEASURED, PALETTE, REACTIVE, VOLTAGE
 from tractexp.blocks.style import PHASES as COLORS
-from tractexp.record.phasor import BLOCK
+from tractexp.record.phasor_measurement import BLOCK
 from tractexp.recording import Channel, Feeder, Recording, Segment
 from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import View

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tractexp.record.phasor import fundamental
+from tractexp.record.phasor_measurement import fundamental
 from tractexp.recording import Connection, Estimator
 
 RATE, NOMINAL, F = 4000.0, 50.0, 48.7  # Hz: of the samples, of the grid, of the test
