@@ -23,6 +23,8 @@ from tractexp.report.candidate_rows import (
 from tractexp.report.events import BAND_DEVIATIONS
 from tractexp.text.wording import join_words
 
+TWO = FEW[:2]
+
 
 @pytest.fixture
 def named(planted):
@@ -39,7 +41,7 @@ def silent():
 def unexplained():
     made = events("load_step", size=2.0, count=3)
     with no_term_is_searched():
-        return investigate(made[:2], made[2:])
+        return investigate(made[:2], made[2:], TWO)
 
 
 def page(found, folder):
@@ -276,10 +278,18 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
     assert "Missed by the base model" in words
 
 
+def test_what_is_left_is_written_sample_by_sample(unexplained, tmp_path):
+    unexplained.write_results(tmp_path)
+    path = tmp_path / "unexplained.csv"
+    rows = np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding=None)
+    assert len(rows) == sum(event.record.samples for event in unexplained.question.train)
+    assert np.abs(rows["P"]).max() > 5 * 0.002  # the step stands out of the noise
+
+
 def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):
     """It says what was tested, not what the catalogue holds, and numbers that can be pictured."""
     reason = unexplained.reason
-    tested = len(FEW) + 3  # and what may be wrong with the measurement
+    tested = len(TWO) + 3  # and what may be wrong with the measurement
     assert f"none of the {tested} effects tested" in reason
     assert "catalogue" not in reason
     assert not re.search(r"e-\d\d", reason)

@@ -27,7 +27,8 @@ def find(effect, size, seed, effects, recorder=FAST):
 
 
 def test_the_catalogues_own_trip_keeps_its_name_beside_its_members():
-    found = find("undervoltage_trip", 1.0, 800011, TRIP, SHORT)
+    made = events("undervoltage_trip", seed=800011, recorder=SHORT)
+    found = investigate(made, effects=TRIP)
     assert (found.names, found.members) == (TRIP, TRIP)
     assert found.forms["undervoltage_trip"]["law"] == "catalogue"
     # the others are far behind after a few iterations

@@ -34,7 +34,8 @@ def test_an_investigation_starts_anew_with_shorter_steps_where_its_fits_ask_for_
     monkeypatch.setattr(kernels, "LONGEST_SEARCH_STEP", 1.0)
     monkeypatch.setattr(Problem, "steps_at", lambda own, values: 256)
     said: list[str] = []
-    found = investigate(events(recorder=FAST), progress=said.append)
+    made = events(count=1, recorder=FAST)
+    found = investigate(made, effects=("stator_resistance",), progress=said.append)
     own = found.steps.context.kernels
     assert said.count("the fits lie where the motor is fast: again with shorter steps") == 1
     assert (

@@ -121,7 +121,7 @@ def test_the_page_shows_the_currents_of_the_phases_before_and_after(planted):
 def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_path):
     steps, few = (
         planted.steps,
-        ("torque:slip", "torque:slip_squared", "motor:slip", "power:washout", "angle:slip"),
+        ("torque:slip", "motor:slip", "power:washout"),
     )
     among = [term(f"answer:{name}") for name in few]
     proposed = propose(
