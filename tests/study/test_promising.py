@@ -4,12 +4,10 @@ them would.
 
 import numpy as np
 import pytest
-from made_context import bench
-from made_dips import FAST, LOUD, base, events
+from made_context import fitted_base
+from made_dips import FAST, LOUD, events
 
-from tractexp.discrepancy.disagreement import disagreement
 from tractexp.inference import fit_effort, fitting
-from tractexp.inference.base_fit import base_fit
 from tractexp.inference.promising import select_promising_starts
 
 TRIP = ("undervoltage_trip",)
@@ -20,8 +18,9 @@ def planted():
     """The bench of a trip of 5 %, its base fit, and a start at each setting of the catalogue's
     grid.
     """
-    at = bench(base(), events("undervoltage_trip", 0.5, 800012, noise=LOUD, recorder=FAST), TRIP)
-    first = disagreement(base_fit(at), 0)
+    made = events("undervoltage_trip", 0.5, 800012, noise=LOUD, recorder=FAST)
+    first = fitted_base(made, TRIP)
+    at = first.context
     settings = at.catalogue["undervoltage_trip"].settings
     units = np.array(
         [at.coordinates.place_values(first.fit.unit, s | {"tripped_share": 0.05}) for s in settings]

@@ -154,8 +154,8 @@ ENGINE = ("noise", "inference", "identification", "discrepancy")
 
 
 def engine_imports(path: Path) -> dict[str, set[str]]:
-    """{module of the engine: the names that a file imports from it}; a module that is imported as a
-    whole is a name of its room.
+    """{module of the engine: the names that a file imports from it}; of a module that is imported
+    as a whole its own name.
     """
     found: dict[str, set[str]] = {}
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -166,8 +166,10 @@ def engine_imports(path: Path) -> dict[str, set[str]]:
         else:
             continue
         for module, name in pairs:
-            if f"{module}.{name}.".startswith(tuple(f"tractexp.{room}." for room in ENGINE)):
-                found.setdefault(module, set()).add(name)
+            whole = f"{module}.{name}"
+            if f"{whole}.".startswith(tuple(f"tractexp.{room}." for room in ENGINE)):
+                is_module = (ROOT / whole.replace(".", "/")).with_suffix(".py").exists()
+                found.setdefault(whole if is_module else module, set()).add(name)
     return found
 
 
