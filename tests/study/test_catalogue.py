@@ -20,7 +20,10 @@ MEMBERS = {name for name, cls in discover()["effect"].items() if cls.family}
 
 def test_members_belong_to_the_effects_that_are_asked_for():
     made = events(count=1)
-    names = lambda only: {m.name for m in catalogue(base(), made, only).members}  # noqa: E731
+
+    def names(only):
+        return {member.name for member in catalogue(base(), made, only).members}
+
     assert names(("magnetic_saturation",)) == {"saturation_curve"}
     assert names(("stator_resistance",)) == set()
     assert names(()) == MEMBERS

@@ -15,23 +15,28 @@ from tractexp.discrepancy.held_out import assess, carry_fits, compare_on
 from tractexp.inference.fitting import Refit
 
 
+def add_events(steps, made):
+    """The events of an investigation together with these."""
+    known = steps.evidence
+    return AllEvents(steps.context, made, known.noise, known.faults, known.base.fit)
+
+
 def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     """An event with the effect adds to the evidence of the fitted ones, one without it takes from
     it.
     """
     steps = planted.steps
-    trained, alone, known = steps.context, steps.extended_fit, steps.evidence
-    criteria = trained.criteria
-    both = lambda made: AllEvents(trained, made, known.noise, known.faults, known.base.fit)  # noqa: E731
-    fit = lambda made: both(made).fit_jointly([alone], seed=0)  # noqa: E731
-    (confirmed,) = fit(events("stator_resistance", size=2.0, count=3)[2:])
+    alone, criteria = steps.extended_fit, steps.context.criteria
+    dip_with_it = events("stator_resistance", size=2.0, count=3)[2:]
+    (confirmed,) = add_events(steps, dip_with_it).fit_jointly([alone], seed=0)
     assert confirmed.louder > 0
     assert confirmed.p_left >= criteria.adequate_p
     assert confirmed.fit.names == ("stator_resistance",)
     assert confirmed.fit.unit.shape == alone.unit.shape
-    R_s = [trained.coordinates.value("R_s", unit) for unit in (confirmed.fit.unit, alone.unit)]
-    assert R_s[0] == pytest.approx(R_s[1], rel=0.2)
-    (denied,) = fit(events(None, count=3)[2:])
+    value = steps.context.coordinates.value
+    assert value("R_s", confirmed.fit.unit) == pytest.approx(value("R_s", alone.unit), rel=0.2)
+    dip_without_it = events(None, count=3)[2:]
+    (denied,) = add_events(steps, dip_without_it).fit_jointly([alone], seed=0)
     assert denied.louder < 0
     assert denied.p_left < criteria.adequate_p
 
@@ -61,14 +66,11 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
     """A step of the load after the held-out dip is seen beside the effect; without it nobody asks
     for that fit.
     """
-
     steps = planted.steps
     criteria = steps.context.criteria
 
     def judged_on(made):
-        known = steps.evidence
-        both = AllEvents(steps.context, made, known.noise, known.faults, known.base.fit)
-        (row,) = assess(both, steps.verdict.kept, seed=0)
+        (row,) = assess(add_events(steps, made), steps.verdict.kept, seed=0)
         assert row.names == ("stator_resistance",)
         assert not row.is_fitted_to_all
         return row

@@ -86,16 +86,17 @@ class Narrow(Family):
 
     def with_effects(self, names):
         names = {*names}
-        clashes = lambda more: {"b", "m"} <= {*names, *more}  # noqa: E731
+        why = "the model has a state 'x' already"
+
+        def clash(more=()):
+            return {"b", "m"} <= {*names, *more}
 
         def compiled():
-            if clashes(()):
-                raise RefusedEffect("m", "the model has a state 'x' already")
+            if clash():
+                raise RefusedEffect("m", why)
 
         def acceptance(effect):
-            return SimpleNamespace(
-                refusal="the model has a state 'x' already" if clashes([effect.name]) else None
-            )
+            return SimpleNamespace(refusal=why if clash([effect.name]) else None)
 
         return SimpleNamespace(names=names, compile=compiled, acceptance=acceptance)
 

@@ -36,9 +36,10 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
         fit_to_all=lambda fits: fits,
     )
     gains = {f.names: 100.0 if good else -100.0 for f, good in zip(fits, helps, strict=True)}
-    judged = lambda context, events, bare, fits: {  # noqa: E731
-        f.names: held_out(gains[f.names], 100.0, left=10.0) for f in fits
-    }
+
+    def judged(context, events, bare, fits):
+        return {f.names: held_out(gains[f.names], 100.0, left=10.0) for f in fits}
+
     return both, [row(f.names[0]) for f in fits], judged
 
 

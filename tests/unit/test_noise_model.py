@@ -42,7 +42,10 @@ def test_heavy_tails_are_drawn_beyond_what_the_quiet_samples_showed():
     """
     rng = np.random.default_rng(8)
     whole = slice(0, 400)
-    drawn = lambda rows: estimate(rows, np.ones((2, 400), dtype=bool), [whole]).shocks  # noqa: E731
+
+    def drawn(rows):
+        return estimate(rows, np.ones((2, 400), dtype=bool), [whole]).shocks
+
     heavy = drawn(rng.standard_t(4, (2, 400)))
     assert all(len(channel) > 400 and 8 < channel.max() < 30 for channel in heavy)
     assert all(channel.std() == pytest.approx(1.0) for channel in heavy)

@@ -15,7 +15,10 @@ def test_a_score_is_the_drop_of_the_refitted_linear_problem():
     rng = np.random.default_rng(5)
     N, s, r = rng.normal(size=(200, 6)), rng.normal(size=200), rng.normal(size=200)
     Q, _ = np.linalg.qr(N)
-    off = lambda y: y - Q @ (Q.T @ y)  # noqa: E731
+
+    def off(y):
+        return y - Q @ (Q.T @ y)
+
     drop, p = signed_drop(off(s)[None], off(r)[None], np.array([0]))
     without = np.linalg.lstsq(N, r, rcond=None)[1][0]
     both = np.linalg.lstsq(np.column_stack([N, s]), r, rcond=None)[1][0]
