@@ -69,12 +69,15 @@ def as_it_was(environment):
     )
     handlers, level = root.handlers[:], root.level
     surroundings = mock.patch.dict(os.environ, COLUMNS | environment)
+    # MLflow is imported where something is logged, not for each sentence that refuses a command
+    not_ahead = mock.patch.object(process, "start_ahead")
     hydra = GlobalHydra.instance().hydra
     GlobalHydra.instance().clear()
     progress.build_console.cache_clear()  # a process of its own would have one of its own width
     try:
-        with surroundings, mock.patch.object(sys, "argv", ["tractexp"]), warnings.catch_warnings():
-            yield
+        with surroundings, mock.patch.object(sys, "argv", ["tractexp"]), not_ahead:
+            with warnings.catch_warnings():
+                yield
     finally:
         process._end_ahead()
         progress.build_console.cache_clear()
