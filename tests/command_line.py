@@ -75,9 +75,13 @@ def as_it_was(environment):
     GlobalHydra.instance().clear()
     progress.build_console.cache_clear()  # a process of its own would have one of its own width
     try:
-        with surroundings, mock.patch.object(sys, "argv", ["tractexp"]), not_ahead:
-            with warnings.catch_warnings():
-                yield
+        with (
+            surroundings,
+            mock.patch.object(sys, "argv", ["tractexp"]),
+            not_ahead,
+            warnings.catch_warnings(),
+        ):
+            yield
     finally:
         process._end_ahead()
         progress.build_console.cache_clear()

@@ -192,6 +192,11 @@ class Identification(Written):
         return "; ".join(filter(None, [*(d for d in self.doubts if d not in headline), headline]))
 
     @property
+    def usability_sentence(self) -> str:
+        """Both, as console, page and summary begin; the headline where it was not judged."""
+        return f"{self.usability}: {self.usability_reason}" if self.usability else self.headline
+
+    @property
     def own_parameters(self) -> list[Estimate]:
         """The estimates but for those of what the records show beside the load."""
         return [e for e in self.parameters.values() if e.name not in self.result.nuisances]

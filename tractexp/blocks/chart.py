@@ -494,7 +494,7 @@ class Chart:
             if not self._legend:  # just above the panels, below the buttons
                 layout["title"] |= {"yref": "paper", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
         told = {"units": self._units, "answers": self._answers, "cursor": self._cursor}
-        plain = {"data": self._data, "layout": layout}
+        plain = {"data": [self._label_hover(trace) for trace in self._data], "layout": layout}
         plain |= {key: value for key, value in told.items() if value not in (None, [])}
         if self._cursor is not None:  # read out beside it
             quiet: dict[str, Any] = {"hoverinfo": "none", "hovertemplate": None}
@@ -512,6 +512,15 @@ class Chart:
             "</div>"
             f'<script type="application/json">{data}</script>'
         )
+
+    def _label_hover(self, trace: dict[str, Any]) -> dict[str, Any]:
+        """A trace whose label says which quantity it is, where the chart has several panels; the
+        unit stands at the axis, where a button may change it.
+        """
+        if trace["hovertemplate"] != HOVER or len(self._axes) < 2:
+            return trace
+        title = self._axes[trace["yaxis"].replace("y", "yaxis")]["title"]["text"]
+        return trace | {"hovertemplate": f"{title.partition(' [')[0]} {HOVER}"}
 
     def _add(
         self, name: str, at: int, /, kind: str = "scatter", silent: bool = False, **more: Any

@@ -10,7 +10,7 @@ from scipy.special import ndtr, ndtri
 from tractexp.discrepancy.findings import Findings
 from tractexp.inference.catalogue import Candidate
 from tractexp.inference.score_test import Score
-from tractexp.text.wording import format_probability
+from tractexp.text.wording import format_probability, join_words
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %
 # power at the smallest relevant size, as of a planned test (Saris, Satorra and van der Veld 2009)
@@ -36,6 +36,8 @@ def judgements(investigation: Findings) -> list[Judgement]:
     criteria = investigation.context.criteria
     critical = investigation.first.chance.critical_p(criteria.naming_false_alarms)
     scores = {s.name: s for s in investigation.last.scores}
+    chosen = investigation.last.fit.names
+    beside = f"beside {join_words(chosen)}, " if chosen else ""
     judged_effects = [
         Judgement(name, "not testable", why)
         for name, why in investigation.catalogue.untestable.items()
@@ -54,7 +56,8 @@ def judgements(investigation: Findings) -> list[Judgement]:
                 Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise")
             )
         else:
-            judged_effects.append(Judgement(name, *assessment(candidate, score, critical), score))
+            status, why = assessment(candidate, score, critical)
+            judged_effects.append(Judgement(name, status, f"{beside}{why}", score))
     return sorted(judged_effects, key=lambda j: j.name)
 
 
@@ -76,7 +79,7 @@ def assessment(candidate: Candidate, score: Score, critical: float) -> tuple[str
     if not np.isfinite(deviation):
         return "not testable", "these events cannot show it"
     limit = abs(size) + ONE_SIDED * deviation
-    below = f"{main.name} within {limit:.2g}{unit} of its null"
+    below = f"{main.name} is within {limit:.2g}{unit} of {main.absent:g}"
     if ndtr(relevant / max(deviation, 1e-300) + ndtri(critical)) < TESTABLE:
         return (
             "not testable",

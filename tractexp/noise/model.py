@@ -269,11 +269,14 @@ class Noise:
         return f"{', '.join(f'{name} {level:.2g} pu' for name, level in levels)}, {color}"
 
     def deviation(self, drive: Drive) -> np.ndarray:
-        """The standard deviation (C, N) [pu] of every sample of each channel, shapes included."""
+        """The standard deviation (C, N) [pu] of every sample of each channel, errors of the voltage
+        included, about what the load wanders.
+        """
         variance = np.empty(drive.measurements.shape)
         for e, part in enumerate(drive.parts):
-            shapes = np.einsum("ij,kjt->kit", self._unmixing_matrix, self._shapes(part, e))
-            variance[:, part] = self._fast_variance(e)[:, None] + (shapes**2).sum(axis=0)
+            variance[:, part] = self._fast_variance(e)[:, None]
+        if self.input_modes is not None:
+            variance += (self.input_modes**2).sum(axis=0)
         return np.sqrt(variance)
 
     @property

@@ -54,10 +54,9 @@ def noise(page: Report, findings: Findings) -> None:
             " measurement and at the powers measured before the events."
         )
     if (window := context.records.window) is not None:
-        model = " The extended configuration does not do so." if findings.names else ""
         page.text(
             f"{window.describe().capitalize()}, of voltage and current alike: any other window"
             " would make the voltage bend where the power does not. The voltage that the load saw"
             " is reckoned back from the record, and the current of the model is averaged as the"
-            f" recorder does.{model}"
+            " recorder does."
         )

@@ -23,7 +23,7 @@ def summary(fit: "Identification") -> Report:
     start = [text for event in result.events if (text := starts_at_rest(event))]
     report = Report()
     if fit.headline:
-        report.text(finish_sentence(fit.headline))
+        report.text(finish_sentence(fit.usability_sentence))
     report.add(parameters(fit), *tabulate_race(result.race))
     report.text(*machine(fit), *describe_rivals(fit), *filter(None, [result.on_given_base()])).add(
         errors(fit)
@@ -81,7 +81,8 @@ def yardstick(fit: "Identification") -> list[str]:
     where not judged.
     """
     poles = fit.result.linear_network.get("poles")
-    beside = f" The network's poles: {poles_in_words(poles)}." if poles else ""
+    what = "pole" if len(poles or ()) == 1 else "poles"
+    beside = f" The network's {what}: {poles_in_words(poles)}." if poles else ""
     return [finish_sentence(fit.yardstick) + beside] if fit.yardstick else []
 
 

@@ -96,7 +96,10 @@ def event_curves(
     of phasors, `beside` the event of other models.
     """
     record, power = fit.event.record, np.stack((fit.P, fit.Q))
-    about, notes = f"{record.name}, {ROLES[fit.role]}", [f"{note}." for note in record.notes]
+    about, notes = (
+        f"{record.name}, {ROLES[fit.role]}",
+        [finish_sentence(note) for note in record.notes],
+    )
     if fit.waves is not None:
         page.chart(
             wave_chart(fit.waves, [Drawn("estimate", fit.currents, style.PALETTE[0])]),

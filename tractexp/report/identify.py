@@ -44,7 +44,7 @@ def report(fit: "Identification") -> Report:
     lead = "; ".join([*describe_identities(of), f"{result.optimizer}, seed {result.seed}."])
     page = Report(f"Identification of {title(of, names)}", lead)
     page.verdict(
-        finish_sentence(fit.headline),
+        finish_sentence(fit.usability_sentence),
         *yardstick(fit),
         f"{finish_sentence(result.acceptance)}{_describe_current_errors(result)}",
         headline(result),
@@ -207,7 +207,8 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
     """Whitened residuals, their autocorrelation, and what the tests of them say."""
     likelihood, tests = uncertainty.of_noise, uncertainty.tests
     drive, events = likelihood.problem.drive, likelihood.problem.events
-    white = uncertainty.whitened_residual.reshape(drive.channels, -1)
+    # measured less calculated, as in the charts of power
+    white = -uncertainty.whitened_residual.reshape(drive.channels, -1)
     colored = [t for t in tests if t["p"] < REJECTED]
     page.text(_conclude_tests(colored, len(tests)))
     for e, event in enumerate(events[:MOST_OPEN_EVENTS]):
@@ -224,7 +225,8 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
             limit = 1.96 / np.sqrt(max(len(rows), 1))
             lags.level(limit).level(-limit)
         caption = (
-            f"{event.record.name}: the whitened residual, in standard deviations of the noise."
+            f"{event.record.name}: measured less calculated, whitened, in standard deviations of"
+            " the noise."
         )
         page.chart(chart.edge(event.t_start).edge(event.t_end), caption)
         page.chart(

@@ -61,7 +61,7 @@ def describe_judged_load(fit: "Identification") -> Report:
     names = [event["name"] for event in result.events if event["role"] == "train"]
     page = Report().text(describe_load(result, names))
     if fit.usability:
-        page.text(shorten(f"{fit.usability}: {fit.usability_reason}."))
+        page.text(shorten(f"{fit.usability_sentence}."))
     return page.text("")
 
 
