@@ -97,6 +97,14 @@ def test_values_have_names(fit, dips):
     assert fit.report()._repr_html_().startswith("<iframe")
 
 
+def test_summary_page_and_sheet_begin_with_whether_the_model_may_be_used(fit):
+    word = fit.usability.capitalize()
+    first = fit.usability_reason.partition(",")[0]
+    assert f"{word}: {first}" in str(fit.summary())
+    assert f"{word}: {first}" in fit.report().html
+    assert f"{word.upper()}. T{first[1:]}" in fit.sheet().html
+
+
 def test_an_investigation_names_what_is_missing_and_gives_a_model_again(found, fit, dips):
     assert (found.verdict, found.names) == ("named", ("stator_resistance",))
     assert found.gap.validate.closed > 0.9

@@ -29,6 +29,16 @@ def test_a_long_curve_keeps_its_spike():
     assert unpacked(trace["x"])[unpacked(trace["y"]).argmax()] == 654_321
 
 
+def test_a_label_says_which_of_several_panels_it_is_of():
+    chart = Chart("t", ["P [pu]", "ΔQ [pu]"])
+    for panel in (0, 1):
+        chart.line("estimate", np.arange(3), np.arange(3), BLUE, panel)
+    said = [trace["hovertemplate"] for trace in chart.plain()["data"]]
+    assert [words.split("%")[0] for words in said] == ["P ", "ΔQ "]
+    (alone,) = Chart("t", ["P [pu]"]).line("P", np.arange(3), np.arange(3), BLUE).plain()["data"]
+    assert alone["hovertemplate"].startswith("%")
+
+
 def test_equal_names_are_one_entry_of_the_legend():
     chart = Chart("t", ["P", "Q"])
     for panel in (0, 1):

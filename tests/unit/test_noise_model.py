@@ -69,6 +69,23 @@ def test_noise_of_a_wandering_load_is_white_once_whitened():
     assert rows.var() == pytest.approx(1.0, abs=0.02)
 
 
+def test_samples_scatter_by_the_fast_noise_and_by_errors_of_the_voltage_about_what_wanders():
+    """The band around a curve is as wide as the noise that is told, however far a load wanders."""
+    n = 400
+    load = Load(np.tile([[1.0], [0.0]], n), np.array([[1.0, 0.0]]))
+    modes = np.zeros((1, 2, n))
+    modes[0, 1, 100] = 4.0
+    noise = Noise(
+        ((white_noise(3.0), white_noise(3.0)),),
+        random_walk=RandomWalk(np.array([200.0, 0.0]), 0.002, load),
+        input_modes=modes,
+    )
+    drive = SimpleNamespace(measurements=np.empty((2, n)), parts=[slice(0, n)])
+    expected = np.full((2, n), 3.0)
+    expected[1, 100] = 5.0
+    assert noise.deviation(drive) == pytest.approx(expected)
+
+
 def test_noise_drawn_white_has_the_law_of_noise_that_is_whitened():
     """Colored, mixed, wandering noise with heavy tails and a gap: variance in all directions, tails
     and gap alike.
