@@ -165,7 +165,7 @@ def test_a_window_of_phasors_is_no_missing_effect():
     assert found.content["phasor_window"] == pytest.approx(0.06)
     assert any("60 ms" in line for line in told)
     assert "60 ms" in found.reason
-    assert "though no record says so: ask whether it does" in found.reason
+    assert "though no record says so: ask whoever runs the recorder" in found.reason
 
 
 @pytest.mark.parametrize(

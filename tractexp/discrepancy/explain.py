@@ -68,7 +68,7 @@ def explain(
             "what the fitted events leave open of it was fitted to the held-out ones, too"
         )
     if (window := context.records.window) is not None:
-        doubt = "" if window.said else ", though no record says so: ask whether it does"
+        doubt = "" if window.said else ", though no record says so: ask whoever runs the recorder"
         clauses.append(f"{window.describe()}, which is taken into account{doubt}")
     tests = evidence.base.tests if verdict.chosen is None else verdict.chosen.tests or evidence.last
     if tests is not None and tests.parameters_at_bound:
