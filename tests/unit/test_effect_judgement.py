@@ -1,9 +1,13 @@
-"""What the data say of an effect outside the model, `assessment`: a score in, a word out."""
+"""What the data say of each effect, `judgements`, and of one outside the model, `assessment`: a
+score in, a word out.
+"""
+
+from types import SimpleNamespace
 
 import pytest
 
 from tractexp.configuration.plugin import get
-from tractexp.discrepancy.judgement import assessment
+from tractexp.discrepancy.judgement import assessment, judgements
 from tractexp.inference.catalogue import candidate
 from tractexp.inference.score_test import Score
 
@@ -35,3 +39,31 @@ def test_an_effect_is_testable_that_would_be_seen_with_four_chances_in_five(powe
     """At its smallest relevant size; the normal quantiles are those of 0.75 and 0.85."""
     word = judge(deviation=LEAST / (1.6449 + power))
     assert (word != "not testable") == is_testable
+
+
+def test_every_effect_has_a_status_and_the_reason():
+    names = ("stator_resistance", "second_cage", "time_skew", "load_change")
+    score = Score("stator_resistance", 0.0, 0.5, {"R_s": 0.0}, {"R_s": 0.001}, {})
+    effects = {name: candidate(get("effect", name)()) for name in names}
+    findings = SimpleNamespace(
+        context=SimpleNamespace(criteria=SimpleNamespace(naming_false_alarms=0.02)),
+        first=SimpleNamespace(chance=SimpleNamespace(critical_p=lambda p: p)),
+        last=SimpleNamespace(
+            scores=[score], fit=SimpleNamespace(names=("second_cage", "time_skew"))
+        ),
+        catalogue=SimpleNamespace(
+            untestable={"frequency_dependence": "f is not recorded"}, candidates=effects.values()
+        ),
+        names=("second_cage",),
+    )
+    told = {one.name: (one.status, one.why) for one in judgements(findings)}
+    assert told.pop("stator_resistance") == (
+        "ruled out",
+        "beside second_cage and time_skew, R_s is within 0.0016 pu of 0",
+    )
+    assert told == {
+        "frequency_dependence": ("not testable", "f is not recorded"),
+        "load_change": ("irrelevant", "in the fit as a nuisance, not above its noise"),
+        "second_cage": ("relevant", "added"),
+        "time_skew": ("relevant", "in the best explanation, which was not accepted"),
+    }

@@ -1,52 +1,13 @@
-"""What to do next, `recommendation`, and the sentence behind a verdict, of rows of few numbers."""
+"""What to do next, `recommendation`, by a verdict, a grade and rows of few numbers."""
 
 from types import SimpleNamespace
 
 import pytest
-from made_sets import CONFIRMED, DENIED, MILD, beside_base, row
+from made_sets import DENIED, MILD, beside_base, off, row, table
 
-from tractexp.discrepancy.decide import decide
-from tractexp.discrepancy.explain import explain
 from tractexp.discrepancy.recommend import recommend_confirmation, recommendation
+from tractexp.identification.adequacy import Grade
 from tractexp.inference.criteria import Criteria
-
-CONTEXT = SimpleNamespace(
-    catalogue=SimpleNamespace(label_effect=lambda name: name, candidates=range(3)),
-    criteria=Criteria(),
-    records=SimpleNamespace(window=None),
-)
-
-
-def tell(evidence):
-    """The word of the verdict, and the sentence behind it."""
-    verdict = decide(evidence, Criteria())
-    return verdict.word, explain(verdict, evidence, None, CONTEXT)
-
-
-@pytest.mark.parametrize(
-    ("columns", "word", "doubt"),
-    [
-        ({"gap": CONFIRMED}, "named", ""),
-        ({}, "candidate", "; no event was held out to confirm it"),
-        ({"gap": MILD}, "candidate", "; the held-out events are too mild to show it"),
-        (
-            {"gap": CONFIRMED, "grade": "wrong_model"},
-            "candidate",
-            "; the model with it does not describe this load, so it is no name",
-        ),
-    ],
-)
-def test_a_name_says_what_it_was_set_against_and_why_it_is_no_more_than_a_candidate(
-    columns, word, doubt
-):
-    told = "a explains the disagreement, and none of the 2 other effects tested does"
-    assert tell(beside_base(row("a", **columns))) == (word, f"{told}{doubt}")
-
-
-def test_what_only_all_events_show_is_told():
-    evidence = beside_base(row(), base_p=0.5, p_of_all=1e-4)
-    told = "the fitted events alone show no disagreement, but all events together do"
-    assert tell(evidence) == ("unexplained", told)
 
 
 @pytest.mark.parametrize(
@@ -88,6 +49,56 @@ def test_what_to_do_where_nothing_explains_follows_from_the_held_out_events(evid
         verdict=SimpleNamespace(word="unexplained"),
         proposed=SimpleNamespace(proposal=None),
         by_likelihood=evidence,
-        context=CONTEXT,
+        context=SimpleNamespace(criteria=Criteria()),
     )
     assert recommendation(findings).startswith(told)
+
+
+TERM = SimpleNamespace(term=SimpleNamespace(words="a torque that falls"))
+DIP = SimpleNamespace(sentence=lambda: "record a deep dip")
+
+
+def recommend(word, grade="adequate", event=None, term=None, evidence=None):
+    """What to do next of a verdict and a grade; a candidate is confirmed by an event as deep."""
+    findings = SimpleNamespace(
+        next_event=event,
+        unrecorded_course={},
+        verdict=SimpleNamespace(word=word),
+        proposed=SimpleNamespace(proposal=term),
+        final_grade=SimpleNamespace(adequacy=SimpleNamespace(grade=Grade(grade))),
+        evidence=evidence or beside_base(row("a")),
+        names=("a",),
+        undetermined_values={},
+        context=SimpleNamespace(
+            events=[SimpleNamespace(record=SimpleNamespace(name="dip1"))], criteria=Criteria()
+        ),
+        train=SimpleNamespace(by_event=(400.0,)),
+        all_fitted=False,
+    )
+    return recommendation(findings)
+
+
+@pytest.mark.parametrize(
+    ("choice", "told"),
+    [
+        ({"word": "named"}, "use the extended model; judge it on further events"),
+        ({"word": "named", "grade": "effect_missing"}, "find what is missing still: "),
+        ({"word": "candidate"}, "record a further dip as deep as dip1 and hold it out: "),
+        ({"word": "candidate", "grade": "wrong_model"}, "find what is missing still: "),
+        ({"word": "none"}, "use the base model; what is missing, if anything, is below"),
+        (
+            {"word": "none", "evidence": table(off(error=0.1))},
+            "use the base model: what it misses is no difference to anyone",
+        ),
+        ({"word": "tied", "event": DIP}, "record a deep dip"),
+    ],
+)
+def test_what_to_do_next_follows_from_the_word_and_the_grade(choice, told):
+    assert recommend(**choice).startswith(told)
+
+
+@pytest.mark.parametrize(("event", "end"), [(None, "to a model"), (DIP, "; record a deep dip")])
+def test_a_proposed_term_is_asked_for_on_site(event, end):
+    told = recommend("unexplained", event=event, term=TERM)
+    assert told.startswith("ask what on site acts like a torque that falls; ")
+    assert told.endswith(end)

@@ -1,4 +1,4 @@
-"""The table of the sets that were fitted, `compare_rivals`."""
+"""The table of the sets that were fitted, `compare_rivals`, of one size, `rank_rivals`."""
 
 from types import SimpleNamespace
 
@@ -6,7 +6,7 @@ import numpy as np
 from made_sets import fitted
 
 from tractexp.discrepancy import rival_sets
-from tractexp.discrepancy.rival_sets import compare_rivals
+from tractexp.discrepancy.rival_sets import compare_rivals, rank_rivals
 from tractexp.inference.criteria import Criteria
 
 
@@ -49,3 +49,23 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
         (("better",), -4.0, ("better",)),
         (("far",), 196.0, None),
     ]
+
+
+def test_sets_of_another_size_are_no_rivals(monkeypatch):
+    fits = [fitted(1000.0, 0), fitted(100.0, 1, "a"), fitted(90.0, 2, "a", "b")]
+    explained = SimpleNamespace(
+        base=SimpleNamespace(
+            context=SimpleNamespace(catalogue=SimpleNamespace(textbook=lambda names: names))
+        ),
+        last=SimpleNamespace(noise=None),
+        chosen=fits[1],
+        steps=[SimpleNamespace(fit=fits[0])],
+        refits={fit.names: fit for fit in fits},
+    )
+    by_names = {fit.names: fit for fit in fits}
+    monkeypatch.setattr(rival_sets, "refit_from", lambda *_: fits[0])
+    monkeypatch.setattr(
+        rival_sets, "refit", lambda context, noise, starts: [by_names[names] for names, _ in starts]
+    )
+    (row,) = rank_rivals(explained)
+    assert (row.names, row.lowered, row.behind) == (("a",), 900.0, 0.0)
