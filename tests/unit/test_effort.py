@@ -10,7 +10,7 @@ from tractexp.inference.effort import Effort
 def test_a_long_step_is_not_silent(monkeypatch):
     monkeypatch.setattr(effort, "SILENCE", 0.04)
     lines = []
-    with Effort(lines.append).audible() as spent:
+    with Effort(lines.append).tell_when_silent() as spent:
         spent.say("fitting")
         part = spent.anew()
         part.spend(30)
@@ -27,7 +27,7 @@ def test_a_long_step_is_not_silent(monkeypatch):
 
 def test_a_part_names_its_step_to_the_same_listener():
     lines = []
-    with Effort(lines.append).audible() as spent:
+    with Effort(lines.append).tell_when_silent() as spent:
         spent.anew().say("judging")
     assert lines == ["judging"]
 
@@ -35,7 +35,7 @@ def test_a_part_names_its_step_to_the_same_listener():
 def test_a_long_step_says_how_many_parts_and_how_long_they_take_but_no_time_spent(monkeypatch):
     monkeypatch.setattr(effort, "SILENCE", 0.04)
     lines = []
-    with Effort(lines.append).audible() as spent:
+    with Effort(lines.append).tell_when_silent() as spent:
         spent.say("fitting")
         with spent.anew().parts(4) as ended, spent.parts(9):  # a part of a part
             ended()
@@ -51,7 +51,7 @@ def test_a_long_step_says_how_many_parts_and_how_long_they_take_but_no_time_spen
 def test_one_part_alone_says_nothing(monkeypatch):
     monkeypatch.setattr(effort, "SILENCE", 0.04)
     lines = []
-    with Effort(lines.append).audible() as spent:
+    with Effort(lines.append).tell_when_silent() as spent:
         spent.say("fitting")
         with spent.parts(1), spent.parts(5) as ended:
             ended()

@@ -64,17 +64,19 @@ class LoadModel(Portable, Plain, Tabulated):
 
     @property
     def node(self) -> dict[str, Any]:
-        """The parts, as `result.json` keeps them; integration, domain and window where they are not
-        the usual ones.
+        """The parts of the composed model as `result.json` keeps them, with integration, domain and
+        window if they are not the defaults.
         """
         parts = {
             "motor": dict(self.motor),
             "static": dict(self.static),
             "effects": list(self.effects),
         }
-        usual = {"integration": "classical", "domain": "phasors", "window": None}
+        defaults = {"integration": "classical", "domain": "phasors", "window": None}
         return parts | {
-            key: value for key, plain in usual.items() if (value := getattr(self, key)) != plain
+            key: value
+            for key, default in defaults.items()
+            if (value := getattr(self, key)) != default
         }
 
     @functools.cached_property

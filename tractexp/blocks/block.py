@@ -240,7 +240,7 @@ class Report:
         detail: Collection[int] = (),
     ) -> "Report":
         """Add a table; columns by number in `words` wrap, those in `detail` are shown on demand."""
-        return self.add(Table(columns, rows, title, caption, words, detail))
+        return self.add(Table(columns, rows, title, caption, words=words, detail=detail))
 
     def chart(self, chart: "Chart", caption: str = "") -> "Report":
         """Add a chart with a caption."""

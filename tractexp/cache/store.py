@@ -185,9 +185,10 @@ def _sum(path: Path, content: bytes, secret: bytes = b"") -> bytes:
 
 
 def read_secret() -> bytes:
-    """The user's secret, made where there is none yet.
+    """The user's secret, by which entries beside results are known as this user's; made if there is
+    none yet.
 
-    Raises `UserError` where the cache folder cannot keep it.
+    Raises `UserError` if its file cannot be written or read, or is not as long as it was made.
     """
     path = find_cache_folder() / SECRET
     if not path.exists():

@@ -24,14 +24,18 @@ def ui(arguments: list[str]) -> int:
     from tractexp.tracking.ui import serve
 
     return serve(
-        tracking.address(chosen.uri), port=chosen.port, page=_open_page, open_browser=chosen.open
+        tracking.address(chosen.uri),
+        port=chosen.port,
+        page=_find_start_page,
+        open_browser=chosen.open,
     )
 
 
-def _open_page(uri: str) -> str:
-    """The view of the comparison; the list of experiments where the store cannot keep it.
+def _find_start_page(uri: str) -> str:
+    """Store the view that compares runs and return its address on the server; that of the list of
+    experiments if the store cannot keep it.
 
-    MLflow's plain address opens a page on language models.
+    The server's root is no start: MLflow shows a page on language models there.
     """
     from tractexp.tracking.view import EXPERIMENTS, comparison_view
 

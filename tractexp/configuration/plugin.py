@@ -228,14 +228,14 @@ def import_packages() -> tuple[Any, ...]:
 
 
 def place_in_plugin(error: BaseException) -> str:
-    """File and line of the innermost frame of an exception that is in a plugin; "" where none is.
+    """File and line of the innermost traceback frame that lies in a plugin; "" if none does.
 
-    Our own tasks come in as plugins do; what fails in them is our mistake.
+    Our own tasks are imported as plugins are, but what fails in them is our mistake.
     """
-    others = [
+    foreign_packages = [
         package for package in import_packages() if not package.__name__.startswith("tractexp.")
     ]
-    folders = [Path(path) for package in others for path in package.__path__]
+    folders = [Path(path) for package in foreign_packages for path in package.__path__]
     frames = [
         (frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)
     ]

@@ -134,7 +134,7 @@ def investigate(
             findings = _findings(base_fit(finer), validate, seed, grader)
         return findings
 
-    with Effort(tell).audible() as effort:
+    with Effort(tell).tell_when_silent() as effort:
         findings = findings_of(train, validate)
         if findings.verdict.word == UNEXPLAINED and shows_more(findings.evidence, criteria):
             effort.say("only all events together show something: again, fitted to all of them")

@@ -41,7 +41,7 @@ def parse(where: str, lines: list[str], remarks: Remarks, first: int = 1) -> Hea
     read_rates(rows, header, count)
     _dates(rows, header)
     _kind(rows, header)
-    _trailer(rows, header)
+    _read_trailer(rows, header)
     return header
 
 
@@ -182,21 +182,24 @@ def _kind(rows: Lines, header: Header) -> None:
         )
 
 
-def _trailer(rows: Lines, header: Header) -> None:
-    """Time multiplier (1999), time codes and clock quality (2013): missing ones have their
-    defaults.
+def _read_trailer(rows: Lines, header: Header) -> None:
+    """Read time multiplier (1999), time codes and clock quality (2013) into `header`; those that
+    are missing have their defaults.
     """
+    # a line with commas within is the time codes already
     if rows.rest and "," not in rows.peek().strip(", "):
         line, text = rows.take("the time multiplier")
         parsed = number(text.strip(", "))
         if parsed is None or not 0 < parsed <= GREATEST:
             rows.remarks.add(
-                f"time multiplier {quote_field(text)} is not a number above zero, 1 taken", line
+                f"time multiplier {quote_field(text)} is no number from 0 to {GREATEST:g}, 1 taken",
+                line,
             )
             parsed = 1.0
         header.timemult = parsed
     elif header.revision >= 1999:
         rows.remarks.add("no time multiplier, 1 taken")
-    header.time_code, header.quality = [rows.take("")[1] if rows.rest else "" for _ in range(2)]
+    header.time_code = rows.take("")[1] if rows.rest else ""
+    header.quality = rows.take("")[1] if rows.rest else ""
     if rows.rest:
         rows.remarks.add("the rest of the file is not used", rows.rest[0][0])

@@ -83,21 +83,22 @@ class BlackBox:
 
     @property
     def poles(self) -> list[dict[str, float]]:
-        """`decay` [1/s], `frequency` [Hz] and `admittance` [pu] of each pole of the vectors, the
-        slowest first.
+        """`decay` [1/s], `frequency` [Hz] and `admittance` [pu] of each pole of the first network,
+        that of space vectors; the slowest pole first.
 
-        In waveforms the frequency is that in the phases, negative where the vector turns backwards;
-        in phasors P and Q oscillate with it. The admittance is what the pole adds at first and what
-        dies out.
+        In waveforms the frequency is that in the phases, negative if the vector turns backwards;
+        in phasors P and Q oscillate with it. The admittance is the size of the pole's part of the
+        response at first, which decays.
         """
         poles = self.networks[0].poles
-        shares = np.abs(self.networks[0].coefficients)
-        turning = (
+        # behind those of the poles stand those of the derivative and of a constant
+        admittances = np.abs(self.networks[0].coefficients[: len(poles)])
+        frequencies = (
             poles.imag / (2 * np.pi) + self.turns
             if self.turns
             else np.abs(poles.imag) / (2 * np.pi)
         )
-        rows = zip((-poles.real).tolist(), turning.tolist(), shares.tolist(), strict=False)
+        rows = zip((-poles.real).tolist(), frequencies.tolist(), admittances.tolist(), strict=True)
         return [
             dict(zip(("decay", "frequency", "admittance"), row, strict=True))
             for row in sorted(rows)

@@ -55,21 +55,22 @@ class Projection:
         return cls(ports, current, 1 / seconds, 1 / max(port.step for port in ports))
 
     def linear_part(self, poles: Complex) -> tuple[Complex, Complex, Complex]:
-        """The best linear part for poles (n,) [rad/s].
+        """Fit the current by the responses of poles (n,) [rad/s], by linear least squares.
 
         Returns
         -------
         (k,) complex
             Coefficients of the responses.
         (R, k) complex
-            An orthonormal base of these.
+            An orthonormal basis of the responses, R samples of all ports.
         (R,) complex
             What they leave of the current.
         """
-        base, triangle = np.linalg.qr(_rows(self.ports, lambda port: basis(port, poles)))
-        inside = base.conj().T @ self.current
+        responses = _rows(self.ports, lambda port: basis(port, poles))
+        orthonormal, triangle = np.linalg.qr(responses)
+        inside = orthonormal.conj().T @ self.current
         coefficients = np.linalg.lstsq(triangle, inside, rcond=None)[0]
-        return coefficients, base, self.current - base @ inside
+        return coefficients, orthonormal, self.current - orthonormal @ inside
 
     @property
     def grid(self) -> list[complex]:

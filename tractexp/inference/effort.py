@@ -105,24 +105,24 @@ class Effort:
         return sum(effort.simulations for effort in self._all)
 
     @contextmanager
-    def audible(self) -> Iterator["Effort"]:
-        """Tell the listener, as long as this is entered, that a step goes on wherever nothing was
-        told for `SILENCE` seconds.
+    def tell_when_silent(self) -> Iterator["Effort"]:
+        """While entered, tell the listener that a step still runs after every `SILENCE` seconds
+        without a message.
         """
         ended = Event()
 
         def watch() -> None:
-            counted = 0
+            last_count = 0
             while not ended.wait(SILENCE / 4):
                 now = time.perf_counter()
                 if now - self._said >= SILENCE:
-                    # parts of parts come and go
-                    far = [str(part) for part in self._parts if part.total > 1][:1]
-                    if self.total > counted:
-                        far.append(f"{self.total} simulations")
+                    # the outermost part only: those within it change too fast to be told
+                    progress = [str(part) for part in self._parts if part.total > 1][:1]
+                    if self.total > last_count:
+                        progress.append(f"{self.total} simulations")
                     self._said = now
-                    counted = self.total
-                    reached = f": {', '.join(far)}" if far else ""
+                    last_count = self.total
+                    reached = f": {', '.join(progress)}" if progress else ""
                     self._tell(f"{STILL} {self._step or 'at work'}{reached}")
 
         watcher = Thread(target=watch, name="progress", daemon=True)

@@ -127,8 +127,8 @@ class Likelihood(FitProblem):
         return np.concatenate([rows, self.prior_rows(unit)], axis=1) if self.prior else rows
 
     def prior_rows(self, unit: np.ndarray) -> np.ndarray:
-        """The rows of the prior (n, k) at coordinates (n, D): weighted departures from what
-        machines usually are. k is 0 without a prior.
+        """The residuals of the prior (n, k) at coordinates (n, D): weighted departures from the
+        parameters that machines usually have. k is 0 without a prior.
         """
         if not self.prior:
             return np.empty((len(unit), 0))

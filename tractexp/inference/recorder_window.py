@@ -14,7 +14,8 @@ from tractexp.record import Event, Window
 from tractexp.record.window import averaged_power, mean_weights, sharpen_voltage
 from tractexp.recording.estimator import list_estimators
 
-CYCLES = (1, 2, 3, 4, 5, 6)
+CYCLES = (1, 2, 3, 4, 5, 6)  # of the plain means
+SAME_WEIGHT = 1e-9  # weights that differ by less are equal
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +97,15 @@ def windows_of(events: Sequence[Event]) -> list[RecorderWindow]:
     if recorded and not others:
         windows = [RecorderWindow(recorded.length, recorded, said=True)]
     else:
-        windows = _usual_windows(frequency)
+        windows = _list_usual_windows(frequency)
     return [w for w in sorted(windows, key=lambda w: w.window) if 2 * step <= w.window < before]
 
 
-def _usual_windows(frequency: float) -> list[RecorderWindow]:
-    """Averages over whole cycles of a nominal frequency [Hz], and the windows of the estimators
-    that weight their samples.
+def _list_usual_windows(frequency: float) -> list[RecorderWindow]:
+    """The windows that recorders commonly use at a nominal frequency [Hz]: plain means over whole
+    cycles, then the windows of estimators whose weights are not all equal.
     """
-    shapes = [one.window(frequency) for one in list_estimators(frequency)]
-    uneven = [RecorderWindow(w.length, w) for w in shapes if np.ptp(w.weights) > 1e-9]
-    return [*(RecorderWindow(k / frequency) for k in CYCLES), *uneven]
+    means = [RecorderWindow(cycles / frequency) for cycles in CYCLES]
+    windows = [estimator.window(frequency) for estimator in list_estimators(frequency)]
+    uneven = [window for window in windows if np.ptp(window.weights) > SAME_WEIGHT]
+    return [*means, *(RecorderWindow(window.length, window) for window in uneven)]

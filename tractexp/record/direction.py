@@ -15,7 +15,8 @@ LEAST_SIGN_RATIO = 3.0  # times the noise that P must exceed to have a sign
 # where that is certain
 OUTWARD = "its current is counted out of it, or this feeder supplies such loads"
 # of |P|: positive power of this size, at normal voltage, is a train that motors and brakes
-TURNS = 0.1
+REVERSED_SHARE = 0.1
+LEAST_REVERSED_TIME = 0.02  # of a record
 REMEDY = "set data.reverse_current=true"
 
 
@@ -48,12 +49,13 @@ def explain_negative_power(
         The direction that the negative sequence shows: 1 as a load's, -1 reversed, 0 where it shows
         none.
     calm : (N,) bools
-        The state to compare with; by default the one that lasts longest.
+        Which samples are undisturbed; by default those about the voltage that lasts longest.
 
     Returns
     -------
     str
-        One clause; "" where P is not negative.
+        One clause: the cause, or that power flows both ways. "" if P is not negative, or no sample
+        is there to tell.
     """
     valid = np.isfinite(U) & np.isfinite(P) & np.isfinite(Q)
     if not valid.any() or (calm is not None and not (calm & valid).any()):
@@ -68,12 +70,14 @@ def explain_negative_power(
     least_power = LEAST_SIGN_RATIO * _measure_usual_step(P)
     if -least_power <= P0:
         return ""
-    if np.count_nonzero(P[normal] > -TURNS * P0) > max(FEWEST_STATE_SAMPLES, 0.02 * len(P)):
+    reversed_samples = np.count_nonzero(P[normal] > REVERSED_SHARE * abs(P0))
+    if reversed_samples > max(FEWEST_STATE_SAMPLES, LEAST_REVERSED_TIME * len(P)):
         return (
             "P changes its sign at normal voltage, as of a train that brakes and motors: power"
             " flows both ways"
         )
-    return _tell_cause(polarity, *_find_exponent(U / level, P / P0), P0, Q0)
+    exponent, is_known = _find_exponent(U / level, P / P0)
+    return _tell_cause(polarity, exponent, is_known, P0, Q0)
 
 
 def _tell_cause(polarity: int, a: float, fell: bool, P0: float, Q0: float) -> str:

@@ -164,14 +164,15 @@ class Course:
 
     @classmethod
     def from_record(cls, record: Record) -> "Course | None":
-        """The course of a record that says how many kV and MVA its per unit is; None of another,
-        and where no frequency was recorded or values are missing.
+        """The course of a record in kV, kA and MVA; None if the record does not say how many kV and
+        MVA its per unit is, if no frequency was recorded, or if U, P or Q is missing or U is not
+        positive somewhere.
         """
         if record.f is None or not record.is_from_field:
             return None
         U = record.base.voltage * record.U
         S = record.base.power * (record.P + 1j * record.Q)
-        if not np.isfinite(S).all() or (U <= 0).any():
+        if not (np.isfinite(S).all() and (U > 0).all()):
             return None
         current = np.abs(S) / (np.sqrt(3) * U)
         return cls(

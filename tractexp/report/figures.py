@@ -92,8 +92,8 @@ def response(
     notes: Sequence[str] = (),
     band: tuple[float, float] | None = None,
 ) -> Path:
-    """Draw voltage and the calculated P and Q over time [s], in pu, shape (N,), where nothing was
-    measured; `band` is half of what P and Q are drawn within.
+    """Draw voltage and calculated P and Q (N,) [pu] over time [s], of a simulation that no
+    measurement stands beside; `band` has half the height [pu] of a shaded band about P and about Q.
     """
     _check_lengths(path, t=t, U=U, P=calculated[0], Q=calculated[1])
     from matplotlib import rc_context
@@ -106,9 +106,10 @@ def response(
         for panel, name, color, values in zip(panels, "UPQ", colors, (U, *calculated), strict=True):
             panel.plot(*style.thin(t, values), color=color)
             _label_axis(panel, f"{name} [pu]", -0.085)
-        for panel, values, half in zip(panels[1:], calculated, band or (), strict=False):
-            some, middle = style.thin(t, values)
-            panel.fill_between(some, middle - half, middle + half, color=style.FAINT)
+        if band is not None:
+            for panel, values, half in zip(panels[1:], calculated, band, strict=True):
+                times, middle = style.thin(t, values)
+                panel.fill_between(times, middle - half, middle + half, color=style.FAINT)
         panels[2].set_xlabel("t [s]")
         return style.save(figure, path)
 

@@ -272,17 +272,19 @@ def starts(event: Mapping[str, Any], unit: str = "") -> str:
     return f"{seconds}, {moment.isoformat(' ', 'milliseconds')}"
 
 
-def event_row(e: Mapping[str, Any]) -> list[str]:
-    """An event's cells."""
-    powers = [change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"]
+def event_row(event: Mapping[str, Any]) -> list[str]:
+    """The cells of one event, in the order of the table of events: dip, kind, start, duration [ms],
+    depth, phase jump, U2, P and Q before and after, and whether it is worth fitting.
+    """
+    powers = [change(event[f"{x}_before"], event[f"{x}_after"]) for x in "PQ"]
     return [
-        "" if e["dip"] is None else str(e["dip"]),
-        e["kind"],
-        starts(e),
-        f"{1000 * e['duration']:.0f}",
-        f"{e['depth']:.1%}",
-        degrees(e["jump"]),
-        share(e["U2"]),
+        "" if event["dip"] is None else str(event["dip"]),
+        event["kind"],
+        starts(event),
+        f"{1000 * event['duration']:.0f}",
+        f"{event['depth']:.1%}",
+        degrees(event["jump"]),
+        share(event["U2"]),
         *powers,
-        f"{'yes' if e['worth'] else 'no'}: {e['why']}",
+        f"{'yes' if event['worth'] else 'no'}: {event['why']}",
     ]

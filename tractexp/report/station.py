@@ -105,14 +105,14 @@ def screen(content: Mapping[str, Any]) -> Report:
     page.text(*told[:MOST_SCREEN_LOADS])
     if len(told) > MOST_SCREEN_LOADS:
         page.text("of every load: --all, or the page")
-    unfitted = [shorten(sentence, TWO_LINES) for sentence in _tell_unfitted(content)]
+    unfitted = [shorten(sentence, TWO_LINES) for sentence in _describe_unfitted(content)]
     return page.text(*unfitted[:1])
 
 
 def summary(content: Mapping[str, Any]) -> Report:
     """The loads in a table, then of each what differs, in sentences."""
     page = Report().text(_tell_extent(content)).add(tabulate_loads(content))
-    return page.text(*_describe_loads(content), *_tell_unfitted(content))
+    return page.text(*_describe_loads(content), *_describe_unfitted(content))
 
 
 def _describe_loads(content: Mapping[str, Any]) -> list[str]:
@@ -129,8 +129,10 @@ def _tell_extent(content: Mapping[str, Any]) -> str:
     return f"{content['files']} files in {content['folder']}, {count_noun(dips, 'dip')} fitted"
 
 
-def _tell_unfitted(content: Mapping[str, Any]) -> list[str]:
-    """Loads that were not fitted and events that could not be read, a sentence each."""
+def _describe_unfitted(content: Mapping[str, Any]) -> list[str]:
+    """A sentence for each load that was not fitted, and one for all dips that could not be read,
+    with the reason of the first.
+    """
     told = [
         f"not fitted: {load['load'] or load['station']}: {load['why']}"
         for load in content["loads"]
@@ -174,7 +176,7 @@ def report(content: Mapping[str, Any]) -> Report:
     """The page: the loads in a table, then each by itself."""
     page = Report(f"Station of {content['folder']}", _tell_extent(content))
     page.add(tabulate_loads(content))
-    page.text(*_tell_unfitted(content))
+    page.text(*_describe_unfitted(content))
     for load in content["loads"]:
         if "why" not in load:
             _show_load(page, load)

@@ -8,9 +8,10 @@ from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
+from tractexp import tracking
 from tractexp.errors import UserError
 from tractexp.text.progress import say
-from tractexp.tracking import log, runfile
+from tractexp.tracking import runfile
 
 
 class Recorder:
@@ -28,15 +29,18 @@ class Recorder:
         return None if self.opening is None else self.opening.result()
 
     def log(self, folder: Path) -> None:
-        """Log what a job has kept for the store; nothing where it kept nothing, or where the
-        sweep's run waits.
+        """Log what a job has kept for the store, below the sweep's run. Does nothing if the job
+        kept nothing, if the sweep's run could not be logged, or once the store was refused.
         """
-        if self.refused or (parent := self.parent()) is None:
+        if self.refused:
+            return
+        parent = self.parent()
+        if parent is None:
             return
         try:
             entry = runfile.read(folder)
             if entry is not None and not entry.run_id:
-                entry.mark_logged(log(replace(entry.run, parent=parent), entry.uri))
+                entry.mark_logged(tracking.log(replace(entry.run, parent=parent), entry.uri))
         except UserError as error:
             self.refused = True
             say(f"not logged yet: {error}")

@@ -67,7 +67,7 @@ def event_for(
     named = sorted({name for names in sets for name in names})
     missing = catalogue(model, events, named)
     _check(missing, named)
-    with Effort(tell).audible() as effort:
+    with Effort(tell).tell_when_silent() as effort:
         context = Context.from_records(
             model, missing, Records.from_events(events), bounds, fixed, Criteria(), effort, substeps
         )

@@ -42,7 +42,9 @@ def same(context: Context, one: Refit, other: Refit) -> dict[str, Any] | None:
     pairs = []
     for truth, rival in ((one, other), (other, one)):
         for size in (1.0, 0.5):
-            pair = _follow_truth(context, drive, _shrunk(context, truth, size), truth.names, rival)
+            pair = _follow_truth(
+                context, drive, _scale_effects(context, truth, size), truth.names, rival
+            )
             if pair is None:
                 return None
             pairs.append(pair)
@@ -55,15 +57,16 @@ def same(context: Context, one: Refit, other: Refit) -> dict[str, Any] | None:
     return {"rank": rank, "off": max(off for _, off in pairs), "reason": reason}
 
 
-def _shrunk(context: Context, fit: Refit, size: float) -> np.ndarray:
-    """Coordinates (D,) of a fit with the sizes of its effects at this share, without faults of the
-    measurement.
+def _scale_effects(context: Context, fit: Refit, share: float) -> np.ndarray:
+    """The coordinates (D,) of a fit without faults of the measurement, the size of each effect at a
+    share of its way from null: 0 is without the effect, 1 as it was fitted.
     """
-    at = context.coordinates
-    unit = at.without_faults(fit.unit, ())
-    sizes = at.sizes(fit.names)
-    unit[sizes] = at.null[sizes] + size * (unit[sizes] - at.null[sizes])
-    return unit
+    coordinates = context.coordinates
+    scaled = coordinates.without_faults(fit.unit, free=())  # a copy
+    columns = coordinates.sizes(fit.names)
+    null = coordinates.null[columns]
+    scaled[columns] = null + share * (scaled[columns] - null)
+    return scaled
 
 
 def _follow_truth(
@@ -78,7 +81,7 @@ def _follow_truth(
     if not len(truth):
         return None
     columns = _of_load(context, rival.names)
-    start = _shrunk(context, rival, 1.0)
+    start = _scale_effects(context, rival, 1.0)
 
     def simulate_points(points: np.ndarray, whose: Sequence[str]) -> np.ndarray:
         outputs = context.kernels.simulate(whose, points, drive)

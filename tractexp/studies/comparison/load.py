@@ -85,16 +85,20 @@ def _job(folder: Path) -> SearchRun | None:
 
 
 def _read_job(folder: Path) -> SearchRun | None:
-    """The run of a sweep's folder, None for what is no search; errors come as they are."""
+    """The run of one job's folder in a sweep; None if its task is no search. Exceptions of reading
+    are the caller's.
+    """
     config = _yaml(folder / ".hydra" / "config.yaml")
     if config["task"]["name"] != FITTING:
         return None
     status = _status(folder)
     unfinished = _explain_missing_result(folder, status)
-    runtime: Mapping[str, Any] = {"choices": status.get("choices")}
-    if (folder / ".hydra" / "hydra.yaml").is_file() or not (unfinished and runtime["choices"]):
-        # of a job ended at once it is missing
-        runtime = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]
+    of_hydra = folder / ".hydra" / "hydra.yaml"
+    runtime: Mapping[str, Any]
+    if unfinished and status.get("choices") and not of_hydra.is_file():
+        runtime = {"choices": status["choices"]}  # a job that ended at once left its status only
+    else:
+        runtime = _yaml(of_hydra)["hydra"]["runtime"]
     choices = runtime["choices"]
     fields: dict[str, Any] = {
         "optimizer": choices["optimizer"],
