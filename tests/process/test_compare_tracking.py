@@ -351,7 +351,7 @@ def test_a_view_that_cannot_be_stored_opens_on_the_list_of_experiments(monkeypat
         raise UserError("the store is of another version")
 
     monkeypatch.setattr(view, "comparison_view", refuse)
-    assert ui._open_page("sqlite:///x.db") == view.EXPERIMENTS
+    assert ui._find_start_page("sqlite:///x.db") == view.EXPERIMENTS
     assert (
         "because the comparison view could not be stored: the store is of another version"
         in capsys.readouterr().out

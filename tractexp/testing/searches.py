@@ -37,7 +37,7 @@ class Noted(Bowl):
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
         """The bowl's residuals; the points are kept."""
-        self.batches.append(values)
+        self.batches.append(values.copy())  # an optimizer may change what it was given
         return super().residuals(values)
 
 
