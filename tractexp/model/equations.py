@@ -137,9 +137,9 @@ class Equations:
         if name.startswith("__"):
             raise AttributeError(name)
         words = [*(w for w in dir(self) if not w.startswith("_")), *sites.SITES]
+        nearest = suggest_nearest(name, words) or ";"
         raise Unknown(
-            "the equations offer no"
-            f" 'eq.{name}'{suggest_nearest(name, words) or '; docs/plugins.md lists all words'}"
+            f"the equations offer no 'eq.{name}'{nearest} docs/plugins.md lists all words"
         )
 
     def __setattr__(self, name: str, value: Any) -> None:
