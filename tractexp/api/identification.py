@@ -212,7 +212,7 @@ class Identification(Written):
             return self.advice
         command = build_folder_command("task=export", f"task.format={name}")
         return (
-            [f"hand in {SHEET}, and export it: {command}", *self.advice] if command else self.advice
+            [f"hand in {SHEET}, and export the model: {command}", *self.advice] if command else self.advice
         )
 
     @property
