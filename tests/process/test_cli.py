@@ -65,7 +65,7 @@ def test_the_first_line_of_the_answer_is_what_it_is_good_for(main_job):
     _, done = main_job
     answer = done.stdout.partition("optimizer: issa, seed 0")[2]
     assert answer.strip().startswith(
-        "The model describes this load within 1.8 % of its response (0.47 % of S); an effect is"
+        "Doubtful: the model describes this load within 1.8 % of its response (0.47 % of S); an"
     )
     assert answer.count("95 % interval") == 2  # of the parameters and of the model's error
     assert "task=discrepancy" in answer

@@ -244,7 +244,7 @@ def test_a_folder_that_is_not_the_jobs_alone_is_refused(subdirs, sentence, tmp_p
 def test_a_job_is_logged_once_below_the_run_of_its_sweep(jobs, monkeypatch):
     logged = []
     monkeypatch.setattr(
-        recorder, "log", lambda run, uri: (logged.append((run.name, run.parent, uri)), "id")[1]
+        recorder.tracking, "log", lambda run, uri: (logged.append((run.name, run.parent, uri)), "id")[1]
     )
     opening: Future[str | None] = Future()
     opening.set_result("7")
@@ -263,7 +263,7 @@ def test_a_store_that_is_away_is_asked_once_and_what_it_lacks_is_kept(jobs, monk
         asked.append(run.name)
         raise UserError("the store is away")
 
-    monkeypatch.setattr(recorder, "log", refuse)
+    monkeypatch.setattr(recorder.tracking, "log", refuse)
     opening: Future[str | None] = Future()
     opening.set_result("7")
     record = recorder.Recorder(jobs[0].folder.parent, opening)
