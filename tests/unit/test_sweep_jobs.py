@@ -244,7 +244,9 @@ def test_a_folder_that_is_not_the_jobs_alone_is_refused(subdirs, sentence, tmp_p
 def test_a_job_is_logged_once_below_the_run_of_its_sweep(jobs, monkeypatch):
     logged = []
     monkeypatch.setattr(
-        recorder.tracking, "log", lambda run, uri: (logged.append((run.name, run.parent, uri)), "id")[1]
+        recorder.tracking,
+        "log",
+        lambda run, uri: (logged.append((run.name, run.parent, uri)), "id")[1],
     )
     opening: Future[str | None] = Future()
     opening.set_result("7")

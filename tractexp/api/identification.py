@@ -211,9 +211,9 @@ class Identification(Written):
         if self.usability != USABLE or not (name := choose_format(self.result)):
             return self.advice
         command = build_folder_command("task=export", f"task.format={name}")
-        return (
-            [f"hand in {SHEET}, and export the model: {command}", *self.advice] if command else self.advice
-        )
+        if not command:
+            return self.advice
+        return [f"hand in {SHEET}, and export the model: {command}", *self.advice]
 
     @property
     def adequate(self) -> bool:
