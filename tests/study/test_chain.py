@@ -18,7 +18,7 @@ from command_line import run_command
 LONGEST = 5  # steps, the first command counted
 ADVICE = re.compile(r"(next|(use|see|investigate) [^:]*): ")
 # fitted anew, it has the grade that the investigation told
-EXTENDED = ("fit the extended model", "see the extended model")
+EXTENDED = ("use the extended model", "see the extended model")
 AS_BASE = "investigate it as the base model"
 
 

@@ -177,7 +177,7 @@ def test_the_command_tells_the_story_and_how_to_go_on(tmp_path):
         "usable: the extended model describes this load",
         "where:",
         "held out",
-        "next: fit the extended model: tractexp model=run/conf/model/extended.yaml ",
+        "next: use the extended model: tractexp model=run/conf/model/extended.yaml ",
         "discrepancy.html",
     ):
         assert part in told, part

@@ -25,13 +25,13 @@ def tell(grade, better="look at the waveforms"):
 
 def test_no_other_domain_is_advised_where_the_model_is_adequate():
     (use,) = tell("adequate")
-    assert use.startswith("fit the extended model: tractexp model=")
+    assert use.startswith("use the extended model: tractexp model=")
 
 
 @pytest.mark.parametrize(
     ("grade", "first"),
     [
-        ("effect_missing", "fit the extended model: "),
+        ("effect_missing", "use the extended model: "),
         ("wrong_model", "see the extended model, which does not describe this load: "),
     ],
 )

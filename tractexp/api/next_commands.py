@@ -31,7 +31,7 @@ def list_next_commands(result: Investigation, paths: Mapping[str, Path]) -> list
         if grade == Grade.WRONG_MODEL:
             lines.append(f"see the extended model, which does not describe this load: {use}")
         else:
-            lines.append(f"fit the extended model{which}: {use}")
+            lines.append(f"use the extended model{which}: {use}")
         if grade != Grade.ADEQUATE and not better:
             again = use_of(domain, model, fit_all=fit_all, task=["task=discrepancy"])
             lines.append(f"investigate it as the base model: {again}")
