@@ -68,6 +68,8 @@ def pytest_configure(config):
     What tests log goes to no store of the developer's own.
     """
     os.environ.pop("MLFLOW_TRACKING_URI", None)
+    # the first use of MLflow says so for its process; what a command in this one says is taken back
+    os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
 
