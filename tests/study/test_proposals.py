@@ -2,14 +2,13 @@
 the page, and the plugin that `generate` writes.
 """
 
-import importlib.util
 import json
-import sys
 import zlib
 
 import numpy as np
 import pytest
 from made_dips import FAST, events
+from proposed_file import load_proposed_effect
 
 import tractexp
 from hidden_effects import EFFECTS, Noise
@@ -113,18 +112,10 @@ def test_the_page_and_the_table_tell_it(stepped, tmp_path):
     )
 
 
-def _loaded(path, monkeypatch):
-    spec = importlib.util.spec_from_file_location("proposed_effect", path)
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "proposed_effect", module)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     made, found = stepped
     found.write(tmp_path)
-    module = _loaded(tmp_path / "proposed_effect.py", monkeypatch)
+    module = load_proposed_effect(tmp_path / "proposed_effect.py", monkeypatch)
     proposal, bench = (
         found.steps.proposed.proposal,
         found.steps.proposed.proposal.judged.train.context,

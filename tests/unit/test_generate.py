@@ -1,25 +1,16 @@
 """A term as the text of a plugin, `generate`: a model takes that of each balance and signal."""
 
-import importlib.util
 import itertools
-import sys
 
 import pytest
 from nasty import NASTY
+from proposed_file import load_proposed_effect
 
 import tractexp
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.library import ANSWER, BALANCES, CLOCKS, SIGNALS, Term
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")
-
-
-def _loaded(path, monkeypatch):
-    spec = importlib.util.spec_from_file_location("proposed_effect", path)
-    module = importlib.util.module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, "proposed_effect", module)
-    spec.loader.exec_module(module)
-    return module
 
 
 def _every_balance_and_signal():
@@ -49,7 +40,7 @@ def test_every_balance_and_signal_makes_a_plugin_that_the_model_takes(
     values |= {s.name: s.grid[0] for s in chosen.signal.shapes}
     path = tmp_path / "proposed_effect.py"
     path.write_text(generate.source(chosen, values, "event1"), encoding="utf-8")
-    effect = _loaded(path, monkeypatch).ProposedEffect()
+    effect = load_proposed_effect(path, monkeypatch).ProposedEffect()
     assert tractexp.compose().model.acceptance(effect).refusal is None
     assert [p.name for p in effect.parameters] == list(generate.parameters_of(chosen))
 
@@ -66,6 +57,6 @@ def test_a_name_of_a_record_is_text_in_the_plugin_that_is_to_be_installed(tmp_pa
         name = name.encode(errors="backslashreplace").decode()
         assert (
             f"workflow from {name}; no textbook"
-            in _loaded(path, monkeypatch).ProposedEffect.__doc__
+            in load_proposed_effect(path, monkeypatch).ProposedEffect.__doc__
         )
     assert not (tmp_path / "owned").exists()

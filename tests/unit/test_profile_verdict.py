@@ -11,16 +11,15 @@ from tractexp.identification.profile_lanes import End, LikelihoodProfile, find_o
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict, brief
 
 
+def closed_profile(values, interval):
+    """A profile of C whose deviance rises by 5 on either side of its best value."""
+    rises = np.array([5.0, 0.0, 5.0])
+    return LikelihoodProfile("C", np.array(values), rises, interval, (End.CLOSED, End.CLOSED), ())
+
+
 def test_two_minima_and_open_sides_change_the_verdict():
     good = ParameterVerdict(IDENTIFIED, "± 3 %")
-    base = LikelihoodProfile(
-        "C",
-        np.array([0.4, 0.5, 0.6]),
-        np.array([5.0, 0, 5.0]),
-        (0.48, 0.52),
-        (End.CLOSED, End.CLOSED),
-        (),
-    )
+    base = closed_profile([0.4, 0.5, 0.6], (0.48, 0.52))
     assert revise_verdict(good, base, 0, 1).word == IDENTIFIED
     twice = revise_verdict(good, replace(base, minima=(0.58,)), 0, 1)
     assert (twice.word, "two minima, another at 0.58" in twice.detail) == (WEAK, True)
@@ -37,14 +36,7 @@ def test_a_verdict_repeats_no_interval():
     another.
     """
     by_curvature = ParameterVerdict(WEAK, "trades against T_m (correlation 0.98)")
-    profile = LikelihoodProfile(
-        "C",
-        np.array([0.3, 0.5, 0.9]),
-        np.array([5.0, 0.0, 5.0]),
-        (0.31, 0.88),
-        (End.CLOSED, End.CLOSED),
-        (),
-    )
+    profile = closed_profile([0.3, 0.5, 0.9], (0.31, 0.88))
     verdict = str(revise_verdict(by_curvature, profile, 0.0, 1.0))
     assert verdict == "weakly identified: trades against T_m (correlation 0.98)"
     assert brief(verdict) == "weakly identified"
