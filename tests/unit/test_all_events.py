@@ -39,6 +39,13 @@ def test_what_another_set_would_reject_is_fitted_from_every_setting_first(behind
     assert compare(near, {behind: 6152.0})[behind] == 6152.0
 
 
+def test_what_was_ahead_is_fitted_from_every_setting_once_another_passes_it():
+    """Else it would be rejected by a fit that was sought harder than its own."""
+    near = {ONE: 6150.0, TWO: 6880.0}
+    everywhere = {TWO: 6000.0, ONE: 5999.0}
+    assert compare(near, everywhere) == everywhere
+
+
 def test_what_is_as_good_as_the_best_is_not_fitted_again():
     near = {ONE: 6150.0, TWO: 6153.0}
     assert compare(near, {ONE: 0.0, TWO: 0.0}) == near

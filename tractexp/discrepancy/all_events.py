@@ -101,23 +101,31 @@ class AllEvents:
         return each_apart(lambda fit: self._measure(fit, by_name[fit.names], seed), fits, effort)
 
     def compare(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
-        """Sets fitted to all events from where they were; what leaves something there, or less than
-        another does, is fitted from every setting, too.
+        """Sets fitted to all events from where they were; what leaves something there, or would be
+        rejected beside another, is fitted from every setting, too.
         """
-        joint = {t.fit.names: t for t in self.fit_jointly(alone, seed)}
-        least = min(t.fit.cost for t in joint.values())
+        joint = {one.fit.names: one for one in self.fit_jointly(alone, seed)}
+        waiting = list(alone)
+        while doubtful := self._select_doubtful(waiting, joint):
+            for one in self.fit_jointly(doubtful, seed, anew=True):
+                if one.fit.cost < joint[one.fit.names].fit.cost:
+                    joint[one.fit.names] = one
+            waiting = [fit for fit in waiting if fit not in doubtful]
+        return list(joint.values())
+
+    def _select_doubtful(
+        self, fits: Sequence[Refit], joint: Mapping[Names, JointFit]
+    ) -> list[Refit]:
+        """Those whose joint fit leaves more than chance does, or would be rejected beside the best
+        of all.
+        """
         criteria = self.fitted.criteria
-        doubtful = [
-            fit
-            for fit, t in zip(alone, (joint[f.names] for f in alone), strict=True)
-            if t.p_left < criteria.false_alarms or criteria.rejects(t.fit.cost - least)
-        ]
-        better = [
-            t
-            for t in self.fit_jointly(doubtful, seed, anew=True)
-            if t.fit.cost < joint[t.fit.names].fit.cost
-        ]
-        return list({**joint, **{t.fit.names: t for t in better}}.values())
+        least = min(one.fit.cost for one in joint.values())
+
+        def is_doubtful(one: JointFit) -> bool:
+            return one.p_left < criteria.false_alarms or criteria.rejects(one.fit.cost - least)
+
+        return [fit for fit in fits if is_doubtful(joint[fit.names])]
 
     def without_each(self, fit: Refit) -> dict[str, Refit]:
         """{member: fit} of a set without each of its effects, to the fitted events.

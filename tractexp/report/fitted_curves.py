@@ -96,10 +96,8 @@ def event_curves(
     of phasors, `beside` the event of other models.
     """
     record, power = fit.event.record, np.stack((fit.P, fit.Q))
-    about, notes = (
-        f"{record.name}, {ROLES[fit.role]}",
-        [finish_sentence(note) for note in record.notes],
-    )
+    about = f"{record.name}, {ROLES[fit.role]}"
+    notes = [finish_sentence(note) for note in record.notes]
     if fit.waves is not None:
         page.chart(
             wave_chart(fit.waves, [Drawn("estimate", fit.currents, style.PALETTE[0])]),
