@@ -86,15 +86,14 @@ def behind_window(
     context = base.context
     if not context.domain.windowed or context.drive.windows:
         return None
-    tests = examine_fit(base.quiet, best, noise, seed, plain=True)
+    tests = examine_fit(base.quiet, best, noise, seed)
     for window in windows_of(context.events) if tests.faults else ():
         behind = context.move_to_records(Records.from_events(context.records.recorded, window))
         fit = refit_from(behind, tests.noise, best.names, best.unit)
         if not fit.deviance < bare.deviance:
             break  # it costs more than the explanation gains
-        there = examine_fit(
-            QuietNoise.from_context(behind, fit.unit), fit, tests.noise, seed, plain=True
-        )
+        quiet = QuietNoise.from_context(behind, fit.unit)
+        there = examine_fit(quiet, fit, tests.noise, seed)
         if there.adequate and not there.faults:
             context.effort.say(f"{window.describe()}: taken into account from here on")
             return fitted_from(behind, [bare.unit], base.local_minima)
