@@ -15,7 +15,7 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 import numpy as np  # noqa: E402
 
 from tractexp.configuration.plugin import get  # noqa: E402
-from tractexp.inference.catalogue import Catalogue, catalogue  # noqa: E402
+from tractexp.inference.catalogue import Catalogue, build_catalogue  # noqa: E402
 from tractexp.inference.injection import PUSHES  # noqa: E402
 from tractexp.inference.kernels import Family  # noqa: E402
 from tractexp.model.drive import Drive, Excitation  # noqa: E402
@@ -47,7 +47,7 @@ def tested() -> Catalogue:
     record = Record(
         "dip", t=np.arange(SAMPLES) * STEP, U=drive.inputs[0], P=P, Q=Q, source="made"
     ).check()
-    return catalogue(load, [detect(record)])
+    return build_catalogue(load, [detect(record)])
 
 
 def cost(model: Model, drive: Drive) -> float:

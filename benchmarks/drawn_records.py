@@ -15,7 +15,7 @@ import oracle  # noqa: F401
 from independent import Dip, Load, Machine, Recorder, Stall, Static, record
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.identification.result import parts
+from tractexp.identification.result import build_parts
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
 from tractexp.record import Event, Record, detect
@@ -26,7 +26,7 @@ DRAWS = 1000  # before giving up
 
 def model() -> Model:
     """The third-order motor with the exponential static load: seven parameters."""
-    return compose(*parts(MODEL))
+    return compose(*build_parts(MODEL))
 
 
 def load(rng: np.random.Generator) -> Load:

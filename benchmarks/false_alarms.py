@@ -34,9 +34,9 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
     leaves.
     """
     from tractexp.configuration.plugin import get
-    from tractexp.discrepancy.disagreement import disagreement
-    from tractexp.inference.base_fit import base_fit
-    from tractexp.inference.catalogue import catalogue
+    from tractexp.discrepancy.disagreement import examine_base_fit
+    from tractexp.inference.base_fit import fit_base_model
+    from tractexp.inference.catalogue import build_catalogue
     from tractexp.inference.context import Context
     from tractexp.inference.criteria import Criteria
     from tractexp.inference.effort import Effort
@@ -49,9 +49,9 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
         detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(made)
     ]
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    missing = catalogue(model, events)
-    first = disagreement(
-        base_fit(
+    missing = build_catalogue(model, events)
+    first = examine_base_fit(
+        fit_base_model(
             Context.from_records(
                 model, missing, Records.from_events(events), {}, {}, Criteria(), Effort()
             )

@@ -272,7 +272,7 @@ def _compared(found, trial: cases.Trial) -> dict:
     """What the product said, held against what was made: sizes, places, clean curves, and what was
     to be found.
     """
-    from tractexp.discrepancy.discrepancy_json import parameters
+    from tractexp.discrepancy.discrepancy_json import list_parameters
 
     told = truth(trial.case, trial.seed)
     row = {
@@ -281,7 +281,7 @@ def _compared(found, trial: cases.Trial) -> dict:
     }
     hidden = [e["name"] for e in told["effects"]]
     if len(hidden) == 1 and list(found.names) == hidden and hidden[0] in SAME:
-        own = parameters(found)[SAME[found.names[0]]]
+        own = list_parameters(found)[SAME[found.names[0]]]
         row |= {
             "estimate": own["value"],
             "error": own["standard_error"],
@@ -352,7 +352,7 @@ def _left(found, clean: np.ndarray) -> float:
     projected out.
     """
     from tractexp.discrepancy.explanations import search_effect_sets
-    from tractexp.inference.linearization import tangent
+    from tractexp.inference.linearization import linearize_fit
 
     bench, first, refits = found.context, found.first, found.explanations.refits
     singles = [
@@ -363,7 +363,7 @@ def _left(found, clean: np.ndarray) -> float:
     singles = singles or search_effect_sets([first], {(): first.fit}, 1, lambda line: None)
     left = []
     for fit in sorted(singles, key=lambda f: f.cost)[:BEST]:
-        t = tangent(bench, fit, first.noise)
+        t = linearize_fit(bench, fit, first.noise)
         off = (t.residual + bench.drive.measurements - clean) * bench.valid
         rows = (
             t.build_score_test(first.noise)

@@ -62,11 +62,11 @@ def measure_shares(name: str, seed: int) -> dict[str, float]:
     """Of every effect the share of the base model's squares that it takes away of the dip that was
     not fitted, by the textbook names. Raises where the load cannot be made.
     """
-    from tractexp.discrepancy.disagreement import disagreement
+    from tractexp.discrepancy.disagreement import examine_base_fit
     from tractexp.discrepancy.explanations import search_effect_sets
     from tractexp.discrepancy.prediction import predict
-    from tractexp.inference.base_fit import base_fit
-    from tractexp.inference.catalogue import catalogue
+    from tractexp.inference.base_fit import fit_base_model
+    from tractexp.inference.catalogue import build_catalogue
     from tractexp.inference.context import Context
     from tractexp.inference.effort import Effort
     from tractexp.inference.fitting import refit
@@ -78,9 +78,9 @@ def measure_shares(name: str, seed: int) -> dict[str, float]:
     unused = study.detect_event("unused", study.make_unused(quiet))
     model = study.compose_model()
     records = Records.from_events(fitted)
-    known = catalogue(model, fitted, ())
+    known = build_catalogue(model, fitted, ())
     context = Context.from_records(model, known, records, {}, {}, Criteria(), Effort(print))
-    first = disagreement(base_fit(context), 0)
+    first = examine_base_fit(fit_base_model(context), 0)
     fits = search_effect_sets([first], {(): first.fit}, 1, lambda line: None)
     at = context.coordinates
     wanted = [(one.names, at.without_faults(one.unit, ())) for one in (first.fit, *fits)]

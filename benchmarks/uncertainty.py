@@ -342,7 +342,7 @@ def timing(repeats: int = 9) -> dict:
     loaded; medians.
     """
     from tractexp.configuration.plugin import get
-    from tractexp.identification.profile import profiles
+    from tractexp.identification.profile import profile_parameters
     from tractexp.identification.search import search
     from tractexp.inference.problem import Problem
 
@@ -358,7 +358,7 @@ def timing(repeats: int = 9) -> dict:
         marks.append(time.perf_counter())
         known = judged(problem, found.values).uncertainty
         marks.append(time.perf_counter())
-        made = profiles(known)
+        made = profile_parameters(known)
         _ = made.verdicts
         marks.append(time.perf_counter())
         rows.append(np.diff(marks))

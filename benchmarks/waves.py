@@ -144,7 +144,7 @@ def lengths(series: str, seed: int) -> dict:
 def told_at_truth(event, truth: dict[str, float]) -> dict[str, float]:
     """Relative standard errors at the true values, under the noise that the event shows there."""
     from tractexp.configuration.plugin import get
-    from tractexp.identification.residual_noise import noise_at
+    from tractexp.identification.residual_noise import estimate_noise_at
     from tractexp.identification.uncertainty import conclude
     from tractexp.inference.likelihood import Likelihood
     from tractexp.inference.observed import Observed
@@ -158,7 +158,7 @@ def told_at_truth(event, truth: dict[str, float]) -> dict[str, float]:
     likelihood = Likelihood.from_problem(observed.problem)
     values = np.array([truth[n] for n in observed.problem.space.names])
     unit = likelihood.to_unit(values)[0]
-    noise = noise_at(observed, likelihood, unit, observed.input_errors(values))
+    noise = estimate_noise_at(observed, likelihood, unit, observed.input_errors(values))
     errors = conclude(replace(likelihood, noise=noise), unit).information.standard_errors
     return dict(zip(observed.problem.space.names, (errors / values).tolist(), strict=True))
 

@@ -13,8 +13,8 @@ from hidden_effects import Case, Noise
 from hidden_effects.generator import scene
 from independent import Dip
 from tractexp.extend import Effect, Parameter, sites
-from tractexp.inference.base_fit import base_fit
-from tractexp.inference.catalogue import Catalogue, candidate
+from tractexp.inference.base_fit import fit_base_model
+from tractexp.inference.catalogue import Catalogue, build_candidate
 from tractexp.inference.fitting import refit
 from tractexp.inference.kernels import Family
 from tractexp.record import Record, detect
@@ -61,9 +61,9 @@ def fitted_alike():
     """
     made = recorded(hidden(*MILD, effect="stator_resistance", size=1.0))
     few = bench(base(), made, ("stator_resistance", "speed_dependent_torque"))
-    effects = Catalogue((*few.catalogue.candidates, candidate(LeakageLoss())), {})
+    effects = Catalogue((*few.catalogue.candidates, build_candidate(LeakageLoss())), {})
     context = few.rebuild(effects, few.records, few.effort, Family)
-    found, at = base_fit(context), context.coordinates
+    found, at = fit_base_model(context), context.coordinates
     starts = [
         ((name,), at.place_values(found.fit.unit, {label: value}))
         for name, label, value in (

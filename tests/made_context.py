@@ -2,8 +2,8 @@
 
 from made_dips import FEW, base
 
-from tractexp.inference.base_fit import base_fit
-from tractexp.inference.catalogue import catalogue
+from tractexp.inference.base_fit import fit_base_model
+from tractexp.inference.catalogue import build_catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
@@ -12,7 +12,7 @@ from tractexp.inference.records import Records
 
 def bench(model, made, only=FEW, bounds=None, **settings):
     """The free numbers of a model and of some effects beside these events."""
-    missing = catalogue(model, made, only)
+    missing = build_catalogue(model, made, only)
     records = Records.from_events(made)
     return Context.from_records(
         model, missing, records, bounds or {}, {}, Criteria(), Effort(), **settings
@@ -21,4 +21,4 @@ def bench(model, made, only=FEW, bounds=None, **settings):
 
 def fitted_base(made, only=FEW):
     """The base model as it fits these events by itself."""
-    return base_fit(bench(base(), made, only))
+    return fit_base_model(bench(base(), made, only))

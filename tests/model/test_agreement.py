@@ -61,23 +61,23 @@ def test_only_the_events_that_disagree_most_are_fitted_by_themselves(mixed, monk
 def test_the_powers_of_all_events_take_one_simulation_of_differences(alike, monkeypatch):
     """Of P before the dips and of Q, however many events there are."""
     assert alike.exact
-    only, sizes = agreement.only, []
+    only, sizes = agreement.select_group_rows, []
 
     def counted(likelihood, groups):
         rows = only(likelihood, groups)
         return lambda unit, lanes: (sizes.append(len(unit) / len(groups)), rows(unit, lanes))[1]
 
-    monkeypatch.setattr(agreement, "only", counted)
+    monkeypatch.setattr(agreement, "select_group_rows", counted)
     assert agreement.find_disagreeing_events(alike) == ([], [])
     assert max(sizes) == alike.likelihood.free + 2
 
 
 def test_no_more_fits_are_made_for_many_events(alike, monkeypatch):
-    only, fits = agreement.only, []
+    only, fits = agreement.select_group_rows, []
     monkeypatch.setattr(agreement, "SUSPECTS", 2)
     monkeypatch.setattr(
         agreement,
-        "only",
+        "select_group_rows",
         lambda likelihood, groups: (fits.append(groups), only(likelihood, groups))[1],
     )
     assert agreement.find_disagreeing_events(alike) == ([], [])

@@ -1,4 +1,4 @@
-"""Fits that are `held_to_usual`: the same rows in an identification and in an investigation."""
+"""Fits that are `add_usual_prior`: the same rows in an identification and in an investigation."""
 
 from pathlib import Path
 
@@ -7,8 +7,8 @@ import pytest
 from made_context import bench
 
 import tractexp
-from tractexp.identification.estimate import held_to_usual
-from tractexp.inference.blocks import blocks_of
+from tractexp.identification.estimate import add_usual_prior
+from tractexp.inference.blocks import cut_blocks
 from tractexp.inference.likelihood import Likelihood
 from tractexp.noise import Noise
 
@@ -27,8 +27,8 @@ def context(dips, *, priors):
 def test_a_block_of_samples_counts_as_one_row_of_the_prior(contactors):
     problem = context(contactors, priors=True).kernels.bare
     squares = Likelihood.of_squares(problem, 0.01)
-    held, unit = held_to_usual(squares), np.full((1, problem.space.dimension), 0.4)
-    blocks = blocks_of(problem.events, problem.drive, problem.space.dimension)
+    held, unit = add_usual_prior(squares), np.full((1, problem.space.dimension), 0.4)
+    blocks = cut_blocks(problem.events, problem.drive, problem.space.dimension)
     assert held.prior**2 * len(blocks) == pytest.approx(squares.samples)
     np.testing.assert_array_equal(held.of_records.rows(unit), squares.rows(unit))
 
@@ -36,7 +36,7 @@ def test_a_block_of_samples_counts_as_one_row_of_the_prior(contactors):
 def test_an_investigation_holds_the_motor_by_the_rows_of_an_identification(contactors):
     """Eq. (8) with what machines usually are: the same rows at the same parameters."""
     investigated = context(contactors, priors=True).with_measured_power.held_to_usual
-    squares = held_to_usual(Likelihood.of_squares(investigated.kernels.bare, 0.02))
+    squares = add_usual_prior(Likelihood.of_squares(investigated.kernels.bare, 0.02))
     at, free = investigated.coordinates, np.linspace(0.3, 0.6, squares.free)[None]
     unit = at.null[None].copy()
     unit[:, at.base] = free

@@ -1,12 +1,12 @@
-"""What a recorder's filter makes of a jump lies within what `_at_jumps` leaves open there; nothing
-is where nothing jumps.
+"""What a recorder's filter makes of a jump lies within what `_find_jump_samples` leaves open there;
+nothing is where nothing jumps.
 """
 
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from tractexp.inference.jumps import AROUND, _at_jumps
+from tractexp.inference.jumps import AROUND, _find_jump_samples
 
 RATE, FINER = 3200.0, 12
 
@@ -29,7 +29,7 @@ def jumping(at: float, size: float, cutoff: float) -> tuple[np.ndarray, np.ndarr
 @pytest.mark.parametrize("at", [0.06, 0.0601, 0.06022])
 def test_what_a_filter_makes_of_a_jump_lies_within_what_is_open(at, cutoff):
     calculated, recorded = jumping(at, 0.3, cutoff)
-    off, doubt = np.abs(recorded - calculated), dict(_at_jumps(calculated))
+    off, doubt = np.abs(recorded - calculated), dict(_find_jump_samples(calculated))
     assert doubt
     bad = [k for k in np.flatnonzero(off > 0.012) if off[k] > 3 * doubt.get(k, 0.0)]
     assert off.max() > 0.06  # the filter does matter
@@ -39,5 +39,5 @@ def test_what_a_filter_makes_of_a_jump_lies_within_what_is_open(at, cutoff):
 
 def test_a_sine_with_harmonics_has_no_jump():
     t = np.arange(400) / RATE
-    assert _at_jumps(np.cos(2 * np.pi * 50 * t) + 0.1 * np.cos(2 * np.pi * 350 * t)) == []
-    assert _at_jumps(np.zeros(400)) == []
+    assert _find_jump_samples(np.cos(2 * np.pi * 50 * t) + 0.1 * np.cos(2 * np.pi * 350 * t)) == []
+    assert _find_jump_samples(np.zeros(400)) == []

@@ -10,7 +10,7 @@ import uncertainty as study
 from printed_events import NOISE, one_dip, records
 from written_out import dense_normal
 
-from tractexp.inference.least_squares import normal
+from tractexp.inference.least_squares import build_normal_matrix
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
 from tractexp.inference.separable import NOT_SEPARABLE
@@ -46,7 +46,7 @@ def test_the_normal_equations_of_the_likelihood_are_those_of_every_column_by_its
     unit, lanes = likelihood.to_unit(study.TYPICAL), np.zeros(1, dtype=int)
     base = likelihood.rows(unit)
     alone, together = (
-        normal(likelihood.rows, unit, base, lanes, apart)
+        build_normal_matrix(likelihood.rows, unit, base, lanes, apart)
         for apart in (NOT_SEPARABLE, likelihood.separable_columns)
     )
     for one, other in (alone[0], together[0]), (dense_normal(alone[1]), dense_normal(together[1])):

@@ -1,4 +1,6 @@
-"""What machines usually are, `departures`: its numbers, and rows beside those of the records."""
+"""What machines usually are, `compute_departures`: its numbers, and rows beside those of the
+records.
+"""
 
 from dataclasses import replace
 
@@ -9,9 +11,9 @@ from printed_events import minimum
 import tractexp
 from tractexp.configuration.plugin import get
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.prior import departures, held_in_words
+from tractexp.inference.prior import compute_departures, describe_prior
 from tractexp.inference.problem import Problem
-from tractexp.inference.sandwich import scatter
+from tractexp.inference.sandwich import estimate_scatter
 
 # R_s, X_s, X_m, R_r, X_r, H, load factor of the seven types of the source
 TYPES = (
@@ -52,7 +54,7 @@ def test_a_motor_says_what_is_usual_of_some_of_its_parameters(motor, known):
     (event,) = tractexp.read("tibet_50pct")
     model = tractexp.compose(motor=motor).model
     values = np.array([[p.default for p in model.parameters]])
-    rows = departures(Problem(model, [event], priors=True), values)
+    rows = compute_departures(Problem(model, [event], priors=True), values)
     assert rows.shape == (1, known)
     assert np.isfinite(rows).all()
 
@@ -73,15 +75,15 @@ def test_a_quantity_at_its_median_departs_by_nothing_and_at_its_factor_by_one(pr
         "M": 0.0068 * 0.5 / 2.2,
     }
     row = np.array([[values[name] for name in problem.space.names]])
-    assert departures(problem, row)[0] == pytest.approx([1.0, 0.0, 0.0, -1.0], abs=1e-9)
-    assert held_in_words(problem, row[0]).endswith(
+    assert compute_departures(problem, row)[0] == pytest.approx([1.0, 0.0, 0.0, -1.0], abs=1e-9)
+    assert describe_prior(problem, row[0]).endswith(
         "and is 1 standard deviations off where it is farthest"
     )
 
 
 def test_a_motor_of_which_nothing_is_known_is_held_by_nothing(problem):
     other = Problem(tractexp.compose(motor="none").model, problem.events, priors=True)
-    assert departures(other, other.defaults[None]).shape == (1, 0)
+    assert compute_departures(other, other.defaults[None]).shape == (1, 0)
 
 
 def test_rows_of_the_records_are_the_same_beside_a_prior(problem):
@@ -90,7 +92,7 @@ def test_rows_of_the_records_are_the_same_beside_a_prior(problem):
     rows, beside = squares.rows(unit), held.rows(unit)
     np.testing.assert_array_equal(beside[:, : rows.shape[1]], rows)
     np.testing.assert_allclose(
-        beside[:, rows.shape[1] :], 3 * departures(problem, squares.values(unit))
+        beside[:, rows.shape[1] :], 3 * compute_departures(problem, squares.values(unit))
     )
     np.testing.assert_array_equal(held.of_records.rows(unit), rows)
     assert held.scale_noise(2.0).prior == 1.5
@@ -104,7 +106,7 @@ def test_a_parameter_that_the_prior_alone_holds_scatters_as_it_says(problem):
         held = replace(Likelihood.of_squares(problem, 0.01), prior=prior)
         start = problem.space.to_unit(problem.defaults)
         unit = minimum(held, start, iterations=200, tolerance=1e-9, central=True)
-        information = scatter(held, unit).information
+        information = estimate_scatter(held, unit).information
         values = dict(zip(problem.space.names, information.values, strict=True))
         errors = dict(zip(problem.space.names, information.standard_errors, strict=True))
         assert errors["C"] == pytest.approx((1 - values["C"]) * np.log(1.33), rel=0.05)

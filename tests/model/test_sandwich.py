@@ -1,5 +1,5 @@
-"""The scatter of least squares where what is left is no noise, by `scatter`: against refits, and of
-white and correlated residuals.
+"""The scatter of least squares where what is left is no noise, by `estimate_scatter`: against
+refits, and of white and correlated residuals.
 """
 
 import numpy as np
@@ -8,10 +8,14 @@ import uncertainty as study
 from printed_events import NOISE, minimum, one_dip
 
 import tractexp
-from tractexp.inference.blocks import LENGTH, blocks_of
+from tractexp.inference.blocks import LENGTH, cut_blocks
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
-from tractexp.inference.sandwich import moves_without_blocks, robust_root, scatter
+from tractexp.inference.sandwich import (
+    compute_moves_without_blocks,
+    compute_robust_root,
+    estimate_scatter,
+)
 
 
 def least_squares(case, deviation=NOISE):
@@ -23,16 +27,16 @@ def least_squares(case, deviation=NOISE):
 def test_blocks_hold_every_sample_once_and_begin_with_the_dip():
     case = one_dip()
     (event,) = case.events
-    blocks = blocks_of(case.events, case.drive, 7)
+    blocks = cut_blocks(case.events, case.drive, 7)
     assert np.array_equal(
         np.concatenate([np.arange(b.start, b.stop) for b in blocks]), np.arange(case.drive.samples)
     )
     assert event.start in [b.start for b in blocks]
     (length,) = {round((b.stop - b.start) * event.record.step, 3) for b in blocks[1:-1]}
     assert 0.9 * LENGTH < length <= LENGTH
-    later = blocks_of(case.events, case.drive, 7, from_dip=True)
+    later = cut_blocks(case.events, case.drive, 7, from_dip=True)
     assert later[0].start == event.start
-    many = blocks_of(case.events, case.drive, 60)  # three for each parameter
+    many = cut_blocks(case.events, case.drive, 60)  # three for each parameter
     assert len(many) > 2.5 * 60
 
 
@@ -41,7 +45,7 @@ def test_of_a_linear_model_leaving_out_a_block_moves_it_as_a_refit_does():
     J, rows = rng.standard_normal((1, 60, 3)), 0.01 * rng.standard_normal((1, 60))
     blocks = [slice(k, k + 20) for k in (0, 20, 40)]
     whole = np.linalg.lstsq(J[0], -rows[0])[0]
-    moves = moves_without_blocks(J, rows + J @ whole, blocks, J[0].T @ J[0])
+    moves = compute_moves_without_blocks(J, rows + J @ whole, blocks, J[0].T @ J[0])
     for block, move in zip(blocks, moves, strict=True):
         rest = np.setdiff1d(np.arange(60), np.arange(60)[block])
         assert np.linalg.lstsq(J[0, rest], -rows[0, rest])[0] - whole == pytest.approx(move)
@@ -50,7 +54,7 @@ def test_of_a_linear_model_leaving_out_a_block_moves_it_as_a_refit_does():
 def test_no_error_is_less_than_that_of_independent_residuals():
     """Where blocks hardly move the estimate, as by chance a few may."""
     J = np.random.default_rng(2).standard_normal((40, 3))
-    root, ratio, spread = robust_root(J, np.zeros((4, 3)))
+    root, ratio, spread = compute_robust_root(J, np.zeros((4, 3)))
     assert root.T @ root == pytest.approx(J.T @ J)
     assert [*ratio, spread] == pytest.approx([1.0] * 4)
 
@@ -59,8 +63,8 @@ def test_leaving_out_a_block_is_what_a_refit_without_it_gives():
     """The influence of each block, to first order, against least squares without its samples."""
     case = one_dip()
     squares, unit = least_squares(case)
-    scattered = scatter(squares, unit)
-    blocks, moved = blocks_of(case.events, case.drive, 7), []
+    scattered = estimate_scatter(squares, unit)
+    blocks, moved = cut_blocks(case.events, case.drive, 7), []
     (event,) = case.events
     for block in blocks:
         known = squares.valid.copy()
@@ -89,7 +93,7 @@ def test_of_white_noise_it_is_near_the_usual_error_and_of_correlated_residuals_a
             error = study.noise(rng, 1000, NOISE, phi)
             squares, unit = least_squares(one_dip(error, seed=seed))
             left = float(np.sqrt(np.mean(squares.rows(unit[None])[0] ** 2)))
-            each.append(scatter(squares.scale_noise(left), unit).ratio)
+            each.append(estimate_scatter(squares.scale_noise(left), unit).ratio)
         ratios.append(np.median(each, axis=0))
     assert (ratios[0] < 1.6).all()
     assert (ratios[1][[0, 3, 4, 5]] > 1.5 * ratios[0][[0, 3, 4, 5]]).all()
@@ -100,7 +104,7 @@ def test_a_parameter_on_a_bound_is_held_for_the_others_and_has_an_error_of_its_o
     squares = Likelihood.of_squares(case, NOISE)
     unit = minimum(squares, squares.to_unit(np.minimum(study.TYPICAL, case.upper))[0])
     assert unit[3] == 1.0
-    errors = scatter(squares, unit).information.standard_errors
+    errors = estimate_scatter(squares, unit).information.standard_errors
     assert np.isfinite(errors).all()
     assert errors[3] < 0.1 * 0.005
 
@@ -113,7 +117,7 @@ def test_a_parameter_on_a_bound_that_changes_nothing_is_not_known_and_ruins_noth
     unit[-1] = 0.0
     unit = minimum(squares, unit, held=[6])
     silent = Silent(problem=case, noise=squares.noise, valid=squares.valid, initial_power=False)
-    errors = scatter(silent, unit).information.standard_errors
+    errors = estimate_scatter(silent, unit).information.standard_errors
     assert np.isinf(errors[-1])
     assert np.isfinite(errors[:-1]).all()
 

@@ -43,8 +43,10 @@ def test_what_is_judged_is_the_estimate_against_all_draws(known, monkeypatch):
         judged.append((len(draws), len(value)))
         return 1.0
 
-    monkeypatch.setattr(goodness_of_fit, "tail", count_draws)
-    adequacy.surprise(Observed.from_problem(known.likelihood.problem), known.likelihood, known.unit)
+    monkeypatch.setattr(goodness_of_fit, "compute_tail_p", count_draws)
+    adequacy.run_residual_test(
+        Observed.from_problem(known.likelihood.problem), known.likelihood, known.unit
+    )
     assert {*judged} == {(adequacy.FIT_DRAWS, 1)}
 
 
@@ -60,7 +62,7 @@ def test_p_of_noise_alone_is_no_smaller_than_it_says(known):
         noisy = observed.problem.driven_by(observed.problem.events)
         noisy.drive = drive
         again = replace(known.likelihood, problem=noisy)
-        p.append(adequacy.surprise(replace(observed, problem=noisy), again, known.unit).p)
+        p.append(adequacy.run_residual_test(replace(observed, problem=noisy), again, known.unit).p)
     assert 0.0 <= np.mean(np.array(p) < 0.1) < 0.25
     assert min(p) > goodness_of_fit.ADEQUATE_P
 
@@ -74,7 +76,7 @@ def test_a_model_that_takes_its_error_for_slow_noise_is_found_out_by_least_squar
     rows = squares.with_initial_power.rows(known.unit[None])[0]
     least = float(rows @ rows)
     observed = Observed.from_problem(likelihood.problem)
-    agree = adequacy.surprise(observed, likelihood, known.unit, squares, least)
-    apart = adequacy.surprise(observed, likelihood, known.unit, squares, least / 2)
+    agree = adequacy.run_residual_test(observed, likelihood, known.unit, squares, least)
+    apart = adequacy.run_residual_test(observed, likelihood, known.unit, squares, least / 2)
     assert agree.p > goodness_of_fit.ADEQUATE_P
     assert (apart.loudest, apart.p < goodness_of_fit.ADEQUATE_P) == (adequacy.APART, True)

@@ -16,7 +16,7 @@ from written_out import dense, printed_dip
 
 import tractexp
 from tractexp.identification.advice import advise
-from tractexp.identification.uncertainty import conclude, threshold
+from tractexp.identification.uncertainty import compute_threshold, conclude
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
 
@@ -227,7 +227,7 @@ def test_the_deviance_rises_to_its_limit_where_the_interval_ends():
     end = minimum(known.likelihood, moved, held=[j])
     rise = np.sum(known.likelihood.rows(end[None]) ** 2) - known.deviance
     assert rise == pytest.approx(known.limits[j], rel=0.25)
-    assert known.limits[j] != pytest.approx(threshold(), rel=0.01)
+    assert known.limits[j] != pytest.approx(compute_threshold(), rel=0.01)
 
 
 def test_correlated_noise_of_p_and_q_is_seen_and_used():

@@ -12,7 +12,7 @@ from tractexp.configuration.plugin import get
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.advice import advise
-from tractexp.identification.plan import DipShape, forecast
+from tractexp.identification.plan import DipShape, forecast_intervals
 from tractexp.identification.profile import check_by_profiles
 from tractexp.model.model import compose
 
@@ -71,4 +71,4 @@ def test_advice_for_a_model_that_no_planned_dip_can_hold_has_no_figures():
         " nothing can be planned"
     )
     with pytest.raises(UserError, match=sentence):
-        forecast(case, known.values, DipShape.from_event(event))
+        forecast_intervals(case, known.values, DipShape.from_event(event))

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from command_line import run_command
-from test_yardstick import simulated
+from test_network_comparison import simulated
 
 import tractexp
 from tractexp.errors import UserError

@@ -1,5 +1,5 @@
-"""The effects that some events can show, `catalogue`, with the members of their families, and what
-an event lacks, `missing_channel`.
+"""The effects that some events can show, `build_catalogue`, with the members of their families, and
+what an event lacks, `explain_missing_channel`.
 """
 
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from made_dips import base, events
 from wave_records import case
 
 from tractexp.configuration.plugin import discover, get
-from tractexp.inference.catalogue import catalogue, missing_channel
+from tractexp.inference.catalogue import build_catalogue, explain_missing_channel
 from tractexp.model.model import compose
 from tractexp.record import convert_to_waves
 
@@ -22,7 +22,7 @@ def test_members_belong_to_the_effects_that_are_asked_for():
     made = events(count=1)
 
     def names(only):
-        return {member.name for member in catalogue(base(), made, only).members}
+        return {member.name for member in build_catalogue(base(), made, only).members}
 
     assert names(("magnetic_saturation",)) == {"saturation_curve"}
     assert names(("stator_resistance",)) == set()
@@ -30,7 +30,7 @@ def test_members_belong_to_the_effects_that_are_asked_for():
 
 
 def test_a_member_is_no_candidate_of_the_first_search():
-    missing = catalogue(base(), events(count=1))
+    missing = build_catalogue(base(), events(count=1))
     assert not {c.name for c in missing.candidates} & MEMBERS
     assert missing.textbook(("saturation_curve", "load_change")) == (
         "magnetic_saturation",
@@ -43,7 +43,7 @@ def test_an_effect_of_the_frequency_is_tested_where_that_swings(swing, is_enough
     """By a twentieth of a Hz."""
     record = SimpleNamespace(channels={"f": np.linspace(50.0, 50.0 + swing, 10)})
     event = SimpleNamespace(record=record, channels=("f",))
-    told = missing_channel(get("effect", "frequency_dependence")(), [event])
+    told = explain_missing_channel(get("effect", "frequency_dependence")(), [event])
     assert ("moves by less than" not in (told or "")) == is_enough
 
 
@@ -52,5 +52,5 @@ def test_an_effect_that_makes_no_sense_of_waveforms_says_why():
     seed = 4, 0
     made = [convert_to_waves(event) for event in wave_records.events(case(seed, 1), seed)]
     named = "stator_resistance", "speed_dependent_torque"
-    refused = catalogue(compose(motor, static, domain="waves"), made, named).untestable
+    refused = build_catalogue(compose(motor, static, domain="waves"), made, named).untestable
     assert "R_s" in refused["stator_resistance"]

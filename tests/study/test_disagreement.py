@@ -1,5 +1,5 @@
-"""All tests at one fit, `disagreement`: where model and records differ is found by the test that
-looks for it, and chance is drawn as exactly as the decision asks.
+"""All tests at one fit, `examine_base_fit`: where model and records differ is found by the test
+that looks for it, and chance is drawn as exactly as the decision asks.
 """
 
 from dataclasses import replace
@@ -9,16 +9,16 @@ import pytest
 from made_context import bench
 from made_dips import base, events
 
-from tractexp.discrepancy.disagreement import disagreement
-from tractexp.inference.base_fit import base_fit
-from tractexp.inference.chance import scales
+from tractexp.discrepancy.disagreement import examine_base_fit
+from tractexp.inference.base_fit import fit_base_model
+from tractexp.inference.chance import draw_scales
 from tractexp.inference.goodness_of_fit import GoodnessOfFit
 
 
 @pytest.fixture(scope="module")
 def first():
     """The tests of the base model on dips where nothing is missing."""
-    return disagreement(base_fit(bench(base(), events())), seed=0)
+    return examine_base_fit(fit_base_model(bench(base(), events())), seed=0)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,9 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(first):
         assert moved.is_undecided == open_
     exact = replace(
         bare,
-        chance=replace(bare.chance, scales=scales(first.tangent, first.projection, first.noise, 3)),
+        chance=replace(
+            bare.chance, scales=draw_scales(first.tangent, first.projection, first.noise, 3)
+        ),
     )
     exact.__dict__["goodness_of_fit"] = GoodnessOfFit({"one of six": level})
     assert not exact.is_undecided
@@ -97,7 +99,7 @@ def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(first):
     """
     T = first.context.coordinates.value("T_prime", first.fit.unit)
     made = bench(base(), events(), bounds={"T_prime": [1.05 * T, 2 * T]})
-    bounded = disagreement(base_fit(made), seed=0)
+    bounded = examine_base_fit(fit_base_model(made), seed=0)
     assert bounded.fit.unit[made.coordinates.column["T_prime"]] == 0.0
     assert "T_prime" in bounded.parameters_at_bound
     assert first.parameters_at_bound == []

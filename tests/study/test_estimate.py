@@ -172,7 +172,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
         return descend(likelihood.rows, bad, np.ones_like(bad, dtype=bool))
 
     monkeypatch.setattr(module, "explore_minima", one_bad_start)
-    monkeypatch.setattr(module, "along_least_certain", lambda likelihood, unit: unit[None])
+    monkeypatch.setattr(module, "place_along_least_certain", lambda likelihood, unit: unit[None])
     monkeypatch.setattr(module, "_remembered", type(module._remembered)())
     found = module.estimate(case, TRUTH)
     np.testing.assert_allclose(found.uncertainty.values, whole.values, rtol=1e-3)

@@ -9,7 +9,7 @@ from made_context import bench
 from made_dips import FEW, LOUD, base, events
 
 from tractexp.inference import cores, fitting
-from tractexp.inference.base_fit import base_fit
+from tractexp.inference.base_fit import fit_base_model
 from tractexp.inference.fit_effort import FITS_AT_ONCE
 from tractexp.inference.fitting import refit
 
@@ -21,7 +21,7 @@ def test_descents_on_several_cores_say_how_many_have_ended(monkeypatch):
         yield lambda: counted.append("ended")
 
     counted = []
-    fit = base_fit(bench(base(), events(noise=LOUD)))
+    fit = fit_base_model(bench(base(), events(noise=LOUD)))
     monkeypatch.setattr(fit.context.effort, "parts", parts)
     starts = [((name,), fit.fit.unit) for name in FEW] * FITS_AT_ONCE
     # what was fitted before is read back at once
@@ -34,12 +34,12 @@ def test_fits_and_what_they_spend_do_not_depend_on_the_number_of_cores(monkeypat
     """Products of matrices round by how many rows they have: the same descents go together on any
     machine.
     """
-    fit = base_fit(bench(base(), events(), ("stator_resistance",)))
+    fit = fit_base_model(bench(base(), events(), ("stator_resistance",)))
     moved = np.clip(fit.fit.unit + np.linspace(-0.02, 0.02, 9)[:, None], 0.0, 1.0)
     monkeypatch.setattr(fitting.store, "key", lambda *_: "")  # nothing is taken from the store
     found = []
     for number in (1, 3):
-        monkeypatch.setattr(cores, "cores", lambda number=number: number)
+        monkeypatch.setattr(cores, "count_cores", lambda number=number: number)
         before = fit.context.effort.total
         fits = refit(fit.context, fit.noise, [(("stator_resistance",), unit) for unit in moved])
         found.append((fits[0].unit, fits[0].deviance, fit.context.effort.total - before))

@@ -13,7 +13,7 @@ from conftest import MOTOR
 import tractexp
 from tractexp.blocks import Report
 from tractexp.discrepancy.investigate import _complete_row as complete_row
-from tractexp.discrepancy.precision import standard_errors
+from tractexp.discrepancy.precision import compute_standard_errors
 from tractexp.discrepancy.prediction import SHARING, predict_held_out
 from tractexp.identification.verdict import UNIDENTIFIED
 from tractexp.report.predicted import add_prediction_section
@@ -103,7 +103,7 @@ def test_errors_are_wider_where_residuals_are_correlated(found):
     """By blocks left out in turn, against those of residuals that are independent."""
     tests, noise = found.steps.tests, found.steps.evidence.noise
     independent = replace(tests, robust=tests.tangent.build_score_test(noise).R)
-    wide, narrow = standard_errors(tests), standard_errors(independent)
+    wide, narrow = compute_standard_errors(tests), compute_standard_errors(independent)
     assert np.median([wide[name] / narrow[name] for name in wide]) > 1.5
 
 
@@ -129,7 +129,7 @@ def test_a_size_that_is_known_no_better_than_its_bounds_is_told(found):
 
 
 def test_an_effect_whose_size_rests_on_a_bound_is_a_candidate(found, monkeypatch):
-    monkeypatch.setattr("tractexp.discrepancy.findings.at_bound", lambda *_: ["R_s", "T_m"])
+    monkeypatch.setattr("tractexp.discrepancy.findings.list_at_bound", lambda *_: ["R_s", "T_m"])
     (told,) = replace(found.steps).open_sizes
     assert told.startswith("R_s rests on its bound, 0.0")
     again = complete_row(replace(found.steps), found.steps.withheld)

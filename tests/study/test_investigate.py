@@ -40,8 +40,8 @@ def test_all_events_are_fitted_where_nothing_is_named_and_their_name_closes_a_sh
     monkeypatch.setattr(investigating.Findings, "closes_share", closes)
     monkeypatch.setattr(investigating.Findings, "base_values", None)
     monkeypatch.setattr(Kernels, "too_coarse", lambda *_: False)
-    monkeypatch.setattr(investigating, "base_fit", lambda context: None)
-    monkeypatch.setattr(investigating, "_findings", findings_of)
+    monkeypatch.setattr(investigating, "fit_base_model", lambda context: None)
+    monkeypatch.setattr(investigating, "_take_steps", findings_of)
     made = events(count=2)
     told = investigating.investigate(base(), made[:1], made[1:], only=("undervoltage_trip",))
     assert told.withheld == chosen

@@ -1,5 +1,5 @@
-"""Members of a family beside the textbook's effect: when one takes its place, `against_members`,
-and where their fits start, `starts` and `scatter_starts`.
+"""Members of a family beside the textbook's effect: when one takes its place, `compare_members`,
+and where their fits start, `list_member_starts` and `scatter_starts`.
 """
 
 from types import SimpleNamespace
@@ -11,7 +11,12 @@ from made_dips import base, events, investigate
 from made_sets import fitted
 
 from tractexp.discrepancy import families
-from tractexp.discrepancy.families import against_members, open_settings, starts, worth
+from tractexp.discrepancy.families import (
+    compare_members,
+    is_worth,
+    list_member_starts,
+    open_settings,
+)
 from tractexp.inference.fitting import Refit
 from tractexp.inference.wide_fit import scatter_starts
 
@@ -20,16 +25,18 @@ CORE = ("magnetic_saturation", "stator_resistance")
 
 
 def test_nothing_is_tried_where_nothing_is_missing(monkeypatch):
-    monkeypatch.setattr(families, "wide_refits", lambda *_: pytest.fail("a member was fitted"))
+    monkeypatch.setattr(
+        families, "refit_sets_widely", lambda *_: pytest.fail("a member was fitted")
+    )
     assert investigate(events(), effects=("undervoltage_trip",)).verdict == "none"
 
 
 def test_a_member_pays_for_its_further_parameters():
     """The same gain is worth one further parameter and not three; none where it is no better."""
     textbook = fitted(200.0, 1, "one")
-    assert worth(fitted(178.0, 2, "other"), textbook, 1e-5)
-    assert not worth(fitted(178.0, 4, "other"), textbook, 1e-5)
-    assert not worth(fitted(201.0, 2, "other"), textbook, 1.0)
+    assert is_worth(fitted(178.0, 2, "other"), textbook, 1e-5)
+    assert not is_worth(fitted(178.0, 4, "other"), textbook, 1e-5)
+    assert not is_worth(fitted(201.0, 2, "other"), textbook, 1.0)
 
 
 @pytest.mark.parametrize(("better", "named"), [(60.0, True), (99.0, False)])
@@ -42,12 +49,12 @@ def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leave
     refits["magnetic_saturation",] = fitted(400.0, 1, "magnetic_saturation")
     told = SimpleNamespace(fit=refits["static_var_compensator",], noise=None, suffices=True)
     member = fitted(better, 4, "saturation_curve")
-    monkeypatch.setattr(families, "starts", lambda *_: [])
-    monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
+    monkeypatch.setattr(families, "list_member_starts", lambda *_: [])
+    monkeypatch.setattr(families, "refit_sets_widely", lambda *_: [member])
     monkeypatch.setattr(
         families, "examine_fit", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True)
     )
-    tests, held_against = against_members(SimpleNamespace(context=at, quiet=None), told, refits, 0)
+    tests, held_against = compare_members(SimpleNamespace(context=at, quiet=None), told, refits, 0)
     assert tests.fit is (member if named else told.fit)
     assert held_against == [member]
 
@@ -71,14 +78,14 @@ def test_a_member_that_leaves_nothing_is_taken_where_a_textbook_effect_that_fits
     told = SimpleNamespace(
         fit=refits["magnetic_saturation",], noise=None, suffices=textbook_suffices
     )
-    monkeypatch.setattr(families, "starts", lambda *_: [])
-    monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
+    monkeypatch.setattr(families, "list_member_starts", lambda *_: [])
+    monkeypatch.setattr(families, "refit_sets_widely", lambda *_: [member])
     monkeypatch.setattr(
         families,
         "examine_fit",
         lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=member_suffices),
     )
-    tests, held_against = against_members(SimpleNamespace(context=at, quiet=None), told, refits, 0)
+    tests, held_against = compare_members(SimpleNamespace(context=at, quiet=None), told, refits, 0)
     assert tests.fit is (member if named else told.fit)
     assert held_against == ([member] if named or textbook_suffices else [])
 
@@ -93,7 +100,7 @@ def test_a_member_that_nests_the_textbook_starts_from_its_fit():
         ("magnetic_saturation",): Refit(CORE[:1], unit, 0.0, 1),
     }
     member = at.catalogue["saturation_curve"]
-    begun = [point for _, point in starts(at, member, refits)]
+    begun = [point for _, point in list_member_starts(at, member, refits)]
     assert len(begun) == len(open_settings(member, ("curve_saturation",)))
     textbook = at.residuals(unit[None], CORE[:1])[0]
     apart = [
@@ -117,7 +124,7 @@ def two_stages(share):
 
 def test_two_stages_begin_with_the_whole_of_one_or_with_halves():
     at, refits = two_stages(0.2)
-    begun = [unit for _, unit in starts(at, at.catalogue["two_stage_trip"], refits)]
+    begun = [unit for _, unit in list_member_starts(at, at.catalogue["two_stage_trip"], refits)]
     shares = {
         tuple(round(at.coordinates.value(f"stage_{k}_tripped", u), 6) for k in (1, 2))
         for u in begun
@@ -127,7 +134,7 @@ def test_two_stages_begin_with_the_whole_of_one_or_with_halves():
 
 def test_what_is_scattered_moves_all_times_and_no_size():
     at, refits = two_stages(0.2)
-    ((names, unit), *_) = starts(at, at.catalogue["two_stage_trip"], refits)
+    ((names, unit), *_) = list_member_starts(at, at.catalogue["two_stage_trip"], refits)
     points = np.array([point for _, point in scatter_starts(at, Refit(names, unit, 0.0, 11))])
     moved = np.abs(points - unit)
     settings = at.coordinates.settings(names)

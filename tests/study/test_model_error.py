@@ -1,5 +1,5 @@
-"""The size of a model's error, `model_error`: known answers, noise and drift told from it, the
-headline, `result.json` and MLflow.
+"""The size of a model's error, `compute_model_error`: known answers, noise and drift told from it,
+the headline, `result.json` and MLflow.
 """
 
 import functools
@@ -15,10 +15,10 @@ import tractexp
 from tractexp.identification.fit import Fit
 from tractexp.inference.model_error import (
     ModelError,
-    block_sums,
-    in_percent,
-    model_error,
-    noise_variance,
+    compute_model_error,
+    estimate_noise_variance,
+    format_percent,
+    sum_blocks,
 )
 from tractexp.noise.random_walk import WANDERING_COSINES
 from tractexp.report.fit_sentences import describe_rivals, find_rival_moves
@@ -49,7 +49,7 @@ def played(off_P=0.0, off_Q=0.0, noise=0.0, drift=0.0, seed=0, depth=0.5, name="
 
 
 def test_a_model_that_follows_nine_tenths_of_the_response_is_off_by_a_tenth():
-    error = model_error([played(-0.1, -0.1)])
+    error = compute_model_error([played(-0.1, -0.1)])
     assert error.value == pytest.approx(0.1, rel=1e-3)
     assert error.interval == pytest.approx((0.1, 0.1), rel=2e-3)  # the same share of every block
     fit = played()
@@ -65,20 +65,22 @@ def S_before(fit):
 
 
 def test_a_static_load_that_never_answers_is_off_by_all_of_it():
-    assert model_error([played(-1.0, -1.0)]).value == pytest.approx(1.0, rel=1e-3)
+    assert compute_model_error([played(-1.0, -1.0)]).value == pytest.approx(1.0, rel=1e-3)
 
 
 def test_noise_is_not_counted_and_chance_is_in_the_interval():
-    errors = [model_error([played(noise=0.01, seed=seed)]) for seed in range(20)]
+    errors = [compute_model_error([played(noise=0.01, seed=seed)]) for seed in range(20)]
     assert np.median([e.value for e in errors]) < 0.025  # where noise alone is 7 % of the response
     assert all(e.interval[0] == 0.0 for e in errors)
-    half = [model_error([played(-0.1, -0.1, noise=0.01, seed=seed)]) for seed in range(20)]
+    half = [compute_model_error([played(-0.1, -0.1, noise=0.01, seed=seed)]) for seed in range(20)]
     assert np.mean([e.value for e in half]) == pytest.approx(0.1, rel=0.05)
     assert np.mean([e.interval[0] <= 0.1 <= e.interval[1] for e in half]) > 0.7
 
 
 def test_a_drift_before_the_dip_is_no_noise():
-    quiet, drifting = (noise_variance(played(noise=4e-3, drift=d).event) for d in (0.0, 0.05))
+    quiet, drifting = (
+        estimate_noise_variance(played(noise=4e-3, drift=d).event) for d in (0.0, 0.05)
+    )
     assert drifting == pytest.approx(quiet, rel=0.1)
     assert np.sqrt(quiet) == pytest.approx(np.sqrt(2) * 4e-3, rel=0.2)
 
@@ -97,8 +99,8 @@ def test_a_short_record_has_as_many_blocks_as_one_of_a_second():
         P=long.P[:end],
         Q=long.Q[:end],
     )
-    assert [len(sums) for sums in block_sums([short])] == [10]
-    assert [len(sums) for sums in block_sums([short, long])] == [3, len(block_sums([long])[0])]
+    assert [len(sums) for sums in sum_blocks([short])] == [10]
+    assert [len(sums) for sums in sum_blocks([short, long])] == [3, len(sum_blocks([long])[0])]
 
 
 def test_blocks_are_shortened_until_so_many_share_the_response():
@@ -107,15 +109,15 @@ def test_blocks_are_shortened_until_so_many_share_the_response():
     """
     fit = played(-0.1, -0.1)
     record, start = fit.event.record, fit.event.start
-    response = np.abs((record.P + 1j * record.Q)[start:] - S_before(fit)) ** 2 - noise_variance(
-        fit.event
-    )
+    response = np.abs(
+        (record.P + 1j * record.Q)[start:] - S_before(fit)
+    ) ** 2 - estimate_noise_variance(fit.event)
 
     def sharing(sums):
         return sums[0][:, 1].sum() ** 2 / np.sum(sums[0][:, 1] ** 2)
 
     whole, some, cycles = (
-        block_sums([fit], blocks) for blocks in (0.0, 1.5 * sharing(block_sums([fit])), 1e9)
+        sum_blocks([fit], blocks) for blocks in (0.0, 1.5 * sharing(sum_blocks([fit])), 1e9)
     )
     assert sharing(some) >= 1.5 * sharing(whole)
     assert len(whole[0]) < len(some[0]) < len(cycles[0]) == -(-len(response) // 10)
@@ -126,14 +128,14 @@ def test_blocks_are_shortened_until_so_many_share_the_response():
 def test_one_block_tells_nothing_of_chance(monkeypatch):
     monkeypatch.setattr("tractexp.inference.model_error.LENGTH", 100.0)
     monkeypatch.setattr("tractexp.inference.model_error.BLOCKS", 1)
-    error = model_error([played(-0.1, -0.1)])
+    error = compute_model_error([played(-0.1, -0.1)])
     assert error.value == pytest.approx(0.1, rel=1e-3)
     assert error.interval == (0.0, np.inf)
 
 
 def test_events_count_by_the_size_of_their_responses():
     one, two = played(-0.1, -0.1), played(-0.3, -0.3, depth=0.2, name="mild")
-    error, alone = model_error([one, two]), model_error([two])
+    error, alone = compute_model_error([one, two]), compute_model_error([two])
     assert alone.value == pytest.approx(0.3, rel=1e-3)
     assert 0.1 < error.value < 0.2
     assert error.interval[0] < error.value < error.interval[1]
@@ -144,9 +146,9 @@ def test_what_is_missing_of_the_record_counts_nowhere_and_what_diverged_counts_w
     P = fit.event.record.P.copy()
     P[300:320] = np.nan
     gaps = replace(fit, event=replace(fit.event, record=replace(fit.event.record, P=P)))
-    assert model_error([gaps]).value == pytest.approx(0.1, rel=1e-3)
+    assert compute_model_error([gaps]).value == pytest.approx(0.1, rel=1e-3)
     assert (
-        model_error([replace(fit, P=np.where(fit.event.record.t > 1, np.nan, fit.P))]).value
+        compute_model_error([replace(fit, P=np.where(fit.event.record.t > 1, np.nan, fit.P))]).value
         == np.inf
     )
 
@@ -155,7 +157,7 @@ def test_the_interval_is_that_of_leaving_out_each_block_in_turn():
     """By hand, over blocks of 0.1 s; Student's t has the freedom of the blocks."""
     fit = played(-0.1, -0.05, noise=0.01, seed=3)
     record, start = fit.event.record, fit.event.start
-    S, noise = (record.P + 1j * record.Q)[start:], noise_variance(fit.event)
+    S, noise = (record.P + 1j * record.Q)[start:], estimate_noise_variance(fit.event)
     left = np.abs((fit.P + 1j * fit.Q)[start:] - S) ** 2 - noise
     response = np.abs(S - S_before(fit)) ** 2 - noise
     block = np.arange(len(S)) // 50
@@ -164,13 +166,13 @@ def test_the_interval_is_that_of_leaving_out_each_block_in_turn():
     reach = stats.t.ppf(0.975, count - 1) * np.sqrt(
         (count - 1) / count * np.sum((squares - whole) ** 2)
     )
-    error = model_error([fit])
+    error = compute_model_error([fit])
     assert error.square == pytest.approx(whole)
     assert error.interval == pytest.approx((np.sqrt(max(whole - reach, 0)), np.sqrt(whole + reach)))
 
 
 def test_an_error_depends_on_no_base_and_comes_back_as_it_was_stored():
-    error, small = (model_error([played(-0.1, -0.1, base=base)]) for base in (1.0, 1e-9))
+    error, small = (compute_model_error([played(-0.1, -0.1, base=base)]) for base in (1.0, 1e-9))
     assert (small.value, small.of_S) == pytest.approx((error.value, error.of_S), rel=1e-6)
     back = ModelError.from_content(error.to_dict())
     assert back.to_dict() == error.to_dict()
@@ -184,11 +186,11 @@ def test_too_few_samples_before_a_dip_show_no_noise():
         replace(event, steady=slice(0, n))
         for n in (4 * WANDERING_COSINES, 4 * WANDERING_COSINES + 1)
     ]
-    assert noise_variance(shorter[0]) == 0.0 < noise_variance(shorter[1])
+    assert estimate_noise_variance(shorter[0]) == 0.0 < estimate_noise_variance(shorter[1])
 
 
 def test_shares_are_told_to_two_digits():
-    assert [in_percent(x) for x in (0.00571, 0.0567, 0.12345, 1.004, 12.3, np.inf)] == [
+    assert [format_percent(x) for x in (0.00571, 0.0567, 0.12345, 1.004, 12.3, np.inf)] == [
         "0.57 %",
         "5.7 %",
         "12 %",
@@ -231,8 +233,8 @@ def test_result_json_and_the_headline_tell_it(fit, tmp_path):
     assert told["held_out"]["value"] == told["events"][1]["value"] == fit.model_error_held_out.value
     low, high = told["interval"]
     assert low <= told["value"] <= high
-    assert f"within {in_percent(told['value'])} of its response" in fit.headline
-    assert f"the held-out dips within {in_percent(told['held_out']['value'])}" in fit.headline
+    assert f"within {format_percent(told['value'])} of its response" in fit.headline
+    assert f"the held-out dips within {format_percent(told['held_out']['value'])}" in fit.headline
     assert ModelError.from_content(told) == fit.model_error
 
 

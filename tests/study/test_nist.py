@@ -1,10 +1,11 @@
 """Least squares and standard errors against certified answers: the 27 nonlinear problems of NIST
 StRD, both starts.
 
-`descend`, `central_differences` and `Information` are what an estimate and its uncertainty are
-computed by; here their rows are the Institute's problems instead of a simulated load. As in an
+`descend`, `compute_central_differences` and `Information` are what an estimate and its uncertainty
+are computed by; here their rows are the Institute's problems instead of a simulated load. As in an
 estimate, a descent is repeated in units of what the last one left, and the box is then drawn about
 its end, as a user does by `model.bounds`.
+
 
 Rows are computed in extended precision, where the machine has it, and rounded. Lanczos1 leaves
 1e-13 of 1: its own rounding in double precision leaves three digits of the residual, so that no
@@ -20,7 +21,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tractexp.inference.differences import central_differences
+from tractexp.inference.differences import compute_central_differences
 from tractexp.inference.information import Information
 from tractexp.inference.least_squares import descend
 from tractexp.parameter import Box
@@ -198,7 +199,9 @@ def standard_errors(problem: Regression, box: Box, values: np.ndarray) -> np.nda
     def rows(unit, lanes):
         return problem.residuals(box.from_unit(unit))
 
-    (residual,), (J,) = central_differences(rows, box.to_unit(values)[None], np.zeros(1, dtype=int))
+    (residual,), (J,) = compute_central_differences(
+        rows, box.to_unit(values)[None], np.zeros(1, dtype=int)
+    )
     deviation = np.sqrt(residual @ residual / (len(residual) - len(values)))
     names = [f"b{k}" for k in range(1, len(values) + 1)]
     return Information.from_jacobian(

@@ -1,5 +1,5 @@
-"""The paper's experiments: numbers by hand (`mean_residual`, `by_depth`), planted verdicts, every
-experiment and part, refusals.
+"""The paper's experiments: numbers by hand (`compute_mean_residual`, `compare_depths`), planted
+verdicts, every experiment and part, refusals.
 """
 
 import json
@@ -15,7 +15,7 @@ from command_line import run_command
 from tractexp.blocks import Report
 from tractexp.blocks.markdown import markdown
 from tractexp.errors import UserError
-from tractexp.identification.generalization import by_depth, mean_residual
+from tractexp.identification.generalization import compare_depths, compute_mean_residual
 from tractexp.studies import searches
 from tractexp.studies.api.paper import PARTS
 from tractexp.studies.paper import (
@@ -237,14 +237,14 @@ def test_mantegnas_steps_have_exponent_three_halves_and_the_printed_ones_two_thi
 
 def test_eq_21_by_hand():
     """|1 - 1.5| = 0.5 and |2 - 1| = 1 have mean 0.75; the gap does not count."""
-    assert mean_residual(np.array([1.0, 2.0, np.nan]), np.array([1.5, 1.0, 3.0])) == pytest.approx(
-        0.75
-    )
+    assert compute_mean_residual(
+        np.array([1.0, 2.0, np.nan]), np.array([1.5, 1.0, 3.0])
+    ) == pytest.approx(0.75)
 
 
 def test_a_milder_dip_is_interpolated_and_a_deeper_one_extrapolated():
     event = lambda depth: SimpleNamespace(depth=depth)  # noqa: E731
-    kinds = by_depth([event(0.3), event(0.5), event(0.65)], [event(0.4), event(0.5)])
+    kinds = compare_depths([event(0.3), event(0.5), event(0.65)], [event(0.4), event(0.5)])
     assert kinds == ["interpolation", "interpolation", "extrapolation"]
 
 

@@ -1,5 +1,5 @@
-"""Plans: what `forecast` says is what the record then gives, deeper tells more, and `best_events`
-are the best.
+"""Plans: what `forecast_intervals` says is what the record then gives, deeper tells more, and
+`choose_best_events` are the best.
 """
 
 import itertools
@@ -21,11 +21,11 @@ from tractexp.errors import UserError
 from tractexp.identification.plan import (
     DipShape,
     add_information,
-    best_events,
-    depth_needed,
-    each,
-    forecast,
-    over_depth,
+    choose_best_events,
+    compute_event_informations,
+    find_depth_needed,
+    forecast_intervals,
+    forecast_over_depth,
 )
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
@@ -53,7 +53,7 @@ def test_the_forecast_is_what_the_record_then_gives(problem):
     shape = replace(
         DipShape.from_event(event), duration=0.2, noise_P=0.004, noise_Q=0.004, memory=0.0
     )
-    planned = forecast(problem, study.TYPICAL, shape)
+    planned = forecast_intervals(problem, study.TYPICAL, shape)
     # The plan's trapezoid has edges of 20 ms, the record's of 30 ms; q_v and C are at other
     # estimates.
     np.testing.assert_allclose(planned.half[[0, 3, 4, 5]], known.half[[0, 3, 4, 5]], rtol=0.25)
@@ -61,7 +61,7 @@ def test_the_forecast_is_what_the_record_then_gives(problem):
 
 def test_deeper_longer_faster_and_quieter_tell_more(problem):
     def half(**changes):
-        return forecast(problem, study.TYPICAL, replace(SHAPE, **changes)).half
+        return forecast_intervals(problem, study.TYPICAL, replace(SHAPE, **changes)).half
 
     assert (half(depth=0.5) < half(depth=0.2)).all()
     assert (half(rate=1000.0) < half(rate=250.0)).all()
@@ -70,15 +70,17 @@ def test_deeper_longer_faster_and_quieter_tell_more(problem):
 
 
 def test_the_depth_needed_gives_just_the_precision_asked_for(problem):
-    needed = depth_needed(over_depth(problem, study.TYPICAL, SHAPE), "H", 0.01)
-    at = forecast(problem, study.TYPICAL, replace(SHAPE, depth=needed.depth))
+    needed = find_depth_needed(forecast_over_depth(problem, study.TYPICAL, SHAPE), "H", 0.01)
+    at = forecast_intervals(problem, study.TYPICAL, replace(SHAPE, depth=needed.depth))
     assert at.relative[study.NAMES.index("M")] == pytest.approx(0.01, rel=0.03)
     assert str(needed) == f"a dip of {100 * needed.depth:.0f} % gives H within 1 %"
 
 
 def test_what_no_dip_can_give_is_said_with_the_best_there_is(problem):
-    forecasts = over_depth(problem, study.TYPICAL, replace(SHAPE, noise_P=0.05, noise_Q=0.05))
-    needed = depth_needed(forecasts, "q_v", 0.01)
+    forecasts = forecast_over_depth(
+        problem, study.TYPICAL, replace(SHAPE, noise_P=0.05, noise_Q=0.05)
+    )
+    needed = find_depth_needed(forecasts, "q_v", 0.01)
     assert needed.depth is None
     assert "no dip of this kind gives q_v within 1 %: the best, of" in str(needed)
 
@@ -88,17 +90,17 @@ def test_the_best_two_events_are_those_of_all_pairs():
     archive = Problem(
         study.model(), [recorded(d, seed=k, name=f"{d:g}") for k, d in enumerate(depths)]
     )
-    chosen = best_events(archive, study.TYPICAL, least=0.0, most=2)
-    informations = each(archive, study.TYPICAL)
+    chosen = choose_best_events(archive, study.TYPICAL, least=0.0, most=2)
+    informations = compute_event_informations(archive, study.TYPICAL)
     pairs = itertools.combinations(range(4), 2)
     J = {pair: add_information([informations[e] for e in pair]).J for pair in pairs}
     volumes = {pair: np.linalg.slogdet(rows.T @ rows)[1] for pair, rows in J.items()}
     assert {c.event for c in chosen} == set(max(volumes, key=volumes.get))
-    assert best_events(archive, study.TYPICAL, least=0.0)[-1].name == "0.1"
-    everything = best_events(archive, study.TYPICAL, least=0.0)
+    assert choose_best_events(archive, study.TYPICAL, least=0.0)[-1].name == "0.1"
+    everything = choose_best_events(archive, study.TYPICAL, least=0.0)
     assert len(everything) == 4
     assert all(a.gain >= b.gain for a, b in itertools.pairwise(everything))
-    stopped = best_events(archive, study.TYPICAL, least=everything[2].gain + 1e-6)
+    stopped = choose_best_events(archive, study.TYPICAL, least=everything[2].gain + 1e-6)
     assert [c.event for c in stopped] == [c.event for c in everything[:2]]
 
 
@@ -243,7 +245,7 @@ def test_a_dip_in_which_the_model_diverges_tells_nothing(problem, monkeypatch):
     """A motor that stalls: sensitivities beyond all numbers overflow nowhere, and add nothing to
     what is known.
     """
-    (known,) = each(problem, study.TYPICAL)
+    (known,) = compute_event_informations(problem, study.TYPICAL)
     computed = Likelihood.jacobian
 
     def diverging(self, unit):
@@ -251,8 +253,8 @@ def test_a_dip_in_which_the_model_diverges_tells_nothing(problem, monkeypatch):
         return rows, replace(J, columns=J.columns * 1e200)
 
     monkeypatch.setattr(Likelihood, "jacobian", diverging)
-    planned = forecast(problem, study.TYPICAL, SHAPE, known)
-    alone = forecast(problem, study.TYPICAL, SHAPE)
+    planned = forecast_intervals(problem, study.TYPICAL, SHAPE, known)
+    alone = forecast_intervals(problem, study.TYPICAL, SHAPE)
     monkeypatch.undo()
     assert planned.half == pytest.approx(
         add_information([known]).standard_errors * planned.half[0] / known.standard_errors[0]
@@ -266,7 +268,7 @@ def test_what_a_model_misses_makes_a_plan_promise_less(problem):
     """
 
     def half(**changes):
-        return forecast(problem, study.TYPICAL, replace(SHAPE, **changes)).half
+        return forecast_intervals(problem, study.TYPICAL, replace(SHAPE, **changes)).half
 
     grown = half(error=0.05) / half()
     assert grown.min() > 1.5

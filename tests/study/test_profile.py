@@ -1,5 +1,5 @@
-"""Likelihood along one parameter, `profiles`: a parabola where theory says so, open sides, better
-optima, and their page.
+"""Likelihood along one parameter, `profile_parameters`: a parabola where theory says so, open
+sides, better optima, and their page.
 """
 
 import re
@@ -11,9 +11,9 @@ import uncertainty as study
 from pages import charts, read, unpacked
 from printed_events import minimum, problem, records
 
-from tractexp.identification.profile import check_by_profiles, profiles
+from tractexp.identification.profile import check_by_profiles, profile_parameters
 from tractexp.identification.profile_lanes import End
-from tractexp.identification.uncertainty import conclude, threshold
+from tractexp.identification.uncertainty import compute_threshold, conclude
 from tractexp.report.profile import meaning, report
 
 
@@ -23,13 +23,13 @@ def quiet():
 
 
 def test_the_threshold_is_chi_squared_of_one_degree():
-    assert threshold() == pytest.approx(1.959963985**2, rel=1e-6)
+    assert compute_threshold() == pytest.approx(1.959963985**2, rel=1e-6)
 
 
 @pytest.fixture(scope="module")
 def along(quiet):
     """The profiles of all parameters."""
-    return profiles(quiet)
+    return profile_parameters(quiet)
 
 
 def test_with_little_noise_a_profile_is_the_parabola_of_the_information_matrix(quiet, along):
@@ -49,7 +49,7 @@ def test_a_point_of_a_profile_is_the_constrained_optimum(quiet):
     """The deviance with M held, by SciPy on the same whitened residuals."""
     from scipy.optimize import least_squares
 
-    found = profiles(quiet, names=["M"])
+    found = profile_parameters(quiet, names=["M"])
     (profile,) = found.profiles
     j, likelihood = quiet.names.index("M"), quiet.likelihood
     held = (profile.values[-1] - quiet.lower[j]) / (quiet.upper[j] - quiet.lower[j])
@@ -68,7 +68,7 @@ def test_a_shallow_dip_leaves_c_open_on_both_sides_of_a_crest_and_the_verdict_sa
     the crest.
     """
     known = study.judged(problem(records((0.15,), 0.01)), study.TYPICAL).uncertainty
-    (of_C,) = profiles(known, names=["C"]).profiles
+    (of_C,) = profile_parameters(known, names=["C"]).profiles
     assert of_C.ends == (End.BOUND, End.BOUND)
     assert of_C.interval == pytest.approx((0.3, 0.99))
     assert of_C.deviance.max() > 10
@@ -103,7 +103,7 @@ def test_an_interval_holds_what_the_records_do_not_rule_out_whatever_its_profile
     truth = likelihood.to_unit(study.TYPICAL)[0]
     ends = np.array([minimum(likelihood, truth, held=[j]) for j in range(len(judged.names))])
     rows = likelihood.rows(ends)
-    close = np.einsum("nr,nr->n", rows, rows) - judged.deviance < threshold()
+    close = np.einsum("nr,nr->n", rows, rows) - judged.deviance < compute_threshold()
     assert close.sum() >= 2
     low, high = judged.intervals.T
     values, slack = likelihood.values(ends[close]), 1e-3 * (high - low)
@@ -114,7 +114,7 @@ def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
     """Started from a point off the optimum, as a search may leave it."""
     off = quiet.unit.copy()
     off[quiet.names.index("M")] += 3 * quiet.half[3] / (quiet.upper[3] - quiet.lower[3])
-    found = profiles(conclude(quiet.likelihood, off))
+    found = profile_parameters(conclude(quiet.likelihood, off))
     assert found.restarts >= 1
     assert "a better optimum turned up along a profile" in found.notes[0]
     np.testing.assert_allclose(found.uncertainty.values, quiet.values, atol=0.1 * quiet.half.min())
@@ -153,7 +153,7 @@ def test_the_page_of_a_model_that_lacks_something_says_what_its_intervals_hold(t
     )
     known = study.judged(problem([spoiled]), study.TYPICAL).uncertainty
     assert not known.exact
-    found = profiles(known, names=["M", "p_v"])
+    found = profile_parameters(known, names=["M", "p_v"])
     told = read(report(found, "an effect is missing").save(tmp_path / "profile.html"))
     assert "An effect is missing." in told.words
     assert "More than noise is left, so these are intervals of least squares" in told.words
@@ -164,7 +164,7 @@ def test_the_page_of_a_model_that_lacks_something_says_what_its_intervals_hold(t
 
 
 def test_the_page_says_where_curvature_misleads(quiet):
-    found = profiles(quiet, names=["M"])
+    found = profile_parameters(quiet, names=["M"])
     (profile,), value, half = found.profiles, quiet.values[3], quiet.half[3]
     bound, points = (End.CLOSED, End.BOUND), (End.POINTS, End.CLOSED)
     for changes, sentence in (

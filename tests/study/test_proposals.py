@@ -13,7 +13,7 @@ from proposed_file import load_proposed_effect
 import tractexp
 from hidden_effects import EFFECTS, Noise
 from tractexp.discrepancy.proposal import generate
-from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.proposal.library import find_term
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")
 
@@ -43,8 +43,8 @@ def among(monkeypatch):
     """Investigates with a library of a few terms."""
 
     def investigate(made, names):
-        few = [term(name) for name in names]
-        monkeypatch.setattr("tractexp.discrepancy.proposal.propose.terms", lambda: few)
+        few = [find_term(name) for name in names]
+        monkeypatch.setattr("tractexp.discrepancy.proposal.propose.list_terms", lambda: few)
         return investigated(made)
 
     return investigate

@@ -16,7 +16,7 @@ from tractexp.discrepancy.window_search import _choose_window
 from tractexp.domain.excitation import phasors
 from tractexp.errors import UserError
 from tractexp.inference.criteria import Criteria
-from tractexp.inference.recorder_window import RecorderWindow, windows_of
+from tractexp.inference.recorder_window import RecorderWindow, list_recorder_windows
 from tractexp.model.drive import Drive
 from tractexp.record.window import average, averaged_power
 
@@ -58,7 +58,7 @@ def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
 
 def test_windows_are_whole_cycles_and_those_of_measurement_units_that_the_sampling_resolves():
     (event,) = events(count=1)
-    windows = windows_of([event])
+    windows = list_recorder_windows([event])
     assert [w.window for w in windows if not w.shape] == pytest.approx(
         [0.02 * k for k in (1, 2, 3, 4, 5, 6)]
     )
@@ -67,7 +67,7 @@ def test_windows_are_whole_cycles_and_those_of_measurement_units_that_the_sampli
     )
     assert "40 ms by the weights of p_class" in next(w for w in windows if w.shape).describe()
     slow = replace(event, record=replace(event.record, t=event.record.t * 10))
-    assert min(w.window for w in windows_of([slow])) >= 2 * slow.record.step
+    assert min(w.window for w in list_recorder_windows([slow])) >= 2 * slow.record.step
 
 
 def test_a_window_that_the_records_say_is_the_only_one_tried():
@@ -76,11 +76,11 @@ def test_a_window_that_the_records_say_is_the_only_one_tried():
         event,
         record=replace(event.record, window=build_chosen("estimator", "p_class").window(50.0)),
     )
-    (window,) = windows_of([said, said])
+    (window,) = list_recorder_windows([said, said])
     assert window.window == pytest.approx(0.04)
     assert "p_class" in window.describe()
     # where they contradict each other it is searched for
-    assert len(windows_of([said, event])) == 8
+    assert len(list_recorder_windows([said, event])) == 8
 
 
 def test_what_a_triangle_did_is_undone():

@@ -1,4 +1,4 @@
-"""What is left is told by its shape, `remainders`: what is planted comes back, and noise is
+"""What is left is told by its shape, `find_remainders`: what is planted comes back, and noise is
 nothing.
 """
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_dips import FAST, events
 
-from tractexp.discrepancy.remainder import MOST_SHAPES, remainders
+from tractexp.discrepancy.remainder import MOST_SHAPES, find_remainders
 from tractexp.noise import Autoregression, Noise
 
 LEVEL = 0.002
@@ -23,7 +23,7 @@ def noise_of(made, seed=0):
 
 
 def found(made, residual, **settings):
-    return remainders(residual, made, Noise.white(LEVEL, LEVEL), **settings)
+    return find_remainders(residual, made, Noise.white(LEVEL, LEVEL), **settings)
 
 
 def after(event, k, shape):

@@ -1,4 +1,4 @@
-"""Rival structures, `with_rivals`: what a stator resistance that is there, or is not, does to the
+"""Rival structures, `add_rivals`: what a stator resistance that is there, or is not, does to the
 parameters of a model without it.
 """
 
@@ -16,8 +16,8 @@ from tractexp.identification.rivals import (
     IDENTIFIED_SHARE,
     RivalStructure,
     _find_moved_parameters,
-    _structures,
-    with_rivals,
+    _list_structures,
+    add_rivals,
 )
 from tractexp.identification.verdict import IDENTIFIED, WEAK
 from tractexp.inference.problem import Problem
@@ -32,7 +32,7 @@ def judged(case):
     and the truth.
     """
     dips = [detect(Record(f"event{k}", **r).check()) for k, r in enumerate(make(case, SEED))]
-    return with_rivals(estimate_without_search(Problem(study.model(), dips)).uncertainty), truth(
+    return add_rivals(estimate_without_search(Problem(study.model(), dips)).uncertainty), truth(
         case, SEED
     )["load"]
 
@@ -73,13 +73,13 @@ def test_a_static_load_that_refuses_an_effect_of_the_model_is_no_rival():
     """A ZIP load has the share of constant power already."""
     motor, static = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
     with_share = compose(motor, static, [get("effect", "polynomial_static_load")()])
-    assert {name for name, _ in _structures(compose(motor, static))} == {
+    assert {name for name, _ in _list_structures(compose(motor, static))} == {
         "second_cage",
         "stator_resistance",
         "stator_transients",
         "zip",
     }
-    assert {name for name, _ in _structures(with_share)} == {
+    assert {name for name, _ in _list_structures(with_share)} == {
         "second_cage",
         "stator_resistance",
         "stator_transients",

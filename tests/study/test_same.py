@@ -1,5 +1,5 @@
-"""Effects that no dip tells apart, `same`, in one class, `compare_predictions`; and those that only
-look alike.
+"""Effects that no dip tells apart, `prove_same`, in one class, `compare_predictions`; and those
+that only look alike.
 """
 
 import numpy as np
@@ -7,8 +7,8 @@ from made_alike import fitted_alike
 
 from tractexp.discrepancy.classes import compare_predictions, describe_classes, group_alike
 from tractexp.discrepancy.evidence import SLIGHT_ERROR
-from tractexp.discrepancy.next_event.choose import next_event
-from tractexp.discrepancy.next_event.same import same
+from tractexp.discrepancy.next_event.choose import find_next_event
+from tractexp.discrepancy.next_event.same import prove_same
 
 
 def test_sets_that_are_one_function_of_the_voltage_are_one_class():
@@ -40,7 +40,7 @@ def test_each_joins_the_first_group_of_which_it_is_parted_from_none():
 def test_an_equation_in_another_parameter_is_proved_to_be_the_same():
     bench, noise, bare, fits = fitted_alike()
     pair = fits["stator_resistance"], fits["leakage_loss"]
-    chosen = next_event(bench, noise, bare, pair, ["copper", "loss"])
+    chosen = find_next_event(bench, noise, bare, pair, ["copper", "loss"])
     ((one, other, proof),) = chosen.same
     assert (one, other) == (0, 1)
     assert proof["off"] < 1e-6
@@ -53,4 +53,4 @@ def test_an_equation_in_another_parameter_is_proved_to_be_the_same():
 
 def test_effects_that_only_look_alike_are_not_called_the_same():
     bench, _, _, fits = fitted_alike()
-    assert same(bench, fits["stator_resistance"], fits["speed_dependent_torque"]) is None
+    assert prove_same(bench, fits["stator_resistance"], fits["speed_dependent_torque"]) is None

@@ -1,5 +1,5 @@
 """The one search loop: clipping, counting, budgets, the best, the history of `write_history`, and
-the polish by `least_squares_from` that it ends with.
+the polish by `descend_least_squares` that it ends with.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from tractexp.extend.search import (
     race,
     search,
 )
-from tractexp.identification.polish import Elite, _Residuals, least_squares_from
+from tractexp.identification.polish import Elite, _Residuals, descend_least_squares
 from tractexp.identification.result import parse_history, write_history
 from tractexp.text import progress
 
@@ -258,7 +258,7 @@ def test_a_difference_that_cannot_be_simulated_is_taken_the_other_way():
 
 def test_a_start_that_cannot_be_simulated_costs_one_simulation():
     evaluate = Direct(lambda x: np.full((len(x), 4), np.nan))
-    least_squares_from(evaluate, Box.unit(2), np.array([0.5, 0.5]), 1.0)
+    descend_least_squares(evaluate, Box.unit(2), np.array([0.5, 0.5]), 1.0)
     assert evaluate.sizes == [1]
 
 
@@ -280,7 +280,7 @@ class TwoValleys(Direct):
 
 
 def test_a_descent_returns_where_it_ended():
-    x, f = least_squares_from(TwoValleys(), Box.unit(1), np.array([0.3]), 1.01)
+    x, f = descend_least_squares(TwoValleys(), Box.unit(1), np.array([0.3]), 1.01)
     assert x[0] == pytest.approx(0.2, abs=1e-6)
     assert f == pytest.approx(1.0, abs=1e-12)
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from made_alike import fitted_alike
 
-from tractexp.discrepancy.next_event.choose import DECIDED, LEAST_CHANCE, EventTrial, _fitted_to
-from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, imagine_dips
+from tractexp.discrepancy.next_event.choose import DECIDED, LEAST_CHANCE, EventTrial, _fit_sides
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, imagine_dips, record_imagined
 from tractexp.discrepancy.next_event.separation import (
     EventView,
     Separation,
     _reduce_blocks,
     linearize_side,
-    seen,
+    view_events,
 )
 from tractexp.record import detect
 
@@ -31,12 +31,12 @@ def test_a_rival_is_linearised_as_its_refit_moves():
         ImaginedDip(0.1, 0.2),
     )
     sides = [linearize_side(bench, noise, fit) for fit in (bare, truth, rival)]
-    views = [seen(bench, noise, side, [event])[0] for side in sides]
+    views = [view_events(bench, noise, side, [event])[0] for side in sides]
     separation = Separation(sides, bench.criteria)
     rows = _reduce_blocks([np.vstack([v.f - views[0].f, v.K]) for v in views])
     linear = separation._deviance(2, (rows[2][0] - rows[1][0])[None], rows[2][1:])
     exact = separation._deviance(1, np.zeros((1, len(rows[1][0]))), rows[1][1:])
-    moved = _fitted_to(bench, noise, sides, sides[1], event)[2]
+    moved = _fit_sides(bench, noise, sides, sides[1], event)[2]
     refitted = moved.deviance - truth.deviance
     assert float(exact[0]) == pytest.approx(truth.deviance, rel=1e-3)
     assert float(linear[0]) - truth.deviance == pytest.approx(refitted, rel=0.15, abs=1.0)
@@ -72,7 +72,7 @@ def test_a_set_is_not_told_from_itself_whatever_the_recorder_did():
     unit[at.parameters(["time_skew", "load_change"])] += 0.1
     sides = [linearize_side(bench, noise, f) for f in (bare, fit, replace(fit, unit=unit))]
     event = ImaginedDip(0.5, 0.4)
-    own, other = (seen(bench, noise, side, [event])[0].f for side in sides[1:])
+    own, other = (view_events(bench, noise, side, [event])[0].f for side in sides[1:])
     assert other == pytest.approx(own, abs=1e-9)
 
 
@@ -94,7 +94,7 @@ def test_what_rivals_miss_is_missed_in_each_of_its_like():
     separation, event = Separation(sides, bench.criteria, 200), ImaginedDip(0.4, 0.2)
 
     def chance(error, times):
-        views = [seen(bench, noise, side, [event], error)[0] for side in sides]
+        views = [view_events(bench, noise, side, [event], error)[0] for side in sides]
         denied = np.stack([separation.find_denied_rivals(views, truth, times) for truth in (1, 2)])
         return EventTrial.from_draws(event, denied, np.zeros((2, 2), bool)).least
 
@@ -117,7 +117,7 @@ def test_dips_switching_phase_jumps_and_rates_are_tried():
 
 def test_the_smallest_switching_is_an_event_that_can_be_read():
     bench = fitted_alike()[0]
-    made = as_recorded(bench, ImaginedDip(0.04, 1.0, switched=True), np.ones((2, 700)))
+    made = record_imagined(bench, ImaginedDip(0.04, 1.0, switched=True), np.ones((2, 700)))
     again = detect(replace(made.record, name="switched").check())
     assert again.depth == pytest.approx(0.04, abs=0.005)
     assert again.duration == pytest.approx(1.0, abs=0.1)

@@ -1,5 +1,5 @@
-"""What a term of the library would gain in one linear step, `screen`, against simulations and a
-refit.
+"""What a term of the library would gain in one linear step, `screen_terms`, against simulations and
+a refit.
 """
 
 import numpy as np
@@ -7,16 +7,21 @@ import pytest
 from made_context import fitted_base
 from made_dips import FAST, events
 
-from tractexp.discrepancy.proposal.bed import (
-    carried_over,
-    context_of_terms,
-    place,
-    sizes_of,
-    with_terms,
+from tractexp.discrepancy.proposal.library import find_term
+from tractexp.discrepancy.proposal.refit import fit_terms
+from tractexp.discrepancy.proposal.screen import (
+    ScreeningFit,
+    compute_library_p,
+    score_terms,
+    screen_terms,
 )
-from tractexp.discrepancy.proposal.library import term
-from tractexp.discrepancy.proposal.refit import term_fits
-from tractexp.discrepancy.proposal.screen import Ground, compute_library_p, scores, screen
+from tractexp.discrepancy.proposal.term_context import (
+    add_terms,
+    build_term_context,
+    carry_over,
+    list_sizes,
+    place,
+)
 
 STEP, RELAY = "timed:power:step:of_return", "answer:static:relay"
 
@@ -31,9 +36,9 @@ def fitted():
 @pytest.fixture(scope="module")
 def ground(fitted):
     """The same beside the library of terms."""
-    terms = context_of_terms(fitted.context)
-    unit = carried_over(terms, fitted.context, fitted.fit.unit)
-    return Ground.from_coordinates(terms, unit, fitted.noise)
+    terms = build_term_context(fitted.context)
+    unit = carry_over(terms, fitted.context, fitted.fit.unit)
+    return ScreeningFit.from_coordinates(terms, unit, fitted.noise)
 
 
 def test_the_base_model_has_the_same_bits_beside_the_library(fitted, ground):
@@ -49,9 +54,9 @@ def test_a_column_is_the_difference_of_two_simulations(ground, name):
     """Central differences of a tenth of the relevant size, against the one-sided ones of the
     screen.
     """
-    chosen, at = term(name), ground.context.coordinates
+    chosen, at = find_term(name), ground.context.coordinates
     setting = chosen.signal.settings[len(chosen.signal.settings) // 2]
-    (size, _), zeros = sizes_of(chosen)[0], [0.0] * (len(sizes_of(chosen)) - 1)
+    (size, _), zeros = list_sizes(chosen)[0], [0.0] * (len(list_sizes(chosen)) - 1)
     up, down, small = (
         place(at, ground.unit, chosen, setting, [k * size.relevant, *zeros])
         for k in (0.1, -0.1, 0.02)
@@ -64,8 +69,10 @@ def test_a_column_is_the_difference_of_two_simulations(ground, name):
 
 
 def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small(ground):
-    made = term_fits(ground, screen(ground, [term(STEP)]), [])
-    (found,) = scores(ground, [(term(STEP), {"instant": made.values(made.fits[0])["instant"]})])
+    made = fit_terms(ground, screen_terms(ground, [find_term(STEP)]), [])
+    (found,) = score_terms(
+        ground, [(find_term(STEP), {"instant": made.values(made.fits[0])["instant"]})]
+    )
     lowered = made.bare.deviance - made.fits[0].deviance
     assert lowered > 20
     assert found.drop == pytest.approx(lowered, rel=0.1)
@@ -73,9 +80,9 @@ def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small(ground):
 
 def test_noise_gives_the_best_of_many_tries_as_much_as_often_as_is_told():
     rng = np.random.default_rng(4)
-    for name, sizes in (("timed:power_P:step:of_dip", 1), (STEP, len(sizes_of(term(STEP))))):
+    for name, sizes in (("timed:power_P:step:of_dip", 1), (STEP, len(list_sizes(find_term(STEP))))):
         best = rng.chisquare(sizes, (4000, 200)).max(axis=1)
-        p = np.array([compute_library_p(term(name), drop, 200) for drop in best])
+        p = np.array([compute_library_p(find_term(name), drop, 200) for drop in best])
         assert 0.04 < np.mean(p < 0.05) < 0.06
 
 
@@ -83,7 +90,7 @@ def test_noise_gives_the_best_of_many_tries_as_much_as_often_as_is_told():
     ("clock", "begins"), [("of_record", 0.0), ("of_dip", "start"), ("of_return", "end")]
 )
 def test_a_clock_counts_from_where_it_says(ground, clock, begins):
-    chosen = term(f"timed:power_P:step:{clock}")
+    chosen = find_term(f"timed:power_P:step:{clock}")
     point = place(ground.context.coordinates, ground.unit, chosen, {"instant": 0.1}, [1.0])
     added = ground.context.residuals(point[None], (chosen.signal.kind,))[0, 0] - ground.raw[0]
     for e, event in enumerate(ground.context.events):
@@ -101,7 +108,7 @@ def test_a_clock_counts_from_where_it_says(ground, clock, begins):
 
 
 def test_terms_become_candidates_with_their_own_parameters_only(ground):
-    beside = with_terms(ground.context, [term(RELAY), term(RELAY)])
+    beside = add_terms(ground.context, [find_term(RELAY), find_term(RELAY)])
     own = [beside.coordinates.names[k] for k in beside.coordinates.parameters([RELAY])]
     assert own == [
         "answer_static_size",

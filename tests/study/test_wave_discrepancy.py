@@ -14,10 +14,10 @@ import pytest
 from wave_records import case, events
 
 import tractexp
-from tractexp.discrepancy.next_event.choose import next_event
-from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.next_event.choose import find_next_event
+from tractexp.discrepancy.proposal.library import find_term
 from tractexp.discrepancy.proposal.propose import propose
-from tractexp.discrepancy.remainder import remainders
+from tractexp.discrepancy.remainder import find_remainders
 from tractexp.errors import UserError
 from tractexp.model.model import compose
 from tractexp.report import overlay
@@ -123,7 +123,7 @@ def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_
         planted.steps,
         ("torque:slip", "motor:slip", "power:washout"),
     )
-    among = [term(f"answer:{name}") for name in few]
+    among = [find_term(f"answer:{name}") for name in few]
     proposed = propose(
         steps.base,
         steps.first,
@@ -159,7 +159,7 @@ def test_an_event_that_would_decide_is_found_in_waveforms(planted):
     steps = planted.steps
     bench, noise, kept = steps.context, steps.evidence.noise, steps.evidence.rows[0].fit
     other = next(row.fit for row in steps.evidence.rows if row.fit.names != kept.names)
-    chosen = next_event(bench, noise, steps.bare, [kept, other], ["a", "b"])
+    chosen = find_next_event(bench, noise, steps.bare, [kept, other], ["a", "b"])
     assert 0.04 <= chosen.best.event.duration <= 0.32
     assert {np.sign(t.event.jump) for t in chosen.tried} == {-1.0, 0.0, 1.0}
     assert {t.event.unbalance for t in chosen.tried} == {0.0, 0.5}
@@ -182,7 +182,7 @@ def test_what_is_left_of_a_current_is_told_by_its_shape(silent):
         * silent.steps.context.valid
     )
     residual[1] += ring
-    told = remainders(residual, [event], noise)[0]
+    told = find_remainders(residual, [event], noise)[0]
     assert (told.channel, told.kind) == ("current beta", "ringing")
     assert told.frequency == pytest.approx(180, abs=3)
     assert told.size == pytest.approx(0.1, rel=0.2)

@@ -1,5 +1,5 @@
-"""A run in waveforms from a shipped record to its page, and what `forecast` and `advise` make of
-what it finds.
+"""A run in waveforms from a shipped record to its page, and what `forecast_intervals` and `advise`
+make of what it finds.
 """
 
 import base64
@@ -17,8 +17,8 @@ from tractexp.domain import WAVES, domain_of
 from tractexp.domain.playback import measure_as_phasors, measure_unsteadiness
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Grade
-from tractexp.identification.advice import advise, better_domain
-from tractexp.identification.plan import DipShape, forecast
+from tractexp.identification.advice import advise, advise_domain
+from tractexp.identification.plan import DipShape, forecast_intervals
 from tractexp.inference.problem import Problem
 from tractexp.record import convert_to_waves
 from tractexp.report.waves import Drawn, spectra, wave_chart
@@ -199,7 +199,7 @@ def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase
     shape = replace(shape, depth=0.2, duration=0.1, jump=0.0, noise_P=0.005, noise_Q=0.005)
     shape.check()
     plain, deeper, jumping = (
-        forecast(problem, values, s)
+        forecast_intervals(problem, values, s)
         for s in (shape, replace(shape, depth=0.5), replace(shape, jump=40.0))
     )
     assert (deeper.half < plain.half).all()
@@ -243,7 +243,9 @@ def test_an_unbalanced_dip_tells_more_of_the_locked_rotor(fit):
         noise_P=0.005,
         noise_Q=0.005,
     )
-    plain, unbalanced = (forecast(problem, values, replace(shape, unbalance=u)) for u in (0.0, 1.0))
+    plain, unbalanced = (
+        forecast_intervals(problem, values, replace(shape, unbalance=u)) for u in (0.0, 1.0)
+    )
     X_prime = plain.names.index("X_prime")
     assert unbalanced.half[X_prime] < 0.8 * plain.half[X_prime]
 
@@ -294,7 +296,7 @@ def test_what_was_found_in_waveforms_is_exported_for_phasors(fit, format):
 def test_a_short_or_unbalanced_dip_with_samples_is_better_fitted_in_waveforms(dip):
     def said(event, domain="phasors"):
         model = tractexp.compose(domain=domain).model
-        return better_domain(Problem(model, [event]))
+        return advise_domain(Problem(model, [event]))
 
     assert said(dip) == []  # 340 ms, balanced
     short = replace(dip, end=dip.start + round(0.06 * dip.rate))

@@ -1,8 +1,8 @@
-"""Differences in place of derivatives, `central_differences`."""
+"""Differences in place of derivatives, `compute_central_differences`."""
 
 import numpy as np
 
-from tractexp.inference.differences import central_differences
+from tractexp.inference.differences import compute_central_differences
 
 
 def test_a_difference_is_one_sided_where_the_other_side_is_lost():
@@ -17,6 +17,6 @@ def test_a_difference_is_one_sided_where_the_other_side_is_lost():
         return made
 
     at = np.array([0.3, 0.5, 0.5, 1.0])
-    found, J = central_differences(rows, at[None], np.zeros(1, dtype=int))
+    found, J = compute_central_differences(rows, at[None], np.zeros(1, dtype=int))
     np.testing.assert_allclose(found[0], A @ at)
     np.testing.assert_allclose(J[0].T, A, rtol=1e-6, atol=1e-9)

@@ -8,9 +8,9 @@ from tractexp.identification import advice
 def test_where_every_depth_would_do_any_dip_is_advised(monkeypatch):
     """Some of them are named by their depths."""
     known = SimpleNamespace(names=("M",), lower=[0.0], upper=[1.0], values=[0.5])
-    monkeypatch.setattr(advice, "_goal", lambda *_: (0.1, []))
+    monkeypatch.setattr(advice, "_find_goal", lambda *_: (0.1, []))
     told = [
-        advice._further(
+        advice._describe_depths(
             known,
             0,
             [SimpleNamespace(half=[h], shape=SimpleNamespace(depth=d)) for h, d in plan],

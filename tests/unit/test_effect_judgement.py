@@ -1,5 +1,5 @@
-"""What the data say of each effect, `judgements`, and of one outside the model, `assessment`: a
-score in, a word out.
+"""What the data say of each effect, `judge_effects`, and of one outside the model, `assess_effect`:
+a score in, a word out.
 """
 
 from types import SimpleNamespace
@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from tractexp.configuration.plugin import get
-from tractexp.discrepancy.judgement import assessment, judgements
-from tractexp.inference.catalogue import candidate
+from tractexp.discrepancy.judgement import assess_effect, judge_effects
+from tractexp.inference.catalogue import build_candidate
 from tractexp.inference.score_test import Score
 
 LEAST = 0.01  # pu, the smallest relevant stator resistance
@@ -18,7 +18,7 @@ CRITICAL = 0.05
 def judge(size=0.0, deviation=0.001, p=0.5):
     """The word on a stator resistance of one linear step's size and deviation."""
     score = Score("stator_resistance", 0.0, p, {"R_s": size}, {"R_s": deviation}, {})
-    return assessment(candidate(get("effect", "stator_resistance")()), score, CRITICAL)[0]
+    return assess_effect(build_candidate(get("effect", "stator_resistance")()), score, CRITICAL)[0]
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_an_effect_is_testable_that_would_be_seen_with_four_chances_in_five(powe
 def test_every_effect_has_a_status_and_the_reason():
     names = ("stator_resistance", "second_cage", "time_skew", "load_change")
     score = Score("stator_resistance", 0.0, 0.5, {"R_s": 0.0}, {"R_s": 0.001}, {})
-    effects = {name: candidate(get("effect", name)()) for name in names}
+    effects = {name: build_candidate(get("effect", name)()) for name in names}
     findings = SimpleNamespace(
         context=SimpleNamespace(criteria=SimpleNamespace(naming_false_alarms=0.02)),
         first=SimpleNamespace(chance=SimpleNamespace(critical_p=lambda p: p)),
@@ -56,7 +56,7 @@ def test_every_effect_has_a_status_and_the_reason():
         ),
         names=("second_cage",),
     )
-    told = {one.name: (one.status, one.why) for one in judgements(findings)}
+    told = {one.name: (one.status, one.why) for one in judge_effects(findings)}
     assert told.pop("stator_resistance") == (
         "ruled out",
         "beside second_cage and time_skew, R_s is within 0.0016 pu of 0",

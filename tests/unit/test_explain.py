@@ -11,11 +11,11 @@ from made_sets import beside_base, off, row, table
 
 from tractexp.discrepancy.evidence import Verdict
 from tractexp.discrepancy.explain import explain, explain_rest
-from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.proposal.library import find_term
 from tractexp.inference.criteria import Criteria
 
 TERM = "answer:torque:slip"
-WORDS = f"the best term of the library ({term(TERM).words})"
+WORDS = f"the best term of the library ({find_term(TERM).words})"
 
 
 def sentence_on(evidence, word="unexplained", *kept):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tractexp.configuration.plugin import get
-from tractexp.inference.catalogue import candidate
+from tractexp.inference.catalogue import build_candidate
 from tractexp.inference.context import FAULT_PRIOR
 from tractexp.inference.free_set import FreeSet
 from tractexp.parameter import Box
@@ -12,7 +12,7 @@ from tractexp.parameter import Box
 
 def deviation_of_skew(prior):
     """How far clocks are believed to be off [s]."""
-    skew = candidate(get("effect", "time_skew")())
+    skew = build_candidate(get("effect", "time_skew")())
     known = {
         "of_measurement": ("time_skew",),
         "members": (),

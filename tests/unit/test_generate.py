@@ -39,10 +39,10 @@ def test_every_balance_and_signal_makes_a_plugin_that_the_model_takes(
     values = {s.name: 0.1 for s in chosen.balance.sizes}
     values |= {s.name: s.grid[0] for s in chosen.signal.shapes}
     path = tmp_path / "proposed_effect.py"
-    path.write_text(generate.source(chosen, values, "event1"), encoding="utf-8")
+    path.write_text(generate.write_source(chosen, values, "event1"), encoding="utf-8")
     effect = load_proposed_effect(path, monkeypatch).ProposedEffect()
     assert tractexp.compose().model.acceptance(effect).refusal is None
-    assert [p.name for p in effect.parameters] == list(generate.parameters_of(chosen))
+    assert [p.name for p in effect.parameters] == list(generate.list_term_parameters(chosen))
 
 
 def test_a_name_of_a_record_is_text_in_the_plugin_that_is_to_be_installed(tmp_path, monkeypatch):
@@ -53,7 +53,7 @@ def test_a_name_of_a_record_is_text_in_the_plugin_that_is_to_be_installed(tmp_pa
     monkeypatch.chdir(tmp_path)
     for k, name in enumerate(NASTY):
         path = tmp_path / f"{k}.py"
-        path.write_text(generate.source(chosen, values, name), encoding="utf-8")
+        path.write_text(generate.write_source(chosen, values, name), encoding="utf-8")
         name = name.encode(errors="backslashreplace").decode()
         assert (
             f"workflow from {name}; no textbook"

@@ -1,5 +1,6 @@
-"""The arithmetic that identifications and investigations share: intervals (`interval_factor`),
-errors of what is free (`free_standard_errors`), goodness of fit (`compare_with_draws`).
+"""The arithmetic that identifications and investigations share: intervals
+(`compute_interval_factor`), errors of what is free (`compute_free_standard_errors`), goodness of
+fit (`compare_with_draws`).
 """
 
 import numpy as np
@@ -7,17 +8,19 @@ import pytest
 
 from tractexp.inference.free_set import join_boxes
 from tractexp.inference.goodness_of_fit import GoodnessOfFit, Scale, compare_with_draws
-from tractexp.inference.information import free_standard_errors
-from tractexp.inference.interval import ParameterEstimate, interval_factor
+from tractexp.inference.information import compute_free_standard_errors
+from tractexp.inference.interval import ParameterEstimate, compute_interval_factor
 from tractexp.parameter import Box, Parameter
 
 SHARE = Parameter(0.5, (0.0, 1.0), "1", "a share", "made up", name="share")
 
 
 def test_an_error_that_is_known_has_the_normal_interval_and_one_of_few_blocks_a_wider_one():
-    assert interval_factor() == pytest.approx(1.959964, abs=1e-6)
-    assert interval_factor(9) == pytest.approx(2.262157, abs=1e-6)
-    assert interval_factor(0) == interval_factor(1)  # one block tells no more than two do
+    assert compute_interval_factor() == pytest.approx(1.959964, abs=1e-6)
+    assert compute_interval_factor(9) == pytest.approx(2.262157, abs=1e-6)
+    assert compute_interval_factor(0) == compute_interval_factor(
+        1
+    )  # one block tells no more than two do
 
 
 def test_an_interval_is_cut_at_the_bounds_and_is_none_without_an_error():
@@ -29,11 +32,11 @@ def test_an_interval_is_cut_at_the_bounds_and_is_none_without_an_error():
 def test_a_standard_error_is_that_of_the_inverse_and_of_a_coordinate_changing_nothing_infinite():
     root = np.array([[2.0, 1.0, 0.0], [0.0, 4.0, 0.0]])
     known = np.sqrt(np.diag(np.linalg.inv(root[:, :2].T @ root[:, :2])))
-    assert free_standard_errors(root) == pytest.approx([*known, np.inf])
+    assert compute_free_standard_errors(root) == pytest.approx([*known, np.inf])
 
 
 def test_two_coordinates_that_do_the_same_are_not_known_alone():
-    assert np.isinf(free_standard_errors(np.array([[1.0, 1.0], [2.0, 2.0]]))).all()
+    assert np.isinf(compute_free_standard_errors(np.array([[1.0, 1.0], [2.0, 2.0]]))).all()
 
 
 def test_a_fit_is_as_good_as_its_most_significant_test_corrected_for_their_number():

@@ -1,15 +1,15 @@
-"""The library of terms, `terms`, and the effect that holds all of a kind, `Library`."""
+"""The library of terms, `list_terms`, and the effect that holds all of a kind, `Library`."""
 
 from tractexp.configuration.plugin import get
 from tractexp.discrepancy.proposal.effect import Library
-from tractexp.discrepancy.proposal.library import ANSWER, pick_of, terms
+from tractexp.discrepancy.proposal.library import ANSWER, list_terms, pick_of
 from tractexp.model.model import compose
 
 
 def test_the_library_has_a_name_for_each_term():
-    names = [t.name for t in terms()]
+    names = [t.name for t in list_terms()]
     assert len(set(names)) == len(names) > 200
-    assert sum(len(t.signal.settings) for t in terms()) > 5000
+    assert sum(len(t.signal.settings) for t in list_terms()) > 5000
 
 
 def test_the_library_adds_each_signal_that_is_picked():

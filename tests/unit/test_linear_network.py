@@ -1,5 +1,5 @@
-"""The best linear network of few poles, `black_boxes`: planted networks come back, and what is no
-network is a sentence.
+"""The best linear network of few poles, `fit_black_boxes`: planted networks come back, and what is
+no network is a sentence.
 """
 
 from dataclasses import replace
@@ -11,8 +11,8 @@ from scipy import signal
 from tractexp.domain import PHASORS, WAVES
 from tractexp.domain.port import Port
 from tractexp.errors import UserError
-from tractexp.identification.linear_network import CRITERION, black_boxes, choose_network
-from tractexp.identification.projection import Projection, basis, compute_pole_response
+from tractexp.identification.linear_network import CRITERION, choose_network, fit_black_boxes
+from tractexp.identification.projection import Projection, compute_pole_response, compute_port_basis
 from tractexp.record import Record, detect
 from tractexp.record.synthetic import synthetic_event
 
@@ -25,7 +25,7 @@ P0, Q0 = 0.9, 0.3
 
 def choose(domain, event):
     """The network of an event, of as many poles as it asks for."""
-    return choose_network(black_boxes(domain, [event]), [event])
+    return choose_network(fit_black_boxes(domain, [event]), [event])
 
 
 def voltage(start=640, samples=1600, depth=0.3, negative=0.1, duration=0.06):
@@ -92,7 +92,7 @@ def test_a_pole_responds_as_scipy_simulates_it(pole):
 
 def test_a_planted_network_comes_back_from_waves():
     v = voltage()
-    boxes = black_boxes(WAVES, [in_waves(v, planted(v, POLES, SHARES))], most=2)
+    boxes = fit_black_boxes(WAVES, [in_waves(v, planted(v, POLES, SHARES))], most=2)
     np.testing.assert_allclose(poles_of(boxes[2]), POLES, rtol=1e-6)
     np.testing.assert_allclose(
         sorted(boxes[2].networks[0].coefficients, key=abs), [C, *SHARES[::-1]], rtol=1e-5
@@ -103,7 +103,7 @@ def test_what_noise_leaves_of_the_poles_is_what_their_covariance_says():
     """Four standard errors of the nonlinear least squares, by differences of the definition."""
     v, size = voltage(), 0.002
     i = planted(v, POLES, SHARES)
-    boxes = black_boxes(WAVES, [in_waves(v, i + noise(len(v), size))], most=2)
+    boxes = fit_black_boxes(WAVES, [in_waves(v, i + noise(len(v), size))], most=2)
 
     def drawn(x):
         p, g = x[:2] + 1j * x[2:4], x[4:6] + 1j * x[6:8]
@@ -124,7 +124,7 @@ def test_planted_poles_come_back_from_p_and_q():
     u, p, g = power_dip(), -12 + 2j * np.pi * 3, 0.4 - 0.8j
     x = compute_pole_response(u + 0j, p, 0.005)
     P, Q = 2 * (g * x).real + 1.5 * u, 2 * ((0.3 + 0.6j) * x).real + 2.2 * u
-    boxes = black_boxes(PHASORS, [in_phasors(u, P + 1j * Q)], most=2)
+    boxes = fit_black_boxes(PHASORS, [in_phasors(u, P + 1j * Q)], most=2)
     for pole in boxes[2].poles:
         assert pole["decay"] == pytest.approx(12, rel=1e-3)
         assert pole["frequency"] == pytest.approx(3, rel=1e-3)
@@ -133,16 +133,18 @@ def test_planted_poles_come_back_from_p_and_q():
 def test_events_are_fitted_together():
     one, other = voltage(), voltage(depth=0.5, negative=0.0, duration=0.1)
     events = [in_waves(v, planted(v, POLES, SHARES)) for v in (one, other)]
-    np.testing.assert_allclose(poles_of(black_boxes(WAVES, events, most=2)[2]), POLES, rtol=1e-6)
+    np.testing.assert_allclose(
+        poles_of(fit_black_boxes(WAVES, events, most=2)[2]), POLES, rtol=1e-6
+    )
 
 
 def test_without_poles_it_is_an_admittance_and_a_capacitance():
     v = voltage()
-    (box,) = black_boxes(WAVES, [in_waves(v, planted(v, (), ()))], most=0)
+    (box,) = fit_black_boxes(WAVES, [in_waves(v, planted(v, (), ()))], most=0)
     assert box.poles == []
     np.testing.assert_allclose(box.networks[0].coefficients, [C], rtol=1e-9)
     u = power_dip()
-    (box,) = black_boxes(PHASORS, [in_phasors(u, (1.4 + 3.0j) * u)], most=0)
+    (box,) = fit_black_boxes(PHASORS, [in_phasors(u, (1.4 + 3.0j) * u)], most=0)
     np.testing.assert_allclose(box.networks[0].coefficients, [0.0, 1.4 - 3.0j], atol=1e-9)
 
 
@@ -161,7 +163,7 @@ def test_as_many_poles_are_chosen_as_were_planted():
 def test_more_poles_leave_less_of_what_was_fitted():
     v = voltage()
     event = in_waves(v, planted(v, POLES, SHARES) * (1 + 0.1 * np.abs(v)) + noise(len(v), 0.003))
-    left = [box.networks[0].squares(WAVES.ports(event)) for box in black_boxes(WAVES, [event])]
+    left = [box.networks[0].squares(WAVES.ports(event)) for box in fit_black_boxes(WAVES, [event])]
     assert left == sorted(left, reverse=True)
 
 
@@ -169,7 +171,7 @@ def test_every_pole_dies_out_within_the_record_whatever_the_current():
     """Currents that no network draws: noise, and one that grows."""
     v, t = voltage(), np.arange(1600) / RATE
     for i in (noise(1600, 1.0), np.exp(8 * t) + 0j, np.exp(2j * np.pi * 600 * t)):
-        for box in black_boxes(WAVES, [in_waves(v, i)]):
+        for box in fit_black_boxes(WAVES, [in_waves(v, i)]):
             decays = [p["decay"] for p in box.poles]
             assert all(1 / 0.31 < decay <= RATE / 2 + 1e-6 for decay in decays)
 
@@ -180,7 +182,7 @@ def test_the_time_of_the_dip_does_not_matter():
     early = in_waves(v, planted(v, POLES, SHARES))
     late_v = np.concatenate([np.ones(320), v])
     late = in_waves(late_v, planted(late_v, POLES, SHARES), start=960)
-    one, other = (black_boxes(WAVES, [event], most=2)[2] for event in (early, late))
+    one, other = (fit_black_boxes(WAVES, [event], most=2)[2] for event in (early, late))
     np.testing.assert_allclose(poles_of(one), poles_of(other), rtol=1e-6)
 
 
@@ -201,7 +203,7 @@ def test_a_single_phase_has_a_network_of_its_own():
     i[:before] = np.nan
     currents = np.stack([i, np.full(n, np.nan), np.full(n, np.nan)])
     event = replace(made, phases=1, currents=currents, lead=before, steady=slice(before, start))
-    box = black_boxes(WAVES, [event], most=1)[1]
+    box = fit_black_boxes(WAVES, [event], most=1)[1]
     (pole,) = box.poles
     assert pole["decay"] == pytest.approx(30, rel=0.01)
     assert abs(pole["frequency"]) < 0.1
@@ -214,7 +216,7 @@ def test_what_is_periodic_before_the_dip_goes_on():
     v, t = voltage(), np.arange(1600) / RATE
     own = 0.05 * np.exp(-4j * np.pi * F0 * t) + 0.03 * np.exp(2j * np.pi * 6 * F0 * t)
     driven = 0.02 * np.exp(-2j * np.pi * 6 * F0 * t)
-    boxes = black_boxes(
+    boxes = fit_black_boxes(
         WAVES, [event := in_waves(v + driven, planted(v, POLES, SHARES) + own)], most=2
     )
     np.testing.assert_allclose(poles_of(boxes[2]), POLES, rtol=1e-6)
@@ -229,7 +231,7 @@ def test_the_zero_sequence_has_a_path_of_resistance_and_inductance():
     i_zero = 500 * compute_pole_response(zero + 0j, -25.0, 1 / RATE).real
     event = in_waves(v, planted(v, POLES, SHARES))
     event = replace(event, v_zero=zero, currents=np.stack([*event.currents[:2], i_zero]))
-    path = black_boxes(WAVES, [event], most=0)[0].networks[1]
+    path = fit_black_boxes(WAVES, [event], most=0)[0].networks[1]
     np.testing.assert_allclose(path.poles, [-25.0], rtol=1e-5)
     np.testing.assert_allclose(path.coefficients, [500.0], rtol=1e-5)
 
@@ -248,13 +250,13 @@ def test_gaps_are_no_samples():
     u = power_dip()
     event = in_phasors(u, (1.4 + 3.0j) * u)
     gap = replace(event.record, P=np.where(np.arange(500) % 7 == 3, np.nan, event.record.P))
-    (box,) = black_boxes(PHASORS, [replace(event, record=gap)], most=0)
+    (box,) = fit_black_boxes(PHASORS, [replace(event, record=gap)], most=0)
     np.testing.assert_allclose(box.networks[0].coefficients, [0.0, 1.4 - 3.0j], atol=1e-9)
 
 
 def test_a_short_record_has_fewer_poles_or_is_refused():
     u = power_dip(samples=118, duration=0.05)
-    assert len(black_boxes(PHASORS, [in_phasors(u, 2 * u + 0j)])) == 1
+    assert len(fit_black_boxes(PHASORS, [in_phasors(u, 2 * u + 0j)])) == 1
     event = in_phasors(power_dip(), power_dip() + 0j)
     few = replace(event, start=event.record.samples - 6)
     with pytest.raises(
@@ -275,9 +277,9 @@ def test_a_constant_voltage_tells_nothing():
 def test_the_basis_of_a_port_is_as_wide_as_what_is_unknown():
     u = voltage() - 1
     port = Port(u, u, 1 / RATE, 640, None)
-    assert basis(port, POLES).shape == (1600, 4)
-    assert basis(replace(port, steady=1.0), POLES).shape == (1600, 3)
-    assert basis(replace(port, series=True), POLES[:0]).shape == (1600, 0)
+    assert compute_port_basis(port, POLES).shape == (1600, 4)
+    assert compute_port_basis(replace(port, steady=1.0), POLES).shape == (1600, 3)
+    assert compute_port_basis(replace(port, series=True), POLES[:0]).shape == (1600, 0)
 
 
 def test_the_networks_of_records_are_fitted_once_and_the_same_for_the_next_model(
@@ -286,11 +288,11 @@ def test_the_networks_of_records_are_fitted_once_and_the_same_for_the_next_model
     monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path))
     v = voltage()
     train = in_waves(v, planted(v, POLES, SHARES))
-    first = black_boxes(WAVES, [train], most=2)
+    first = fit_black_boxes(WAVES, [train], most=2)
     monkeypatch.setattr(Projection, "optimum", None)  # is not called again
-    for one, again in zip(first, black_boxes(WAVES, [train], most=2), strict=True):
+    for one, again in zip(first, fit_black_boxes(WAVES, [train], most=2), strict=True):
         np.testing.assert_array_equal(again.networks[0].poles, one.networks[0].poles)
         np.testing.assert_array_equal(again.networks[0].coefficients, one.networks[0].coefficients)
     other = in_waves(v, planted(v, POLES, 1.01 * SHARES))
     with pytest.raises(TypeError):
-        black_boxes(WAVES, [other], most=2)
+        fit_black_boxes(WAVES, [other], most=2)

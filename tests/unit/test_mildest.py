@@ -1,9 +1,9 @@
-"""The dip that is recommended, `mildest` of those that decide."""
+"""The dip that is recommended, `pick_mildest` of those that decide."""
 
 import numpy as np
 import pytest
 
-from tractexp.discrepancy.next_event.choose import DECIDED, EventTrial, mildest
+from tractexp.discrepancy.next_event.choose import DECIDED, EventTrial, pick_mildest
 from tractexp.discrepancy.next_event.imagined import ImaginedDip
 
 
@@ -15,4 +15,4 @@ def test_the_mildest_dip_is_recommended_that_decides_with_nineteen_chances_in_tw
         EventTrial(ImaginedDip(deep, 0.1), np.array([p]), np.ones((1, 1)))
         for deep, p in ((0.2, of_mild), (0.6, 0.99))
     ]
-    assert mildest(tried, DECIDED).event.depth == depth
+    assert pick_mildest(tried, DECIDED).event.depth == depth

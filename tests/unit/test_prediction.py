@@ -47,7 +47,9 @@ def test_a_second_is_sought_beside_the_best_law_of_each_of_the_two_best_families
 
 
 def pairs_sought(monkeypatch, ground, known, ranked):
-    monkeypatch.setattr(prediction, "starts", lambda steps, refits, pair: [(pair, np.zeros(1))])
+    monkeypatch.setattr(
+        prediction, "list_starts", lambda steps, refits, pair: [(pair, np.zeros(1))]
+    )
     monkeypatch.setattr(prediction, "refit_sets", lambda context, noise, begin: begin)
     refits = {names: fit(*names) for names in known}
     return [names for names, _ in prediction.search_best_pairs(ground, refits, ranked)]

@@ -8,7 +8,13 @@ import numpy as np
 
 from tractexp.identification.profile import revise_verdict
 from tractexp.identification.profile_lanes import End, LikelihoodProfile, find_outermost
-from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict, brief
+from tractexp.identification.verdict import (
+    IDENTIFIED,
+    UNIDENTIFIED,
+    WEAK,
+    ParameterVerdict,
+    shorten_verdict,
+)
 
 
 def closed_profile(values, interval):
@@ -39,8 +45,8 @@ def test_a_verdict_repeats_no_interval():
     profile = closed_profile([0.3, 0.5, 0.9], (0.31, 0.88))
     verdict = str(revise_verdict(by_curvature, profile, 0.0, 1.0))
     assert verdict == "weakly identified: trades against T_m (correlation 0.98)"
-    assert brief(verdict) == "weakly identified"
-    assert brief("identified") == "identified"
+    assert shorten_verdict(verdict) == "weakly identified"
+    assert shorten_verdict("identified") == "identified"
 
 
 def test_places_that_fit_are_looked_for_beside_an_interval_without_ends():

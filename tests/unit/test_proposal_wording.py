@@ -1,14 +1,14 @@
-"""What became of the search for a term in sentences, `proposed_in_words`."""
+"""What became of the search for a term in sentences, `describe_proposal`."""
 
 from types import SimpleNamespace
 
 from tractexp.discrepancy.proposal.propose import propose
-from tractexp.discrepancy.proposal.wording import proposed_in_words
+from tractexp.discrepancy.proposal.wording import describe_proposal
 
 
 def test_where_no_term_was_asked_for_nothing_is_said():
-    assert proposed_in_words(None, None) == []
-    assert proposed_in_words(None, "why not") == ["no term is proposed: why not"]
+    assert describe_proposal(None, None) == []
+    assert describe_proposal(None, "why not") == ["no term is proposed: why not"]
 
 
 def test_what_a_proposal_ties_with_and_looks_like_is_said():
@@ -18,10 +18,10 @@ def test_what_a_proposal_ties_with_and_looks_like_is_said():
         "parameters": {"k": {"value": 0.2, "standard_error": 0.01}},
     }
     told = {"terms": [term], "explained": {"train": 0.9, "validate": 0.8}, "ties": [], "alike": {}}
-    alone = proposed_in_words(told, None)
+    alone = describe_proposal(told, None)
     assert alone[0].startswith("proposed: a step of P, which explains 90% of")
     assert alone[1:] == ["it is not a function of the voltage: something happened by itself"]
-    further = proposed_in_words(
+    further = describe_proposal(
         {**told, "ties": [{"words": "a ramp of P"}], "alike": {"undervoltage_trip": 0.93}}, None
     )
     assert further[2:] == [

@@ -1,11 +1,11 @@
-"""What to do next, `recommendation`, by a verdict, a grade and rows of few numbers."""
+"""What to do next, `recommend_next`, by a verdict, a grade and rows of few numbers."""
 
 from types import SimpleNamespace
 
 import pytest
 from made_sets import DENIED, MILD, beside_base, off, row, table
 
-from tractexp.discrepancy.recommend import recommend_confirmation, recommendation
+from tractexp.discrepancy.recommend import recommend_confirmation, recommend_next
 from tractexp.identification.adequacy import Grade
 from tractexp.inference.criteria import Criteria
 
@@ -51,7 +51,7 @@ def test_what_to_do_where_nothing_explains_follows_from_the_held_out_events(evid
         by_likelihood=evidence,
         context=SimpleNamespace(criteria=Criteria()),
     )
-    assert recommendation(findings).startswith(told)
+    assert recommend_next(findings).startswith(told)
 
 
 TERM = SimpleNamespace(term=SimpleNamespace(words="a torque that falls"))
@@ -75,7 +75,7 @@ def recommend(word, grade="adequate", event=None, term=None, evidence=None):
         train=SimpleNamespace(by_event=(400.0,)),
         all_fitted=False,
     )
-    return recommendation(findings)
+    return recommend_next(findings)
 
 
 @pytest.mark.parametrize(

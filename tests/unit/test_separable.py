@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from written_out import dense, dense_normal
 
-from tractexp.inference.differences import central_differences, forward_differences
-from tractexp.inference.least_squares import normal
+from tractexp.inference.differences import compute_central_differences, compute_forward_differences
+from tractexp.inference.least_squares import build_normal_matrix
 from tractexp.inference.separable import (
     NOT_SEPARABLE,
     NormalMatrix,
@@ -85,7 +85,8 @@ def test_differences_and_normal_equations_are_those_of_every_coordinate_by_itsel
 
     base = rows(unit, lanes)
     alone, together = (
-        normal(rows, unit, base, lanes, a, central=central) for a in (NOT_SEPARABLE, APART)
+        build_normal_matrix(rows, unit, base, lanes, a, central=central)
+        for a in (NOT_SEPARABLE, APART)
     )
     _, each, shared = simulated
     lanes_and_sides = 2 * (1 + central)
@@ -100,7 +101,7 @@ def test_differences_and_normal_equations_are_those_of_every_coordinate_by_itsel
 
 
 def test_a_step_solves_the_equations_of_every_entry_and_what_rests_stays():
-    matrix = normal(lambda x, lanes: x @ DENSE.T, *_at(), APART)[1]
+    matrix = build_normal_matrix(lambda x, lanes: x @ DENSE.T, *_at(), APART)[1]
     kept = RNG.uniform(size=(2, K + M * E)) > 0.3
     side, added = RNG.normal(size=(2, K + M * E)) * kept, RNG.uniform(0.5, 1, (2, 3, K + M * E))
     solution = matrix.solve(side, kept, (added, ~kept[:, None] * 1.0))
@@ -131,11 +132,11 @@ def test_a_power_that_cannot_be_simulated_on_one_side_is_one_sided_in_its_event_
         made[np.ix_(x[:, 6] > 0.5, APART.rows[1])] = np.nan
         return made
 
-    _, columns = central_differences(
+    _, columns = compute_central_differences(
         rows, np.full((1, K + M * E), 0.5), np.zeros(1, dtype=int), APART
     )
     np.testing.assert_allclose(columns[0], J.columns, rtol=1e-5, atol=1e-8)
-    ahead = forward_differences(
+    ahead = compute_forward_differences(
         rows, np.full((1, K + M * E), 0.5), 0.5 * DENSE.sum(axis=1)[None], np.zeros(1), APART
     )
     lost = ahead[0][K] == 0

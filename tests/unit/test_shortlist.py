@@ -1,5 +1,5 @@
-"""Which sets are fitted next, `shortlist`, and whether any is, `worth_another`: made scores in,
-names out.
+"""Which sets are fitted next, `shortlist_sets`, and whether any is, `is_worth_another`: made scores
+in, names out.
 """
 
 from types import SimpleNamespace
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_sets import fitted
 
-from tractexp.discrepancy.explanations import shortlist, worth_another
+from tractexp.discrepancy.explanations import is_worth_another, shortlist_sets
 from tractexp.inference.fitting import Refit
 
 TEXTBOOK = {"a_of_other_law": "a"}
@@ -23,12 +23,16 @@ def step(fitted, drops):
 
 
 def test_single_effects_are_fitted_in_the_order_of_what_they_lower():
-    assert shortlist([step((), {"b": 9.0, "a": 30.0, "c": 20.0})], 1) == [("a",), ("c",), ("b",)]
+    assert shortlist_sets([step((), {"b": 9.0, "a": 30.0, "c": 20.0})], 1) == [
+        ("a",),
+        ("c",),
+        ("b",),
+    ]
 
 
 def test_beside_a_law_of_another_form_its_own_textbook_is_not_sought():
     last = step(("a_of_other_law", "b"), {"a": 30.0, "b": 20.0, "c": 10.0})
-    assert shortlist([step((), {}), last], 3) == [("a_of_other_law", "b", "c")]
+    assert shortlist_sets([step((), {}), last], 3) == [("a_of_other_law", "b", "c")]
 
 
 @pytest.mark.parametrize(
@@ -44,6 +48,6 @@ def test_beside_a_law_of_another_form_its_own_textbook_is_not_sought():
 )
 def test_a_second_effect_is_tried_and_no_third(sets, another):
     assert (
-        worth_another([SimpleNamespace(fit=fitted(0.0, len(names), *names)) for names in sets])
+        is_worth_another([SimpleNamespace(fit=fitted(0.0, len(names), *names)) for names in sets])
         == another
     )

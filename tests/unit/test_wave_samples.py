@@ -1,5 +1,5 @@
 """Samples of waveforms by themselves: what is cut out, what is periodic, per unit of what, and the
-blocks of residuals that `blocks_of` makes.
+blocks of residuals that `cut_blocks` makes.
 """
 
 from types import SimpleNamespace
@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tractexp.inference.blocks import blocks_of
-from tractexp.inference.interval import interval_factor
+from tractexp.inference.blocks import cut_blocks
+from tractexp.inference.interval import compute_interval_factor
 from tractexp.record.periodic import Periodic
 from tractexp.record.record import Base
 from tractexp.record.synthetic import synthetic_event
@@ -90,7 +90,7 @@ def test_blocks_are_counted_from_the_start_of_each_dip():
     parts = [slice(0, 1050), slice(1050, 2100)]
     drive = SimpleNamespace(events=2, part=parts.__getitem__, parts=parts)
     events = [SimpleNamespace(start=230, record=SimpleNamespace(step=0.001)) for _ in range(2)]
-    whole, after = blocks_of(events, drive), blocks_of(events, drive, from_dip=True)
+    whole, after = cut_blocks(events, drive), cut_blocks(events, drive, from_dip=True)
     assert [b.start for b in whole[:4]] == [0, 30, 130, 230]
     assert [b.start for b in after[:2]] == [230, 330]
     assert 1050 + 230 in [b.start for b in after]
@@ -98,6 +98,6 @@ def test_blocks_are_counted_from_the_start_of_each_dip():
     assert sum(b.stop - b.start for b in whole) == 2100
     assert sum(b.stop - b.start for b in after) == 2 * (1050 - 230)
     # shorter ones, three for each parameter
-    assert len(blocks_of(events, drive, parameters=20)) > 2 * len(whole)
-    assert interval_factor(1) == pytest.approx(12.706, rel=1e-4)
-    assert interval_factor(999) == pytest.approx(1.962, rel=1e-3)
+    assert len(cut_blocks(events, drive, parameters=20)) > 2 * len(whole)
+    assert compute_interval_factor(1) == pytest.approx(12.706, rel=1e-4)
+    assert compute_interval_factor(999) == pytest.approx(1.962, rel=1e-3)

@@ -1,4 +1,4 @@
-"""A search from many starts in turns, `_in_turns`."""
+"""A search from many starts in turns, `_descend_in_turns`."""
 
 from types import SimpleNamespace
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from tractexp.inference import fit_effort, wide_fit
 from tractexp.inference.fitting import Refit
-from tractexp.inference.wide_fit import _in_turns
+from tractexp.inference.wide_fit import _descend_in_turns
 
 
 def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
@@ -21,7 +21,9 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
 
     monkeypatch.setattr(wide_fit, "run_descents", descended)
     monkeypatch.setattr(wide_fit, "_begin_fits", descended)
-    monkeypatch.setattr(wide_fit, "moved_across", lambda bench, noise, fit, faults: fit.unit)
-    ended = _in_turns(at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None)
+    monkeypatch.setattr(wide_fit, "move_across", lambda bench, noise, fit, faults: fit.unit)
+    ended = _descend_in_turns(
+        at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None
+    )
     assert (ended[0].names, ended[0].deviance) == (("falls",), 60.0)
     assert len(turns) == 1 + fit_effort.MOST_TURNS

@@ -68,29 +68,29 @@ def _complete_uncertainty(
     setup: FitSpec, uncertainty: "Uncertainty", progress: Progress
 ) -> "Uncertainty":
     """The uncertainty with what profiles, rival structures and the records' limits add to it."""
-    from tractexp.identification.load_drift import with_load_drift
+    from tractexp.identification.load_drift import add_load_drift
     from tractexp.identification.physical import say_ranges
     from tractexp.identification.profile import check_by_profiles
-    from tractexp.identification.rivals import with_rivals
-    from tractexp.identification.unfinished import with_unfinished
-    from tractexp.identification.unrecorded import with_unrecorded
+    from tractexp.identification.rivals import add_rivals
+    from tractexp.identification.unfinished import add_unfinished
+    from tractexp.identification.unrecorded import add_unrecorded
 
     if setup.check_intervals:
         points = counter("points at most on the profiles", progress)
         uncertainty = check_by_profiles(uncertainty, points)
         structures = counter("structures fitted beside", progress)
-        uncertainty = with_rivals(uncertainty, structures)
-    uncertainty = with_unrecorded(uncertainty, setup.unrecorded_inputs)
-    uncertainty = with_unfinished(with_load_drift(uncertainty))
+        uncertainty = add_rivals(uncertainty, structures)
+    uncertainty = add_unrecorded(uncertainty, setup.unrecorded_inputs)
+    uncertainty = add_unfinished(add_load_drift(uncertainty))
     return say_ranges(uncertainty, setup.model.held)
 
 
 def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result:
     """The result with its uncertainty, what was found beside the estimate, and advice."""
+    from tractexp.identification.network_comparison import compare_with_network
     from tractexp.identification.physical import find_free_optimum
     from tractexp.identification.share import find_share_bound
     from tractexp.identification.unsteady_start import find_unsteady_start
-    from tractexp.identification.yardstick import yardstick
 
     uncertainty, fits = details.uncertainty, details.fits
     agreement = details.agreement or {"gains": {}, "odd_events": [], "notes": []}
@@ -105,7 +105,7 @@ def _add_findings(setup: FitSpec, result: Result, details: FitDetails) -> Result
     return replace(
         result,
         **fields,
-        linear_network=yardstick(fits, result.model_error),
+        linear_network=compare_with_network(fits, result.model_error),
         starts=details.estimation.starts,
         rival_structures=[rival.to_dict() for rival in uncertainty.rivals],
         free_optimum=free.to_dict() if free else {},

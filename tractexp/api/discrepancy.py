@@ -117,11 +117,11 @@ def investigate(
 
 def _build_investigation(question: Question, steps: "Steps") -> Investigation:
     """The result of an investigation, with the content of `discrepancy.json` and `result.json`."""
-    from tractexp.discrepancy.discrepancy_json import content
+    from tractexp.discrepancy.discrepancy_json import build_content
 
     return Investigation(
         question,
-        files.make_plain(content(steps)),
+        files.make_plain(build_content(steps)),
         _estimate_extended_model(question, steps),
         steps,
     )

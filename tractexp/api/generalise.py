@@ -213,9 +213,9 @@ def _judge_generalization(
     setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]"
 ) -> Generalised:
     """The errors of all searches on the dips that none of them fitted."""
-    from tractexp.identification.generalization import by_depth
+    from tractexp.identification.generalization import compare_depths
 
-    kinds = by_depth(setup.validate, setup.train)
+    kinds = compare_depths(setup.validate, setup.train)
     rows = [row for result, fits in searched for row in _compute_residuals(result, fits, kinds)]
     identified = [
         {
@@ -237,7 +237,7 @@ def _compute_residuals(
     result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str]
 ) -> Iterable[dict[str, Any]]:
     """Eq. (21) and Eq. (20) of P and Q on each held-out dip."""
-    from tractexp.identification.generalization import mean_residual
+    from tractexp.identification.generalization import compute_mean_residual
 
     for fit, kind in zip(fits, kinds, strict=True):
         yield {
@@ -246,8 +246,8 @@ def _compute_residuals(
             "event": fit.event.record.name,
             "kind": kind,
             "depth": fit.event.depth,
-            "residual_P": mean_residual(fit.event.record.P, fit.P),
-            "residual_Q": mean_residual(fit.event.record.Q, fit.Q),
+            "residual_P": compute_mean_residual(fit.event.record.P, fit.P),
+            "residual_Q": compute_mean_residual(fit.event.record.Q, fit.Q),
             "epsilon_p": fit.epsilon_p,
             "epsilon_q": fit.epsilon_q,
         } | ({} if fit.epsilon_i is None else {"epsilon_i": fit.epsilon_i})

@@ -19,7 +19,7 @@ from tractexp.configuration.run_command import build_folder_command
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.fit import play
-from tractexp.identification.result import Result, by_event
+from tractexp.identification.result import Result, name_by_event
 from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.inference.model_error import ModelError
 from tractexp.outcome import Drawing, Written
@@ -111,8 +111,8 @@ class Identification(Written):
         T_m[1], T_m[2], too.
         """
         r, about = self.result, {p.name: p.about for p in self.model.model.parameters}
-        values, ended, estimates = by_event(r.parameters, r.per_event), r.search, Estimates()
-        search = by_event(ended["parameters"], ended["per_event"]) if ended else values
+        values, ended, estimates = name_by_event(r.parameters, r.per_event), r.search, Estimates()
+        search = name_by_event(ended["parameters"], ended["per_event"]) if ended else values
         for name, value in values.items():
             of, interval = name.partition("[")[0], r.intervals.get(name)
             without = "mean of its events" if name in r.per_event else FIXED if r.verdicts else ""

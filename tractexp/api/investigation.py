@@ -138,9 +138,9 @@ class Investigation(Written):
     @property
     def proposal_sentences(self) -> list[str]:
         """The proposal as sentences; why there is none where nothing explains."""
-        from tractexp.discrepancy.proposal.wording import proposed_in_words
+        from tractexp.discrepancy.proposal.wording import describe_proposal
 
-        return proposed_in_words(self.proposal, self.content["no_proposal"])
+        return describe_proposal(self.proposal, self.content["no_proposal"])
 
     @property
     def sizes(self) -> list[str]:

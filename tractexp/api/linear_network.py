@@ -161,13 +161,13 @@ def _fit_networks(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
     from tractexp.domain import DOMAINS
     from tractexp.identification.linear_network import (
         MOST_VECTOR_POLES,
-        black_boxes,
         choose_network,
+        fit_black_boxes,
     )
 
     domain = DOMAINS[of.domain]
     train = domain.events(of.train)
-    boxes = black_boxes(domain, train, MOST_VECTOR_POLES if of.order is None else of.order)
+    boxes = fit_black_boxes(domain, train, MOST_VECTOR_POLES if of.order is None else of.order)
     if of.order is None:
         return choose_network(boxes, train), boxes
     if len(boxes) <= of.order:
@@ -198,17 +198,17 @@ def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
 
 def _build_content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[str, Any]:
     """The content of `linear_network.json`."""
-    from tractexp.identification.fit import model_errors
-    from tractexp.identification.yardstick import network_in_words
+    from tractexp.identification.fit import tabulate_model_errors
+    from tractexp.identification.network_comparison import describe_network
     from tractexp.inference.model_error import ModelError
 
     fits = _play_network(box, of)
-    error, by_poles = model_errors(fits), []
+    error, by_poles = tabulate_model_errors(fits), []
     for one in boxes:
-        own = model_errors(_play_network(one, of))
+        own = tabulate_model_errors(_play_network(one, of))
         held = own["held_out"] and own["held_out"]["value"]
         by_poles.append({"poles": len(one.poles), "model_error": own["value"], "held_out": held})
-    sentence = f"{network_in_words(len(box.poles))} leaves {ModelError.from_content(error)}"
+    sentence = f"{describe_network(len(box.poles))} leaves {ModelError.from_content(error)}"
     if error["held_out"]:
         sentence += f", and of the held-out dips {ModelError.from_content(error['held_out'])}"
     return {

@@ -102,7 +102,7 @@ def _choose_event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progr
     """The event that tells rivals apart. Raises `UserError` for a model with `per_event`, or sets
     that do not fit it.
     """
-    from tractexp.discrepancy.next_event.rivals import event_for
+    from tractexp.discrepancy.next_event.rivals import choose_event_for
 
     m = setup.model
     if m.per_event:
@@ -111,6 +111,6 @@ def _choose_event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progr
             f" leave {MODEL.per_event} empty"
         )
     with tell_stages(progress) as tell:
-        return event_for(
+        return choose_event_for(
             m.model, setup.train, rivals, m.bounds, m.fixed, substeps=m.substeps, tell=tell
         )

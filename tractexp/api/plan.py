@@ -25,7 +25,7 @@ from tractexp.identification.adequacy import Grade
 from tractexp.identification.fit import play
 from tractexp.identification.plan import ChosenEvent, DipShape
 from tractexp.identification.result import Result, load
-from tractexp.inference.model_error import ModelError, in_percent, model_error
+from tractexp.inference.model_error import ModelError, compute_model_error, format_percent
 from tractexp.noise import Noise
 from tractexp.outcome import Written
 from tractexp.record import Event
@@ -224,7 +224,7 @@ def _forecast_plan(
 ) -> Planned:
     """Everything forecast: how deep, over what, and the best events."""
     problem, recorded = setup.problem, setup.train
-    planning.column(problem.space.names, parameter)
+    planning.find_column(problem.space.names, parameter)
     if problem.per_event:
         raise UserError(
             f"{name_setting('task=plan')} plans for shared parameters;"
@@ -239,8 +239,8 @@ def _forecast_plan(
     shape = replace(_choose_shape(deepest, seen=noise, **given), error=missed or error)
     shape.check()
     scans = _scan_properties(problem, at, shape)
-    needed = planning.depth_needed(scans[DEPTH][1], parameter, within)
-    best = planning.best_events(problem, at, least, events) if len(recorded) > 1 else []
+    needed = planning.find_depth_needed(scans[DEPTH][1], parameter, within)
+    best = planning.choose_best_events(problem, at, least, events) if len(recorded) > 1 else []
     return Planned(problem, at, origin, _describe_shape(shape), needed, scans, best, least, events)
 
 
@@ -257,12 +257,14 @@ def select_events(setup: Setup, values: Any, most: int) -> list[ChosenEvent]:
     informations, refused = {}, ""
     for event in setup.train:
         try:
-            informations[event.record.name] = planning.alone(setup.problem_of([event]), at)
+            informations[event.record.name] = planning.compute_own_information(
+                setup.problem_of([event]), at
+            )
         except UserError as error:
             refused = str(error)
     if not informations:
         raise UserError(refused)
-    return planning.best_of([*informations.values()], [*informations], 0.0, most)
+    return planning.choose_best([*informations.values()], [*informations], 0.0, most)
 
 
 def _choose_shape(
@@ -295,7 +297,7 @@ def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, No
         if not fit.surprise.adequate:
             origin += ", though more than noise is left there, which the forecast counts as noise"
         at, noise = fit.uncertainty.values, fit.uncertainty.likelihood.noise.select_event(0)
-        missed = 0.0 if fit.surprise.adequate else model_error(play(problem, at)).value
+        missed = 0.0 if fit.surprise.adequate else compute_model_error(play(problem, at)).value
         return at, origin, noise, missed
     if values == DEFAULT:
         defaults = [p.default for p in problem.parameters if p.name in problem.space.names]
@@ -328,9 +330,9 @@ def _scan_properties(problem: Any, values: np.ndarray, shape: DipShape) -> dict[
 
     def scan_shapes(key: str, grid: tuple[float, ...]) -> Any:
         shapes = [replace(shape, **{key: x}) for x in grid]
-        return grid, [planning.forecast(problem, values, s) for s in shapes]
+        return grid, [planning.forecast_intervals(problem, values, s) for s in shapes]
 
-    by_depth = planning.over_depth(problem, values, shape)
+    by_depth = planning.forecast_over_depth(problem, values, shape)
     P = abs(shape.P0)
     loud = [replace(shape, noise_P=x * P, noise_Q=x * P) for x in NOISES]
     scans = {
@@ -340,7 +342,10 @@ def _scan_properties(problem: Any, values: np.ndarray, shape: DipShape) -> dict[
     scans |= {GRIDS[name][0]: scan_shapes(name, GRIDS[name][1]) for name in shape.domain.shaped_by}
     scans[RATE] = scan_shapes("rate", shape.domain.rates(shape.frequency))
     return scans | {
-        shape.domain.planned_noise: (NOISES, [planning.forecast(problem, values, s) for s in loud])
+        shape.domain.planned_noise: (
+            NOISES,
+            [planning.forecast_intervals(problem, values, s) for s in loud],
+        )
     }
 
 
@@ -359,7 +364,7 @@ def _describe_shape(shape: DipShape) -> str:
     )
     dip += shape.domain.describe_shape(shape)
     if shape.error:
-        memory += f", and a model that misses {in_percent(shape.error)} of its response"
+        memory += f", and a model that misses {format_percent(shape.error)} of its response"
     return f"planned: {dip}, noise {first} in {names[0]} and {second} in {names[1]}, of P, {memory}"
 
 

@@ -16,7 +16,7 @@ from tractexp.configuration.plugin import plugin
 from tractexp.configuration.run_command import suggest_run
 from tractexp.errors import check_range
 from tractexp.identification.result import Result
-from tractexp.identification.verdict import IDENTIFIED, brief
+from tractexp.identification.verdict import IDENTIFIED, shorten_verdict
 from tractexp.outcome import Written
 from tractexp.storage import files
 from tractexp.text.progress import Progress, counter
@@ -43,9 +43,9 @@ class Profiled(Written):
     @functools.cached_property
     def curves(self) -> "Profiles":
         """The profiles behind the page; of a loaded result they are computed again."""
-        from tractexp.identification.profile import profiles
+        from tractexp.identification.profile import profile_parameters
 
-        return self.behind or profiles(self.fit.details.uncertainty, self.points)
+        return self.behind or profile_parameters(self.fit.details.uncertainty, self.points)
 
     @property
     def identification(self) -> Identification:
@@ -99,7 +99,9 @@ class Profiled(Written):
         """The next step of the identification; of a model that leaves noise alone, the command that
         plans which dip would tell a parameter that is not identified.
         """
-        poor = [n for n, one in self.profiles.items() if brief(one["verdict"]) != IDENTIFIED]
+        poor = [
+            n for n, one in self.profiles.items() if shorten_verdict(one["verdict"]) != IDENTIFIED
+        ]
         if self.fit.adequate and poor:
             planned = suggest_run("task=plan", f"task.parameter={poor[0]}")
             return f"which dip would tell {poor[0]}: {planned}"
@@ -146,12 +148,14 @@ def profile(
     UserError
         For an identification of which only a `result.json` is known.
     """
-    from tractexp.identification.profile import profiles
+    from tractexp.identification.profile import profile_parameters
 
     check_range("task.points", points, 3, 1000)
     uncertainty = fit.details.uncertainty
     started = time.perf_counter()
-    scan = profiles(uncertainty, points, parts=counter("points at most on the profiles", progress))
+    scan = profile_parameters(
+        uncertainty, points, parts=counter("points at most on the profiles", progress)
+    )
     content = _build_content(scan, time.perf_counter() - started)
     verdicts = {name: str(verdict) for name, verdict in scan.verdicts.items()}
     intervals = {p.name: list(p.interval) for p in scan.profiles}

@@ -34,8 +34,8 @@ from tractexp.identification.station import (
 )
 from tractexp.identification.station_constants import Constants, judge_constants
 from tractexp.identification.station_result import build_result
-from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
-from tractexp.inference.model_error import model_error
+from tractexp.inference.interval import INTERVAL_LEVEL, compute_interval_factor
+from tractexp.inference.model_error import compute_model_error
 from tractexp.process.workers import Workers
 from tractexp.record import Event, OwnBase, Record, detect
 from tractexp.record.thinning import thin_record
@@ -149,7 +149,7 @@ def _fit(job: LoadJob) -> dict[str, Any]:
         "power": _tell_power(dips, fit),
         "events": [*_tell_events(names, fit, composition, predicted)],
         "odd": [{"event": names[k], "why": why} for k, why in sorted(fit.odd.items())],
-        "error": model_error([fit.fits[k] for k in fit.regular]).to_dict(),
+        "error": compute_model_error([fit.fits[k] for k in fit.regular]).to_dict(),
         "predicted": _tell_predicted(predicted, fit),
         "next_dip": next_dip,
         "result": result.to_dict(),
@@ -198,7 +198,7 @@ def _tell_share(fit: SharedFit, composition: Composition) -> dict[str, Any]:
         times = [fit.dips[k].when for k in kept]
         values, errors = composition.predict(times)
         mean, error = float(values.mean()), float(errors.min())
-    half = interval_factor() * float(error)
+    half = compute_interval_factor() * float(error)
     return {
         "value": float(mean),
         "low": float(mean) - half,
@@ -247,7 +247,7 @@ def _tell_events(
     """
     expected, _ = composition.predict([dip.when for dip in fit.dips])
     shares, errors = shrink(fit.shares, fit.share_errors, expected, composition.spread)
-    half = interval_factor() * errors
+    half = compute_interval_factor() * errors
     by_position = {one.position: one for one in predicted}
     for k, (name, dip) in enumerate(zip(names, fit.dips, strict=True)):
         before = by_position.get(k)
@@ -262,7 +262,7 @@ def _tell_events(
             "low": shares[k] - half[k],
             "high": shares[k] + half[k],
             "by_itself": fit.shares[k],
-            "error": model_error([fit.fits[k]]).value,
+            "error": compute_model_error([fit.fits[k]]).value,
             "predicted": None if before is None else before.error,
             "expected": None if before is None else before.share,
             "known": 0 if before is None else before.known,

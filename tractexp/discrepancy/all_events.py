@@ -11,13 +11,20 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.discrepancy.disagreement import disagreement, examine_fit
-from tractexp.inference.base_fit import fitted_from
+from tractexp.discrepancy.disagreement import examine_base_fit, examine_fit
+from tractexp.inference.base_fit import fit_from_starts
 from tractexp.inference.context import Context
-from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Names, Refit, best_of, key_by_names, leave_each_out, refit
+from tractexp.inference.cores import map_on_cores
+from tractexp.inference.fitting import (
+    Names,
+    Refit,
+    key_by_names,
+    leave_each_out,
+    refit,
+    select_best_fits,
+)
 from tractexp.inference.noise_in_quiet import QuietNoise
-from tractexp.inference.wide_fit import wide_refit
+from tractexp.inference.wide_fit import refit_widely
 from tractexp.noise import Noise
 from tractexp.record import Event
 
@@ -96,9 +103,9 @@ class AllEvents:
         by_name = key_by_names(alone)
         effort = self.context.effort
         _ = self.plain  # once, before processes are forked
-        refitted = each_apart(lambda fit: self._refit(fit, anew=anew), alone, effort)
-        fits = best_of(itertools.chain(*refitted))
-        return each_apart(lambda fit: self._measure(fit, by_name[fit.names], seed), fits, effort)
+        refitted = map_on_cores(lambda fit: self._refit(fit, anew=anew), alone, effort)
+        fits = select_best_fits(itertools.chain(*refitted))
+        return map_on_cores(lambda fit: self._measure(fit, by_name[fit.names], seed), fits, effort)
 
     def compare(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
         """Sets fitted to all events from where they were; what leaves something there, or would be
@@ -144,7 +151,9 @@ class AllEvents:
 
     def fit_to_all(self, fits: Mapping[str, Refit]) -> dict[str, Refit]:
         """{member: fit} of given fits, fitted to all events."""
-        joint = {key: best_of(self._refit(fit, anew=False))[0] for key, fit in fits.items()}
+        joint = {
+            key: select_best_fits(self._refit(fit, anew=False))[0] for key, fit in fits.items()
+        }
         return {key: replace(fit, unit=self._narrow(fit)) for key, fit in joint.items()}
 
     def p_left(self, local_minima: Sequence[np.ndarray], seed: int) -> float:
@@ -159,7 +168,7 @@ class AllEvents:
             self.context.coordinates.widen_coordinates(minimum)
             for minimum in (self.bare.unit, *local_minima)
         ]
-        return disagreement(fitted_from(self.context, wide, wide[1:]), seed).p_left
+        return examine_base_fit(fit_from_starts(self.context, wide, wide[1:]), seed).p_left
 
     def _refit(self, alone: Refit, *, anew: bool) -> list[Refit]:
         """A set fitted to all events, from where it was fitted alone; `anew` from every setting of
@@ -175,7 +184,7 @@ class AllEvents:
             (alone.names, at.place_values(at.widen_coordinates(alone.unit), setting))
             for setting in settings
         ]
-        return (wide_refit if anew else refit)(self.context, self.level, wanted, self.faults)
+        return (refit_widely if anew else refit)(self.context, self.level, wanted, self.faults)
 
     def _narrow(self, fit: Refit) -> np.ndarray:
         """The coordinates of a fit without the held-out events' own."""

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from tractexp.discrepancy.evidence import SLIGHT_ERROR
-from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, drive_imagined
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import format_percent
 from tractexp.model.drive import Drive
 from tractexp.text.wording import join_words
 
@@ -60,12 +60,12 @@ def describe_classes(classes: Sequence[EffectClass]) -> str:
         (one,) = classes
         if np.isnan(one.by):
             return "one class: the motor stalls in all of them in every dip that was tried"
-        share = in_percent(one.by)
+        share = format_percent(one.by)
         return f"one class: they predict alike within {share} of the response in every dip tried"
     dip, by = min(parting, key=lambda pair: pair[0].burden)
     sentence = (
         f"{len(classes)} classes: they predict alike in milder dips, and part by"
-        f" {in_percent(by)} of the response in {dip.words}"
+        f" {format_percent(by)} of the response in {dip.words}"
     )
     alike = [map(join_words, one.sets) for one in classes if len(one.sets) > 1]
     never = [f"; no dip tried parts {join_words([*sets])}" for sets in alike]
@@ -79,7 +79,7 @@ def compare_predictions(
     records.
     """
     dips = sorted(imagine_grid(context, fits), key=lambda dip: dip.burden)
-    drive = Drive.from_events([driven(context, dip) for dip in dips])
+    drive = Drive.from_events([drive_imagined(context, dip) for dip in dips])
     at = context.coordinates
     power = [
         context.kernels.simulate(fit.names, at.without_faults(fit.unit, ())[None], drive)[0]

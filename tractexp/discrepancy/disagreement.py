@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.inference.base_fit import BaseFit
-from tractexp.inference.blocks import blocks_of
-from tractexp.inference.chance import BLURRED, Chance, chance_at, is_noise_exact, scales
+from tractexp.inference.blocks import cut_blocks
+from tractexp.inference.chance import BLURRED, Chance, draw_chance, draw_scales, is_noise_exact
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.fit_effort import NOISE_ROUNDS, QUIETER
 from tractexp.inference.fitting import Refit, refit_from
 from tractexp.inference.goodness_of_fit import GoodnessOfFit
-from tractexp.inference.linearization import Linearization, rich_residuals, tangent
+from tractexp.inference.linearization import Linearization, linearize_fit, remove_explained
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.score_test import Score, ScoreTest
 from tractexp.noise import Noise
@@ -64,7 +64,7 @@ class Disagreement:
         fitted = self.root.shape[1]
         if self.robust is None:
             return self.context.samples - fitted
-        return len(blocks_of(self.context.events, self.context.drive, fitted)) - 1
+        return len(cut_blocks(self.context.events, self.context.drive, fitted)) - 1
 
     @property
     def context(self) -> Context:
@@ -73,7 +73,7 @@ class Disagreement:
 
     def score_fit(self, context: Context, fit: Refit, noise: Noise) -> "Disagreement":
         """The scores at another fit under a noise, by what chance does at this one."""
-        t = tangent(context, fit, noise)
+        t = linearize_fit(context, fit, noise)
         return Disagreement(fit, noise, t, t.build_score_test(noise), self.chance)
 
     @functools.cached_property
@@ -153,7 +153,7 @@ class Disagreement:
         )
 
 
-def disagreement(base: BaseFit, seed: int) -> Disagreement:
+def examine_base_fit(base: BaseFit, seed: int) -> Disagreement:
     """The tests of the base model's fit.
 
     Parameters
@@ -196,24 +196,24 @@ def examine_fit(
     Disagreement
     """
     context = quiet.context
-    t = tangent(context, fit, noise)
+    t = linearize_fit(context, fit, noise)
     for _ in range(NOISE_ROUNDS):
         noise = quiet.estimate_noise(
-            fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining_columns
+            fit.unit, remove_explained(t, t.residual[None])[0], t.residual, t.explaining_columns
         )
         fit = refit_from(context, noise, fit.names, fit.unit)
-        t = tangent(context, fit, noise)
+        t = linearize_fit(context, fit, noise)
         if fit.deviance > QUIETER * context.samples:
             break  # else this is the noise of a worse fit
     projection = t.build_score_test(noise)
-    chance = chance_at(t, projection, noise, quiet, seed, plain=True)
+    chance = draw_chance(t, projection, noise, quiet, seed, plain=True)
     result = Disagreement(fit, noise, t, projection, chance)
     stands_out = bool(result.scores) and result.scores[0].p < PLAIN
     plain = plain or is_noise_exact(context, noise) or stands_out
     if not plain and not (result.suffices and not result.faults):
-        result = replace(result, chance=chance_at(t, projection, noise, quiet, seed, plain=False))
+        result = replace(result, chance=draw_chance(t, projection, noise, quiet, seed, plain=False))
     if result.is_undecided:
         result = replace(
-            result, chance=replace(result.chance, scales=scales(t, projection, noise, seed))
+            result, chance=replace(result.chance, scales=draw_scales(t, projection, noise, seed))
         )
     return result

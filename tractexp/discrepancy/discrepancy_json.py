@@ -11,16 +11,16 @@ from tractexp.configuration.run_command import build_again_command, list_setting
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.explain import find_status
 from tractexp.discrepancy.findings import Findings
-from tractexp.discrepancy.forms import by_name, forms
+from tractexp.discrepancy.forms import describe_forms, key_forms
 from tractexp.discrepancy.gap import Curves
-from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import estimates
+from tractexp.discrepancy.judgement import judge_effects
+from tractexp.discrepancy.precision import list_estimates
 from tractexp.discrepancy.proposal import generate
-from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.proposal.library import find_term
 from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
-from tractexp.discrepancy.recommend import recommendation
+from tractexp.discrepancy.recommend import recommend_next
 from tractexp.domain import DOMAINS
-from tractexp.inference.model_error import Change, Misfit, ModelError, in_percent
+from tractexp.inference.model_error import Change, Misfit, ModelError, format_percent
 from tractexp.storage import files
 from tractexp.text import quoting
 from tractexp.text.wording import join_words
@@ -28,7 +28,7 @@ from tractexp.text.wording import join_words
 MODEL_FILE = Path("conf", "model", "extended.yaml")  # beside the page
 
 
-def content(investigation: Findings) -> dict[str, Any]:
+def build_content(investigation: Findings) -> dict[str, Any]:
     """The content of `discrepancy.json`."""
     window = investigation.context.records.window
     return {
@@ -40,21 +40,21 @@ def content(investigation: Findings) -> dict[str, Any]:
             list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets
         ],
         "classes": [one.to_dict() for one in investigation.effect_classes],
-        "forms": by_name(forms(investigation)),
+        "forms": key_forms(describe_forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
-        "gap": gaps(investigation),
+        "gap": build_gaps(investigation),
         "contributions": [
             {"effects": list(names), "model_error": files.make_plain(error)}
             for names, error in investigation.contributions
         ],
         "left": investigation.last.p_by_test,
-        "nearest": _nearest(investigation),
-        "candidates": [*sets(investigation), *_singles(investigation)],
-        "remainder": _remainder(investigation),
+        "nearest": _build_nearest(investigation),
+        "candidates": [*list_sets(investigation), *_list_singles(investigation)],
+        "remainder": _build_remainder(investigation),
         "unrecorded_course": investigation.unrecorded_course or None,
         "proposal": proposal_dict(investigation.proposed, generate.PLUGIN),
         "no_proposal": investigation.proposed.why or None,
-        "recommendation": recommendation(investigation),
+        "recommendation": recommend_next(investigation),
         "next_event": None
         if investigation.next_event is None
         else investigation.next_event.to_dict(),
@@ -66,12 +66,12 @@ def content(investigation: Findings) -> dict[str, Any]:
         "phasor_window": None if window is None else window.window,
         "recorder_window": investigation.window,
         "false_alarm_rate": investigation.context.criteria.false_alarms,
-        "parameters": parameters(investigation),
+        "parameters": list_parameters(investigation),
         "simulations": investigation.context.effort.simulations,
     }
 
 
-def parameters(investigation: Findings) -> dict[str, dict[str, float]]:
+def list_parameters(investigation: Findings) -> dict[str, dict[str, float]]:
     """Parameters of the graded model, each with its standard error where the fit gives one."""
     return {
         e.parameter.name: {"value": e.value, "standard_error": e.error}
@@ -79,7 +79,7 @@ def parameters(investigation: Findings) -> dict[str, dict[str, float]]:
     }
 
 
-def gaps(investigation: Findings) -> dict[str, Any]:
+def build_gaps(investigation: Findings) -> dict[str, Any]:
     """How far off the graded models are: the base model before, the one that the investigation ends
     with after.
 
@@ -91,30 +91,30 @@ def gaps(investigation: Findings) -> dict[str, Any]:
     )
     ranked = {"train": investigation.train, "validate": investigation.validate}
     rows: dict[str, Any] = {
-        role: was and now and _gap(Change(was, now), ranked[role])
+        role: was and now and _build_gap(Change(was, now), ranked[role])
         for role, was, now in zip(ranked, before, after, strict=True)
     }
     return {**rows, "fitted_to_both": investigation.fitted_to_both}
 
 
-def _gap(change: Change[Any], ranked: Change[Curves] | None) -> dict[str, Any]:
+def _build_gap(change: Change[Any], ranked: Change[Curves] | None) -> dict[str, Any]:
     """What two models leave, with the deviance of the ranked fits beside it."""
     return {
-        "before": _misfit(change.before, ranked and ranked.before),
-        "after": _misfit(change.after, ranked and ranked.after),
+        "before": _build_misfit(change.before, ranked and ranked.before),
+        "after": _build_misfit(change.after, ranked and ranked.after),
         "closed": files.make_plain(change.closed_share),
     }
 
 
-def _misfit(misfit: Misfit, ranked: Curves | None) -> dict[str, Any]:
+def _build_misfit(misfit: Misfit, ranked: Curves | None) -> dict[str, Any]:
     """The errors of a model."""
     own = {} if misfit.epsilon_i is None else {"epsilon_i": misfit.epsilon_i}
     errors = {"epsilon_p": misfit.epsilon_p, "epsilon_q": misfit.epsilon_q}
     chi2 = {"chi2_per_sample": ranked and ranked.chi2_per_sample}
-    return files.make_plain({"model_error": _error(misfit.error)} | errors | own | chi2)
+    return files.make_plain({"model_error": _build_error(misfit.error)} | errors | own | chi2)
 
 
-def _nearest(investigation: Findings) -> dict[str, Any] | None:
+def _build_nearest(investigation: Findings) -> dict[str, Any] | None:
     """The set that comes nearest where nothing explains the disagreement, and what it makes of the
     gap.
     """
@@ -123,12 +123,12 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
         return None
     assert near.row.tests is not None
     by_name = {
-        e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)
+        e.parameter.name: e for e in list_estimates(near.row.tests, near.row.fit.unit, near.names)
     }
     on = {"train": near.fitted, "validate": near.held_out}
     return {
         "effects": list(near.names),
-        "gap": {role: both and _gap(both, both) for role, both in on.items()},
+        "gap": {role: both and _build_gap(both, both) for role, both in on.items()},
         "others": [
             {"effects": list(names), "closed": files.make_plain(share)}
             for names, share in near.others
@@ -139,7 +139,7 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
     }
 
 
-def _remainder(investigation: Findings) -> dict[str, Any] | None:
+def _build_remainder(investigation: Findings) -> dict[str, Any] | None:
     """What is left where it is more than noise: its size, on held-out events where there are any,
     the share of the base model's squared error that it is, how often chance leaves as much, which
     test it surprises most, and shapes.
@@ -152,19 +152,19 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     change = investigation.graded_change
     last = change if near is None else near.held_out or near.fitted
     return {
-        "model_error": _error(last.after.error),
+        "model_error": _build_error(last.after.error),
         "share": files.make_plain(1 - change.closed_share) if investigation.names else None,
         "p": tests.p_left,
         "where": tests.loudest,
         "sentence": investigation.headline,
-        "best_term": _best_term(investigation),
+        "best_term": _build_best_term(investigation),
         "of_names": shapes if investigation.names else [],
         "of_nearest": shapes if near else [],
         "of_base": list(map(asdict, investigation.rest.of_base)),
     }
 
 
-def _best_term(investigation: Findings) -> dict[str, Any] | None:
+def _build_best_term(investigation: Findings) -> dict[str, Any] | None:
     """The term of the library that predicts the held-out events best, where it was a rival of
     names.
     """
@@ -172,12 +172,12 @@ def _best_term(investigation: Findings) -> dict[str, Any] | None:
     if best is None or best.prediction is None:
         return None
     return {
-        "words": term(best.names[0]).words,
+        "words": find_term(best.names[0]).words,
         "model_error": files.make_plain(best.prediction.error),
     }
 
 
-def _error(error: ModelError) -> dict[str, Any]:
+def _build_error(error: ModelError) -> dict[str, Any]:
     """A model's error with its interval, and where it stalls."""
     own = {"stalls": error.stalls} if error.stalls else {}
     return files.make_plain({"value": error.value, "interval": error.interval} | own)
@@ -207,7 +207,7 @@ def write_plugin(investigation: Findings, path: Path) -> Path:
     return files.write(path, proposal.source)
 
 
-def sets(investigation: Findings) -> list[dict[str, Any]]:
+def list_sets(investigation: Findings) -> list[dict[str, Any]]:
     """The refitted sets that were compared, with the model's error on held-out events where that
     decided.
     """
@@ -238,11 +238,11 @@ def sets(investigation: Findings) -> list[dict[str, Any]]:
             error["model_error"] = predicted.error
             if predicted.stalls:
                 error["stalls"] = predicted.stalls
-        rows.append(row | files.make_plain(error | {"evidence": _evidence(set_evidence)}))
+        rows.append(row | files.make_plain(error | {"evidence": _list_evidence(set_evidence)}))
     return rows
 
 
-def _evidence(row: SetEvidence) -> dict[str, Any]:
+def _list_evidence(row: SetEvidence) -> dict[str, Any]:
     """The numbers of a set by which `decide` decides; None where a step did not ask."""
     held_out = None if row.gap is None else {"gain": row.gap.gain, "expected": row.gap.expected}
     of_all = None if row.gap is None else {"p_left": row.p_of_all, "behind": row.behind_of_all}
@@ -250,10 +250,10 @@ def _evidence(row: SetEvidence) -> dict[str, Any]:
     return fitted | {"held_out": held_out, "of_all": of_all, "replicated": row.replicated_share}
 
 
-def _singles(investigation: Findings) -> list[dict[str, Any]]:
+def _list_singles(investigation: Findings) -> list[dict[str, Any]]:
     """Every effect of the catalogue, with its one-step size at the chosen model."""
     rows = []
-    for j in judgements(investigation):
+    for j in judge_effects(investigation):
         values = {}
         if j.score is not None:
             null = {p.name: p.absent for p in investigation.catalogue[j.name].sizes}
@@ -347,7 +347,7 @@ def _explain_model(
     if not investigation.verdict.complete:
         left = investigation.select_misfit(investigation.final_grade).error.value
         lines.append(
-            f"Something is missing still: it misses {in_percent(left)} of the load's response."
+            f"Something is missing still: it misses {format_percent(left)} of the load's response."
         )
     if (window := investigation.context.records.window) is not None:
         lines.append(f"window: {window.describe()}.")

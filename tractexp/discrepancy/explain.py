@@ -20,8 +20,8 @@ from tractexp.discrepancy.decide import (
 from tractexp.discrepancy.evidence import SLIGHT_ERROR, Evidence, SetEvidence, Verdict
 from tractexp.discrepancy.gap import DENIED, MILD, SHOWN
 from tractexp.discrepancy.nearest import Nearest, measure_least_error
-from tractexp.discrepancy.next_event.choose import NextEvent, next_event
-from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.next_event.choose import NextEvent, find_next_event
+from tractexp.discrepancy.proposal.library import find_term
 from tractexp.discrepancy.ranking import (
     MOST_NAMED,
     compute_factor,
@@ -30,9 +30,9 @@ from tractexp.discrepancy.ranking import (
     needs_all,
     rank_sets,
 )
-from tractexp.inference.chance import by_draws
+from tractexp.inference.chance import format_drawn_p
 from tractexp.inference.context import Context
-from tractexp.inference.model_error import describe_stall, in_percent
+from tractexp.inference.model_error import describe_stall, format_percent
 from tractexp.text.wording import join_alternatives, join_words, list_figures
 
 CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
@@ -47,7 +47,7 @@ def choose_next_event(verdict: Verdict, evidence: Evidence, context: Context) ->
     fits = [row.reported_fit for row in verdict.kept]
     labels = [join_words(label_effects(names, context)) for names in verdict.sets]
     error = measure_least_error(verdict, evidence, context)
-    return next_event(context, evidence.noise, evidence.base.fit, fits, labels, error=error)
+    return find_next_event(context, evidence.noise, evidence.base.fit, fits, labels, error=error)
 
 
 def explain(
@@ -129,9 +129,9 @@ def _explain_slight(base: SetEvidence) -> str:
     """How little the base model leaves, though more than noise."""
     assert base.fitted_error is not None
     return (
-        f"the base model misses {in_percent(base.fitted_error.error)} of the response of the fitted"
-        f" events and {_size(base)} of the held-out ones: more than noise, but no effect is sought"
-        f" in less than {SLIGHT_ERROR:.0%}"
+        f"the base model misses {format_percent(base.fitted_error.error)} of the response of the"
+        f" fitted events and {_format_error(base)} of the held-out ones: more than noise, but no"
+        f" effect is sought in less than {SLIGHT_ERROR:.0%}"
     )
 
 
@@ -222,13 +222,15 @@ def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) 
         and row not in chosen
         and row.held_out_prediction.excess > most
     ]  # what leaves less does so by chance
-    worse = [f"the base model misses {_size(evidence.base)}"]
+    worse = [f"the base model misses {_format_error(evidence.base)}"]
     if rest:
         following = join_words(label_effects(rest[0].names, context))
-        worse.append(f"the next best of {len(rest)} other sets ({following}) {_size(rest[0])}")
+        worse.append(
+            f"the next best of {len(rest)} other sets ({following}) {_format_error(rest[0])}"
+        )
     worse.append(_describe_term(evidence))
     labels = join_alternatives([label_effects(names, context) for names in verdict.sets])
-    off = list_figures([row.held_out_prediction.error for row in chosen], in_percent)
+    off = list_figures([row.held_out_prediction.error for row in chosen], format_percent)
     if len(chosen) > 1:
         sentence = (
             f"{labels}: they predict the held-out events within {off} of the response, which cannot"
@@ -253,14 +255,14 @@ def _describe_shared(chosen: SetEvidence, evidence: Evidence, context: Context) 
         return ""
     best = min(evidence.every, key=lambda row: row.held_out_prediction.excess)
     labels = join_words(label_effects(best.names, context))
-    return f"; {labels} miss {_size(best)}, the least, and all sets that come near have it"
+    return f"; {labels} miss {_format_error(best)}, the least, and all sets that come near have it"
 
 
 def explain_rest(evidence: Evidence, nearest: Nearest | None, context: Context) -> str:
     """What was tried, how far the nearest of it gets, and what stands out in what it leaves."""
     best = evidence.rows[0]
     assert best.tests is not None
-    chance = f"would come about by chance with a probability of {by_draws(best.p_left)}"
+    chance = f"would come about by chance with a probability of {format_drawn_p(best.p_left)}"
     loudest = f"the most surprised of the tests looks for {best.tests.loudest}"
     if nearest is None and not evidence.faults:
         return (
@@ -287,7 +289,7 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
     leaves of them.
     """
     criteria = context.criteria
-    bare = _size(evidence.base)
+    bare = _format_error(evidence.base)
     near = find_nearest(evidence, criteria)
     if not near.fit.names:
         better = "predicts the held-out events better than the base model"
@@ -295,7 +297,7 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
     if evidence.term is not None:  # it beats the set that would be kept
         beaten = find_leading(evidence, criteria, criteria.divides)[0]
         name = join_words(label_effects(beaten.names, context))
-        misses = f"misses {_size(beaten)} of the response of the held-out events"
+        misses = f"misses {_format_error(beaten)} of the response of the held-out events"
         return f"{name} would be named, but {misses}, and {_describe_term(evidence)}"
     labels = join_words(label_effects(near.names, context))
     why = f"a name must divide that by {criteria.divides:g}"
@@ -310,7 +312,8 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
         f"{_deny_all(context, len(near.names))} predicts the held-out events well enough to be"
         " named"
     )
-    misses = f"{'misses' if len(near.names) == 1 else 'miss'} {_size(near)} of the response there"
+    verb = "misses" if len(near.names) == 1 else "miss"
+    misses = f"{verb} {_format_error(near)} of the response there"
     return f"{none}: {labels}, the nearest, {misses}, where the base model misses {bare}; {why}"
 
 
@@ -318,16 +321,18 @@ def _describe_term(evidence: Evidence) -> str:
     """What the best term is, and how far it is off, as the end of a sentence."""
     assert evidence.term is not None
     return (
-        f"the best term of the library ({term(evidence.term.names[0]).words})"
-        f" {_size(evidence.term)}"
+        f"the best term of the library ({find_term(evidence.term.names[0]).words})"
+        f" {_format_error(evidence.term)}"
     )
 
 
-def _size(row: SetEvidence) -> str:
+def _format_error(row: SetEvidence) -> str:
     """The model's error on the held-out events, as a sentence tells it."""
     stalls = row.held_out_prediction.stalls
     return (
-        f"all ({describe_stall(stalls)})" if stalls else in_percent(row.held_out_prediction.error)
+        f"all ({describe_stall(stalls)})"
+        if stalls
+        else format_percent(row.held_out_prediction.error)
     )
 
 
@@ -368,7 +373,7 @@ def _describe_objection(best: SetEvidence, context: Context) -> str:
         )
     return (
         "what a fit to all events together leaves would come about by chance with a probability of"
-        f" {by_draws(best.p_of_all)}"
+        f" {format_drawn_p(best.p_of_all)}"
     )
 
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.disagreement import Disagreement, disagreement, examine_fit
-from tractexp.discrepancy.families import against_members, worth
+from tractexp.discrepancy.disagreement import Disagreement, examine_base_fit, examine_fit
+from tractexp.discrepancy.families import compare_members, is_worth
 from tractexp.discrepancy.ranking import MOST_NAMED
-from tractexp.discrepancy.window_search import behind_window
+from tractexp.discrepancy.window_search import replace_faults_by_window
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.context import Context
-from tractexp.inference.cores import each_apart
+from tractexp.inference.cores import map_on_cores
 from tractexp.inference.fit_effort import (
     BOX_APART,
     BOX_POINTS,
@@ -29,18 +29,18 @@ from tractexp.inference.fitting import (
     Names,
     Refit,
     Start,
-    best_of,
     key_by_names,
     leave_each_out,
-    no_worse_than_subsets,
-    off_bounds,
+    move_off_bounds,
     refit,
     refit_from,
-    rough_refit,
+    refit_roughly,
+    refit_worse_than_subsets,
+    select_best_fits,
 )
 from tractexp.inference.multistart import DISTINCT
 from tractexp.inference.score_test import Score
-from tractexp.inference.wide_fit import wide_refits
+from tractexp.inference.wide_fit import refit_sets_widely
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct, spread_evenly
 
@@ -82,7 +82,7 @@ class Explanations:
         return self.last.faults
 
 
-def explanations(
+def find_explanations(
     base: BaseFit, first: Disagreement, seed: int, window_settled: bool = False
 ) -> Explanations:
     """Add effects one by one as long as the best one helps more than chance, searching all sets of
@@ -92,32 +92,34 @@ def explanations(
     """
     steps = [first]
     refits: dict[Names, Refit] = {(): first.fit}
-    while steps[-1].asks_for_more and worth_another(steps) and len(steps) < MOST_STEPS:
+    while steps[-1].asks_for_more and is_worth_another(steps) and len(steps) < MOST_STEPS:
         size = len(steps[-1].fit.names) + 1
-        ground = beneath(first, steps[-1].fit) if size > 1 else first
+        ground = examine_beneath(first, steps[-1].fit) if size > 1 else first
         fits = search_effect_sets([ground, *steps[1:]], refits, size, base.context.effort.say)
         refits |= key_by_names(fits)
         if not window_settled and (
-            behind := behind_window(base, first.fit, fits[0], steps[-1].noise, seed)
+            behind := replace_faults_by_window(base, first.fit, fits[0], steps[-1].noise, seed)
         ):
-            return explanations(behind, disagreement(behind, seed), seed, window_settled=True)
-        tests = sufficient(base, fits, steps[-1].noise, seed + size)
+            return find_explanations(
+                behind, examine_base_fit(behind, seed), seed, window_settled=True
+            )
+        tests = find_sufficient(base, fits, steps[-1].noise, seed + size)
         if size == 1:
-            if wider := searched_widely(base, first, refits, tests):
+            if wider := search_widely(base, first, refits, tests):
                 refits |= key_by_names(wider)
-                fits = best_of(f for f in refits.values() if f.names)
-                tests = sufficient(base, fits, first.noise, seed + size)
-            tests = with_families(base, tests, refits, seed)
+                fits = select_best_fits(f for f in refits.values() if f.names)
+                tests = find_sufficient(base, fits, first.noise, seed + size)
+            tests = try_families(base, tests, refits, seed)
         else:
-            tests = without_needless(base, tests, refits, seed + size)
+            tests = drop_needless(base, tests, refits, seed + size)
         steps.append(tests)
     if len(steps) == 1:
-        tests = with_families(base, first, refits, seed)
+        tests = try_families(base, first, refits, seed)
         steps += [tests] if tests is not first else []
     return Explanations(base, tuple(steps), refits)
 
 
-def worth_another(steps: Sequence[Disagreement]) -> bool:
+def is_worth_another(steps: Sequence[Disagreement]) -> bool:
     """Whether one more effect is tried beside those of the last tests; not where one led back to
     the same set.
     """
@@ -125,7 +127,7 @@ def worth_another(steps: Sequence[Disagreement]) -> bool:
     return len(steps[-1].fit.names) < MOST_NAMED and not same
 
 
-def without_needless(
+def drop_needless(
     base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int
 ) -> Disagreement:
     """The tests with an effect less, where its size at the null costs no more than a further name
@@ -139,13 +141,13 @@ def without_needless(
     if len(fit.names) < 2:
         return tests
     fewer = refit(context, tests.noise, leave_each_out(context, fit))[0]
-    if worth(fit, fewer, context.criteria.further_name_p):
+    if is_worth(fit, fewer, context.criteria.further_name_p):
         return tests
     refits[fewer.names] = fewer
-    return without_needless(base, examine_fit(base.quiet, fewer, tests.noise, seed), refits, seed)
+    return drop_needless(base, examine_fit(base.quiet, fewer, tests.noise, seed), refits, seed)
 
 
-def with_families(
+def try_families(
     base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int
 ) -> Disagreement:
     """The tests at a member of a family that leaves nothing and explains more than these; else
@@ -156,7 +158,7 @@ def with_families(
     """
     if not base.context.domain.calibrated or not base.context.criteria.further_name_p:
         return tests
-    tests, fits = against_members(base, tests, refits, seed + FAMILY_SEED_OFFSET)
+    tests, fits = compare_members(base, tests, refits, seed + FAMILY_SEED_OFFSET)
     refits |= key_by_names(fits)
     return tests
 
@@ -169,27 +171,29 @@ def search_effect_sets(
     """
     context = steps[0].context
     noise = steps[-1].noise
-    if not (wanted := shortlist(steps, size)):
+    if not (wanted := shortlist_sets(steps, size)):
         return []
     one, many = ("effect", "effects") if size == 1 else (f"set of {size}", f"sets of {size}")
     say(f"refitting {len(wanted)} {one if len(wanted) == 1 else many}")
-    fits = refit_sets(context, noise, [s for n in wanted for s in starts(steps, refits, n)])
+    fits = refit_sets(context, noise, [s for n in wanted for s in list_starts(steps, refits, n)])
     if size == 1:
-        boxes = each_apart(lambda fit: in_the_box(context, fit), fits, context.effort)
-        fits = best_of([*fits, *refit_sets(context, noise, list(itertools.chain(*boxes)))])
-    return best_of(no_worse_than_subsets(context, noise, {**refits, **key_by_names(fits)}, fits))
+        boxes = map_on_cores(lambda fit: start_all_over(context, fit), fits, context.effort)
+        fits = select_best_fits([*fits, *refit_sets(context, noise, list(itertools.chain(*boxes)))])
+    return select_best_fits(
+        refit_worse_than_subsets(context, noise, {**refits, **key_by_names(fits)}, fits)
+    )
 
 
 def refit_sets(context: Context, noise: Noise, begin: Sequence[Start]) -> list[Refit]:
     """The sets of these starts refitted, those near the best exactly; the best first."""
-    fits = rough_refit(context, noise, begin)
+    fits = refit_roughly(context, noise, begin)
     # the best itself is near, though it diverges and its cost is infinite
     near = [f for f in fits if f.cost <= fits[0].cost + NEAR_BEST]
     exact = key_by_names(refit(context, noise, [f.start for f in near]))
     return [exact.get(f.names, f) for f in fits]
 
 
-def beneath(first: Disagreement, fit: Refit) -> Disagreement:
+def examine_beneath(first: Disagreement, fit: Refit) -> Disagreement:
     """The tests of the base model at the local minimum of a fit with an effect, where its best fit
     is another.
     """
@@ -200,7 +204,7 @@ def beneath(first: Disagreement, fit: Refit) -> Disagreement:
     return first.score_fit(context, bare, first.noise) if away > DISTINCT else first
 
 
-def searched_widely(
+def search_widely(
     base: BaseFit, first: Disagreement, refits: Refits, best: Disagreement
 ) -> list[Refit]:
     """Single effects that have thresholds or times, searched from all their settings.
@@ -210,25 +214,27 @@ def searched_widely(
     if best.suffices:
         return []
     context = base.context
-    singles: Refits = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
-    fits = wide_refits(context, first.noise, wide_starts(context, refits[()].unit, singles), WIDELY)
+    singles: Refits = {f.names: f for f in select_best_fits(refits.values()) if len(f.names) == 1}
+    fits = refit_sets_widely(
+        context, first.noise, list_wide_starts(context, refits[()].unit, singles), WIDELY
+    )
     return [f for f in fits if f.deviance < singles[f.names].deviance - NESTED_TOLERANCE]
 
 
-def wide_starts(context: Context, bare: np.ndarray, refits: Refits) -> list[list[Start]]:
+def list_wide_starts(context: Context, bare: np.ndarray, refits: Refits) -> list[list[Start]]:
     """Starts for each single effect that has thresholds or times: its fit, and all settings beside
     the base model.
     """
     singles = [f for f in refits.values() if len(f.names) == 1]
     unlike = [f for f in singles if len(context.catalogue[f.names[0]].settings) > 1]
-    grounds = bare, *off_bounds(context, bare)
+    grounds = bare, *move_off_bounds(context, bare)
     return [
-        [f.start, *(s for unit in grounds for s in _every_setting(context, f, unit))]
+        [f.start, *(s for unit in grounds for s in _list_every_setting(context, f, unit))]
         for f in unlike
     ]
 
 
-def _every_setting(context: Context, fit: Refit, unit: np.ndarray) -> list[Start]:
+def _list_every_setting(context: Context, fit: Refit, unit: np.ndarray) -> list[Start]:
     """Starts for a single effect at coordinates (D,): of the size that it was fitted with, at all
     its settings.
     """
@@ -241,7 +247,9 @@ def _every_setting(context: Context, fit: Refit, unit: np.ndarray) -> list[Start
     ]
 
 
-def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) -> Disagreement:
+def find_sufficient(
+    base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int
+) -> Disagreement:
     """The tests at the best fit, or at the first of those close to it that asks for no further
     effect where it does.
 
@@ -258,7 +266,7 @@ def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) 
     return best
 
 
-def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
+def shortlist_sets(steps: Sequence[Disagreement], size: int) -> list[Names]:
     """The sets of `size` effects that lower the linearized deviance most.
 
     They begin at the base fit and at sets that have one effect less; of more effects than are
@@ -272,7 +280,7 @@ def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
         sets[tuple(sorted((*last.fit.names, score.name)))] = last.fit.deviance - score.drop
     if 1 < size <= MOST_NAMED:
         names = [s.name for s in first.scores if s.drop > 0][:COMBINED]
-        columns = {s.name: _column(first, s) for s in first.scores}
+        columns = {s.name: _find_column(first, s) for s in first.scores}
         for subset in itertools.combinations(sorted(names), size):
             block = np.concatenate([columns[n] for n in subset])
             side = block @ first.projection.r[0]
@@ -281,7 +289,7 @@ def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
     return sorted(sets, key=lambda s: (sets[s], s))[: SHORTLIST[size]]
 
 
-def _column(at: Disagreement, score: Score) -> np.ndarray:
+def _find_column(at: Disagreement, score: Score) -> np.ndarray:
     """The projected column of a candidate at its best setting."""
     pairs = zip(at.tangent.columns, at.projection.blocks, strict=True)
     return next(
@@ -289,7 +297,7 @@ def _column(at: Disagreement, score: Score) -> np.ndarray:
     )
 
 
-def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[Start]:
+def list_starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[Start]:
     """Starts for one set: each subset's fit with the others at their one-step size, at their best
     two settings. Members of families, which have no column, begin where they were fitted.
     """
@@ -312,7 +320,7 @@ def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[
     return begin
 
 
-def in_the_box(context: Context, fit: Refit) -> list[Start]:
+def start_all_over(context: Context, fit: Refit) -> list[Start]:
     """Starts of one effect from all over the base model's box, by one simulation each: the effect
     as it was fitted, but of relevant size.
 

@@ -19,8 +19,8 @@ from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.catalogue import Candidate
 from tractexp.inference.context import Context
 from tractexp.inference.fit_effort import NEAR_BEST
-from tractexp.inference.fitting import Names, Refit, Start, off_bounds
-from tractexp.inference.wide_fit import wide_refits
+from tractexp.inference.fitting import Names, Refit, Start, move_off_bounds
+from tractexp.inference.wide_fit import refit_sets_widely
 from tractexp.noise import Noise
 
 NEAREST = 4  # members that are searched to the end
@@ -28,7 +28,7 @@ EXAMINED = 3  # members whose remainder is tested
 BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value starts
 
 
-def against_members(
+def compare_members(
     base: BaseFit, tests: Disagreement, refits: Mapping[Names, Refit], seed: int
 ) -> tuple[Disagreement, list[Refit]]:
     """The tests at the best member that leaves nothing and takes the place of the best textbook
@@ -41,10 +41,10 @@ def against_members(
         return tests, []
     context = base.context
     noise = tests.noise
-    fits = member_fits(context, noise, refits, {m.effect.family for m in context.catalogue.members})
+    fits = fit_members(context, noise, refits, {m.effect.family for m in context.catalogue.members})
     for k, fit in enumerate(fits[:EXAMINED]):
         near = not tests.suffices and fit.cost < tests.fit.cost + NEAR_BEST
-        if not near and not worth(fit, tests.fit, context.criteria.further_name_p):
+        if not near and not is_worth(fit, tests.fit, context.criteria.further_name_p):
             continue
         there = examine_fit(base.quiet, fit, noise, seed + k)
         if there.suffices:
@@ -52,7 +52,7 @@ def against_members(
     return tests, fits if tests.suffices else []
 
 
-def member_fits(
+def fit_members(
     context: Context, noise: Noise, refits: Mapping[Names, Refit], families: Container[str]
 ) -> list[Refit]:
     """Members of some families, the nearest of them searched to the end; the best first."""
@@ -60,11 +60,11 @@ def member_fits(
     if not members or not context.domain.calibrated:
         return []
     context.effort.say(f"trying {len(members)} other places and laws")
-    wanted = [starts(context, member, refits) for member in members]
-    return wide_refits(context, noise, wanted, NEAREST, refits.values())
+    wanted = [list_member_starts(context, member, refits) for member in members]
+    return refit_sets_widely(context, noise, wanted, NEAREST, refits.values())
 
 
-def worth(larger: Refit, other: Refit, p: float) -> bool:
+def is_worth(larger: Refit, other: Refit, p: float) -> bool:
     """Whether a set or member explains more than another by more than its further parameters
     cost.
     """
@@ -73,7 +73,9 @@ def worth(larger: Refit, other: Refit, p: float) -> bool:
     return gained > 0 and float(chdtrc(further, gained)) < p
 
 
-def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
+def list_member_starts(
+    context: Context, member: Candidate, refits: Mapping[Names, Refit]
+) -> list[Start]:
     """Starts of a member: from the textbook's fit, with every setting that it leaves open and its
     size told whole or shared, and where the member does not nest that, from the base model's with
     every setting, since the textbook's fit may have gone astray.
@@ -94,7 +96,7 @@ def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -
             ),
         ]
     if textbook is None or not effect.nests_textbook:
-        begun += [(unit, {}) for unit in (bare, *off_bounds(context, bare))]
+        begun += [(unit, {}) for unit in (bare, *move_off_bounds(context, bare))]
     wanted = []
     for ground, textbook_values in begun:
         start = dict(textbook_values)

@@ -17,26 +17,26 @@ from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.evidence import Evidence, Verdict
 from tractexp.discrepancy.explain import explain
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.gap import GapTest, gap, share_gone
+from tractexp.discrepancy.gap import GapTest, compute_gap, share_gone
 from tractexp.discrepancy.grades import Grader
 from tractexp.discrepancy.nearest import Nearest, measure_least_error
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import (
     Overlay,
     draw_graded,
-    of_fit,
-    on_fitted,
-    on_held_out,
+    overlay_fit,
+    overlay_fitted,
+    overlay_held_out,
 )
 from tractexp.discrepancy.places import DisagreementInterval
-from tractexp.discrepancy.precision import estimates
+from tractexp.discrepancy.precision import list_estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult
 from tractexp.discrepancy.rest import Rest, find_shapes, share_of
-from tractexp.identification.conclude import at_bound
+from tractexp.identification.conclude import list_at_bound
 from tractexp.identification.grade import GradedModel
 from tractexp.identification.unrecorded_course import find_course
 from tractexp.identification.unrecorded_input import list_unrecorded_inputs
-from tractexp.identification.verdict import UNIDENTIFIED, size
+from tractexp.identification.verdict import UNIDENTIFIED, choose_scale
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
@@ -169,7 +169,9 @@ class Findings:
         units = [row.held_out_prediction.unit for row in (self.evidence.base, chosen)]
         left = there.residual(units[1], chosen.fit.names)
         noise = QuietNoise.from_context(there, units[1]).estimate_noise(units[1], left)
-        return gap(there, units[0], units[1], chosen.fit.names, noise, there.coordinates.before)
+        return compute_gap(
+            there, units[0], units[1], chosen.fit.names, noise, there.coordinates.before
+        )
 
     @functools.cached_property
     def undetermined_values(self) -> dict[str, float]:
@@ -181,7 +183,8 @@ class Findings:
         return {
             e.parameter.name: e.value
             for e in self.final_estimates
-            if e.verdict.startswith(UNIDENTIFIED) or e.half > size(e.value, *e.parameter.bounds) / 2
+            if e.verdict.startswith(UNIDENTIFIED)
+            or e.half > choose_scale(e.value, *e.parameter.bounds) / 2
         }
 
     @property
@@ -194,7 +197,7 @@ class Findings:
         values = self._final_values
         told = [
             f"{name} rests on its bound, {values[name]:.4g}"
-            for name in at_bound(graded.problem, graded.values)
+            for name in list_at_bound(graded.problem, graded.values)
             if name in own and is_end_of_range(own[name], values[name])
         ]
         unknown = {
@@ -289,7 +292,7 @@ class Findings:
     @functools.cached_property
     def final_estimates(self) -> list[ParameterEstimate]:
         """The parameters of the model that the investigation ends with."""
-        return estimates(self.tests, self.extended_fit.unit, self.names)
+        return list_estimates(self.tests, self.extended_fit.unit, self.names)
 
     @functools.cached_property
     def overlays(self) -> list[Overlay]:
@@ -297,8 +300,8 @@ class Findings:
         near = self.nearest
         extended = bool(self.names)
         return [
-            *on_fitted(self.context, self.train, near, self.places, extended=extended),
-            *on_held_out(self.context, self.withheld, self.validate, self.bare, near),
+            *overlay_fitted(self.context, self.train, near, self.places, extended=extended),
+            *overlay_held_out(self.context, self.withheld, self.validate, self.bare, near),
         ]
 
     @property
@@ -343,7 +346,7 @@ class Findings:
         if not self.names:
             alone.append([replace(overlay, nearest=None) for overlay in self.overlays])
             if self.by_likelihood is not self.evidence:
-                alone.append(of_fit(self.context, self.by_likelihood.base.fit, noise))
+                alone.append(overlay_fit(self.context, self.by_likelihood.base.fit, noise))
         of_base = [find_shapes(overlays, noise, level) for overlays in alone]
         return Rest(of_best, max(of_base, key=share_of, default=[]))
 

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from tractexp.discrepancy.findings import Findings
-from tractexp.discrepancy.precision import covariance
-from tractexp.inference.interval import interval_factor
+from tractexp.discrepancy.precision import compute_covariance
+from tractexp.inference.interval import compute_interval_factor
 from tractexp.model.parts import Curve, Effect
 
 CATALOGUE, OTHER = "catalogue", "other"
 SLOPE_STEP = 0.05  # of a standard error: the step by which a curve's slopes are taken
 
 
-def forms(findings: Findings) -> list[tuple[str, dict[str, Any]]]:
+def describe_forms(findings: Findings) -> list[tuple[str, dict[str, Any]]]:
     """The catalogue's name of each effect of the verdict, and its form as `discrepancy.json` has
     it: of the member of its family that is in the model.
     """
@@ -30,13 +30,13 @@ def forms(findings: Findings) -> list[tuple[str, dict[str, Any]]]:
             "law": OTHER if effect.family else CATALOGUE,
             "differs": effect.differs,
             "effect": effect.name,
-            "curve": _curve(findings, effect),
+            "curve": _describe_curve(findings, effect),
         }
         rows.append((at.family(name), form))
     return rows
 
 
-def by_name(forms: Sequence[tuple[str, dict[str, Any]]]) -> dict[str, dict[str, Any]]:
+def key_forms(forms: Sequence[tuple[str, dict[str, Any]]]) -> dict[str, dict[str, Any]]:
     """Forms by the catalogue's names; a second one of a family by its own."""
     rows: dict[str, dict[str, Any]] = {}
     for name, form in forms:
@@ -44,7 +44,7 @@ def by_name(forms: Sequence[tuple[str, dict[str, Any]]]) -> dict[str, dict[str, 
     return rows
 
 
-def _curve(findings: Findings, effect: Effect) -> dict[str, Any] | None:
+def _describe_curve(findings: Findings, effect: Effect) -> dict[str, Any] | None:
     """The law found with its 95 % band, by the slopes of the curve along the parameters, and the
     textbook law that fits best; None of what is no curve.
     """
@@ -53,12 +53,12 @@ def _curve(findings: Findings, effect: Effect) -> dict[str, Any] | None:
     curve = effect.curve(**values)
     if curve is None:
         return None
-    names, spread = covariance(tests, list(values))
+    names, spread = compute_covariance(tests, list(values))
     free = [k for k in range(len(names)) if spread[k, k] > 0]
-    J = np.array([_slope(effect, values, names[k], spread[k, k] ** 0.5) for k in free]).reshape(
-        -1, len(curve.y)
-    )
-    half = interval_factor(tests.freedom) * np.sqrt(
+    J = np.array(
+        [_differentiate_curve(effect, values, names[k], spread[k, k] ** 0.5) for k in free]
+    ).reshape(-1, len(curve.y))
+    half = compute_interval_factor(tests.freedom) * np.sqrt(
         np.einsum("kn,kl,ln->n", J, spread[np.ix_(free, free)], J)
     )
     return {
@@ -72,7 +72,9 @@ def _curve(findings: Findings, effect: Effect) -> dict[str, Any] | None:
     }
 
 
-def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float) -> np.ndarray:
+def _differentiate_curve(
+    effect: Effect, values: Mapping[str, float], name: str, error: float
+) -> np.ndarray:
     """How the curve (n,) moves with one parameter."""
     h = SLOPE_STEP * error
     up, down = (effect.curve(**{**values, name: values[name] + side * h}) for side in (1, -1))

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.inference.context import Context
-from tractexp.inference.differences import two_sided
-from tractexp.inference.injection import PUSHES, perturbations
+from tractexp.inference.differences import step_both_ways
+from tractexp.inference.injection import PUSHES, inject_perturbations
 from tractexp.inference.linearization import find_active_bounds
 from tractexp.inference.model_error import Change, Misfit
 from tractexp.noise import Noise
@@ -109,7 +109,9 @@ def share_gone(factor: float) -> float:
     return 1 - 1 / factor**2
 
 
-def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] = ()) -> Curves:
+def compute_curves(
+    context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] = ()
+) -> Curves:
     """What a fit with the named effects leaves; beyond all measure where it has no steady state."""
     residual = context.residuals(unit[None], names)
     white = context.whiten(noise, residual)[0]
@@ -124,7 +126,7 @@ def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str
     return Curves(**vars(misfit), calculated=calculated, deviance=deviance, chi2_per_sample=chi2)
 
 
-def gap(
+def compute_gap(
     context: Context,
     base: np.ndarray,
     extended: np.ndarray,
@@ -157,14 +159,14 @@ def gap(
     -------
     GapTest
     """
-    before = curves(context, base, noise, without)
-    after = curves(context, extended, noise, names)
+    before = compute_curves(context, base, noise, without)
+    after = compute_curves(context, extended, noise, names)
     gained = before.deviance - after.deviance
     left = np.inf
     if np.isfinite(after.deviance):
         if changes is None:
             changes = compute_pushed_changes(context, extended, names, noise)
-        left = beyond_chance(context, extended, names, noise, fitted, changes)
+        left = compute_gain_beyond_chance(context, extended, names, noise, fitted, changes)
     apart = (after.calculated - before.calculated)[None] * context.valid
     rows = np.nan_to_num(context.whiten(noise, apart)[0], nan=np.inf).reshape(
         context.drive.channels, -1
@@ -192,11 +194,11 @@ def compute_pushed_changes(
     """The changes (c, C N), whitened, that perturbations of all balances in all windows make at
     coordinates (D,).
     """
-    points, _ = perturbations(context, unit)
+    points, _ = inject_perturbations(context, unit)
     return context.whiten(noise, context.changes(unit, points, names, [PUSHES] * len(points)))
 
 
-def beyond_chance(
+def compute_gain_beyond_chance(
     context: Context,
     unit: np.ndarray,
     names: Sequence[str],
@@ -227,7 +229,7 @@ def beyond_chance(
     -------
     float
     """
-    raw = context.residuals(np.concatenate([unit[None], two_sided(unit, fitted)[0]]), names)
+    raw = context.residuals(np.concatenate([unit[None], step_both_ways(unit, fitted)[0]]), names)
     rows = np.nan_to_num(context.whiten(noise, raw))
     r = rows[0]
     k = len(fitted)

@@ -10,7 +10,13 @@ from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.decide import find_adequate, needs_all_events
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.gap import SHOWN, GapTest, beyond_chance, compute_pushed_changes, gap
+from tractexp.discrepancy.gap import (
+    SHOWN,
+    GapTest,
+    compute_gain_beyond_chance,
+    compute_gap,
+    compute_pushed_changes,
+)
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import (
     Names,
@@ -20,7 +26,7 @@ from tractexp.inference.fitting import (
     refit,
     refit_from,
 )
-from tractexp.inference.noise_in_quiet import QuietNoise, white
+from tractexp.inference.noise_in_quiet import QuietNoise, assume_white_noise
 from tractexp.noise import Noise
 from tractexp.record import Event
 from tractexp.text.wording import count_noun
@@ -165,7 +171,7 @@ def measure_open_gain(both: AllEvents) -> float:
     """
     there, (unit,), noise = carry_fits(both.fitted, both.events, [both.bare])
     changes = compute_pushed_changes(there, unit, (), noise)
-    return beyond_chance(there, unit, (), noise, there.coordinates.before, changes)
+    return compute_gain_beyond_chance(there, unit, (), noise, there.coordinates.before, changes)
 
 
 def compare_on(
@@ -177,7 +183,7 @@ def compare_on(
     other, units, noise = carry_fits(context, events, [bare, *extended])
     before = other.coordinates.before
     return {
-        fit.names: gap(other, units[0], unit, fit.names, noise, before, bare.names)
+        fit.names: compute_gap(other, units[0], unit, fit.names, noise, before, bare.names)
         for fit, unit in zip(extended, units[1:], strict=True)
     }
 
@@ -193,8 +199,10 @@ def carry_fits(
     """
     other = context.move_to_events(events)
     at = other.coordinates.at_measured_power
-    units = [fit_initial_power(other, at(fit.unit), white(other), fit.names) for fit in fits]
-    noise = white(other)
+    units = [
+        fit_initial_power(other, at(fit.unit), assume_white_noise(other), fit.names) for fit in fits
+    ]
+    noise = assume_white_noise(other)
     for unit, fit in zip(reversed(units), reversed(fits), strict=True):
         if np.isfinite(left := other.residual(unit, fit.names)).all():
             noise = QuietNoise.from_context(other, unit).estimate_noise(unit, left)

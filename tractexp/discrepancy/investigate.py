@@ -14,24 +14,24 @@ from tractexp.discrepancy.decide import (
     decide,
     shows_more,
 )
-from tractexp.discrepancy.disagreement import disagreement
+from tractexp.discrepancy.disagreement import examine_base_fit
 from tractexp.discrepancy.evidence import Evidence, Verdict
 from tractexp.discrepancy.explain import choose_next_event
-from tractexp.discrepancy.explanations import Explanations, explanations
+from tractexp.discrepancy.explanations import Explanations, find_explanations
 from tractexp.discrepancy.findings import Findings
-from tractexp.discrepancy.gap import GapTest, gap
+from tractexp.discrepancy.gap import GapTest, compute_gap
 from tractexp.discrepancy.grades import Grader
 from tractexp.discrepancy.held_out import judge_held_out
 from tractexp.discrepancy.nearest import find_nearest_sets
-from tractexp.discrepancy.places import places
+from tractexp.discrepancy.places import find_disagreement_intervals
 from tractexp.discrepancy.prediction import predict_held_out
 from tractexp.discrepancy.proposal.propose import ProposalResult, propose
 from tractexp.discrepancy.replication import replicate
 from tractexp.discrepancy.rival_sets import compare_rivals
-from tractexp.discrepancy.window_search import behind_recorder
+from tractexp.discrepancy.window_search import search_recorder_window
 from tractexp.domain import domain_of
-from tractexp.inference.base_fit import BaseFit, base_fit
-from tractexp.inference.catalogue import catalogue
+from tractexp.inference.base_fit import BaseFit, fit_base_model
+from tractexp.inference.catalogue import build_catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
@@ -100,7 +100,7 @@ def investigate(
     check_events(train, validate)
 
     def findings_of(train: Sequence[Event], validate: Sequence[Event]) -> Findings:
-        missing = catalogue(model, train, only)
+        missing = build_catalogue(model, train, only)
         some = len(missing.candidates)
         others = len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
@@ -127,11 +127,11 @@ def investigate(
             shown,
             search,
         )
-        findings = _findings(base_fit(context), validate, seed, grader)
+        findings = _take_steps(fit_base_model(context), validate, seed, grader)
         if context.kernels.too_coarse(findings.base_values):
             effort.say("the fits lie where the motor is fast: again with shorter steps")
             finer = Context.from_records(*given, context.kernels.box_substeps, priors=priors)
-            findings = _findings(base_fit(finer), validate, seed, grader)
+            findings = _take_steps(fit_base_model(finer), validate, seed, grader)
         return findings
 
     with Effort(tell).tell_when_silent() as effort:
@@ -144,13 +144,13 @@ def investigate(
                 if of_all.closes_share
                 else findings
             )
-        return replace(findings, proposed=_proposal(findings))
+        return replace(findings, proposed=_find_proposal(findings))
 
 
-def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grader) -> Findings:
+def _take_steps(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grader) -> Findings:
     """The investigation from the base model's fit to the verdict."""
-    base, first = behind_recorder(base, disagreement(base, seed), seed)
-    explained = explanations(base, first, seed)
+    base, first = search_recorder_window(base, examine_base_fit(base, seed), seed)
+    explained = find_explanations(base, first, seed)
     criteria = explained.last.criteria
     evidence = compare_rivals(explained, seed)
     evidence = by_likelihood = judge_held_out(evidence, explained, validate, seed)
@@ -184,13 +184,13 @@ def _conclude(
     assert tests is not None
     return Findings(
         base=explained.base,
-        places=() if verdict.word == NONE else tuple(places(tests)),
+        places=() if verdict.word == NONE else tuple(find_disagreement_intervals(tests)),
         explanations=explained,
         by_likelihood=by_likelihood,
         evidence=evidence,
         verdict=verdict,
         nearest=find_nearest_sets(verdict, evidence, validate),
-        train=_gap(tests.context, evidence, verdict),
+        train=_compute_gap(tests.context, evidence, verdict),
         withheld=tuple(validate),
         grader=grader,
         tie_breaker=choose_next_event(verdict, evidence, explained.base.context),
@@ -215,7 +215,7 @@ def _complete_row(findings: Findings, validate: Sequence[Event]) -> Findings:
     return replace(findings, evidence=evidence, verdict=decide(evidence, findings.context.criteria))
 
 
-def _proposal(findings: Findings) -> ProposalResult:
+def _find_proposal(findings: Findings) -> ProposalResult:
     """The term that an unexplained disagreement asks for."""
     base = findings.base
     explained = findings.explanations
@@ -234,7 +234,7 @@ def _proposal(findings: Findings) -> ProposalResult:
     )
 
 
-def _gap(context: Context, evidence: Evidence, verdict: Verdict) -> GapTest:
+def _compute_gap(context: Context, evidence: Evidence, verdict: Verdict) -> GapTest:
     """The gap on the fitted events before and after."""
     at = context.coordinates
     chosen = verdict.chosen
@@ -243,4 +243,4 @@ def _gap(context: Context, evidence: Evidence, verdict: Verdict) -> GapTest:
     tests = (chosen and chosen.tests) or evidence.last
     assert tests is not None
     fitted = [*at.base, *at.before, *at.parameters(verdict.names)]
-    return gap(context, base.unit, after.unit, after.names, tests.noise, fitted)
+    return compute_gap(context, base.unit, after.unit, after.names, tests.noise, fitted)

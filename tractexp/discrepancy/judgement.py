@@ -29,7 +29,7 @@ class Judgement:
     score: Score | None = None
 
 
-def judgements(investigation: Findings) -> list[Judgement]:
+def judge_effects(investigation: Findings) -> list[Judgement]:
     """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the
     chosen model.
     """
@@ -56,12 +56,12 @@ def judgements(investigation: Findings) -> list[Judgement]:
                 Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise")
             )
         else:
-            status, why = assessment(candidate, score, critical)
+            status, why = assess_effect(candidate, score, critical)
             judged_effects.append(Judgement(name, status, f"{beside}{why}", score))
     return sorted(judged_effects, key=lambda j: j.name)
 
 
-def assessment(candidate: Candidate, score: Score, critical: float) -> tuple[str, str]:
+def assess_effect(candidate: Candidate, score: Score, critical: float) -> tuple[str, str]:
     """Status and reason of an effect outside the chosen model."""
     main = candidate.sizes[0]
     unit = "" if main.unit == "1" else f" {main.unit}"

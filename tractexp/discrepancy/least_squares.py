@@ -13,18 +13,18 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.inference.blocks import blocks_of
-from tractexp.inference.chance import chance_at
+from tractexp.inference.blocks import cut_blocks
+from tractexp.inference.chance import draw_chance
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
-from tractexp.inference.linearization import rich_residuals, tangent
+from tractexp.inference.linearization import linearize_fit, remove_explained
 from tractexp.inference.noise_in_quiet import QuietNoise
-from tractexp.inference.sandwich import moves_without_blocks, robust_root
+from tractexp.inference.sandwich import compute_moves_without_blocks, compute_robust_root
 from tractexp.inference.score_test import ScoreTest
 from tractexp.noise import Noise
 
 
-def residual_noise(context: Context, fit: Refit) -> Noise:
+def estimate_residual_noise(context: Context, fit: Refit) -> Noise:
     """White noise as loud as what a fit leaves, alike in each channel.
 
     Under it the deviance is the sum of squares by which names are judged.
@@ -34,23 +34,23 @@ def residual_noise(context: Context, fit: Refit) -> Noise:
     return Noise(Noise.white(*[level] * len(residual)).pairs, np.eye(len(residual)))
 
 
-def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:
+def examine_least_squares(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:
     """All tests at a fit by least squares, under the noise that it shows where little happens, and
     a covariance of its parameters that holds where what it leaves is no noise. It was fitted under
-    `noise`, that of `residual_noise`.
+    `noise`, that of `estimate_residual_noise`.
     """
     quiet = replace(quiet, context=quiet.context.with_measured_power)
-    t = tangent(quiet.context, fit, noise)
-    root = _robust(quiet.context, t.build_score_test(noise))
+    t = linearize_fit(quiet.context, fit, noise)
+    root = _compute_robust_rows(quiet.context, t.build_score_test(noise))
     own = quiet.estimate_noise(
-        fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining_columns
+        fit.unit, remove_explained(t, t.residual[None])[0], t.residual, t.explaining_columns
     )
     projection = t.build_score_test(own)
-    chance = chance_at(t, projection, own, quiet, seed, plain=True)
+    chance = draw_chance(t, projection, own, quiet, seed, plain=True)
     return Disagreement(fit, own, t, projection, chance, root)
 
 
-def _robust(context: Context, projection: ScoreTest) -> np.ndarray:
+def _compute_robust_rows(context: Context, projection: ScoreTest) -> np.ndarray:
     """Rows (k, d) whose inverse products are the covariance of all that is free, from blocks left
     out in turn.
     """
@@ -59,5 +59,5 @@ def _robust(context: Context, projection: ScoreTest) -> np.ndarray:
     measured = context.drive.measurements
     columns = J[: measured.size].reshape(*measured.shape, -1)
     rows = r[: measured.size].reshape(measured.shape)
-    blocks = blocks_of(context.events, context.drive, J.shape[1])
-    return robust_root(J, moves_without_blocks(columns, rows, blocks, J.T @ J))[0]
+    blocks = cut_blocks(context.events, context.drive, J.shape[1])
+    return compute_robust_root(J, compute_moves_without_blocks(columns, rows, blocks, J.T @ J))[0]

@@ -9,7 +9,7 @@ from tractexp.discrepancy.decide import (
     UNEXPLAINED,
 )
 from tractexp.discrepancy.evidence import Evidence, SetEvidence, Verdict
-from tractexp.discrepancy.gap import Curves, curves
+from tractexp.discrepancy.gap import Curves, compute_curves
 from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.ranking import (
     find_nearest,
@@ -61,7 +61,9 @@ def find_nearest_sets(
     if verdict.word != UNEXPLAINED or not rows or not rows[0].fit.names or is_base:
         return None
     fits = [evidence.base.fit, *(row.fit for row in rows)]
-    before, *after = (curves(context, fit.unit, evidence.last.noise, fit.names) for fit in fits)
+    before, *after = (
+        compute_curves(context, fit.unit, evidence.last.noise, fit.names) for fit in fits
+    )
     there = _carry_curves(context, validate, fits[:2]) if validate else None
     others = [
         (row.fit.names, Change(before, one).closed_share)
@@ -77,7 +79,10 @@ def _carry_curves(
     state there.
     """
     other, units, noise = carry_fits(context, validate, fits)
-    pair = curves(other, units[0], noise), curves(other, units[1], noise, fits[1].names)
+    pair = (
+        compute_curves(other, units[0], noise),
+        compute_curves(other, units[1], noise, fits[1].names),
+    )
     return Change(*pair) if np.isfinite([one.deviance for one in pair]).all() else None
 
 
@@ -95,4 +100,6 @@ def _measure_error(row: SetEvidence, noise: Noise, context: Context) -> float:
         return row.prediction.error
     if row.gap is not None:
         return row.gap.after.error.certain
-    return curves(context, row.reported_fit.unit, noise, row.reported_fit.names).error.certain
+    return compute_curves(
+        context, row.reported_fit.unit, noise, row.reported_fit.names
+    ).error.certain

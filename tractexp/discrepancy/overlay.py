@@ -9,7 +9,7 @@ from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.nearest import Nearest
 from tractexp.discrepancy.places import DisagreementInterval
-from tractexp.discrepancy.remainder import Remainder, remainders
+from tractexp.discrepancy.remainder import Remainder, find_remainders
 from tractexp.domain import domain_of
 from tractexp.identification.grade import GradedModel
 from tractexp.inference.context import Context
@@ -57,7 +57,7 @@ class Overlay:
         return domain_of(self.event).excitation(self.event).measurements
 
 
-def on_fitted(
+def overlay_fitted(
     context: Context,
     gap: GapTest,
     nearest: Nearest | None,
@@ -68,10 +68,12 @@ def on_fitted(
     """The fitted events; `extended` tells whether there is an extended model."""
     after = gap.after.calculated if extended else None
     near = None if nearest is None else nearest.fitted.after.calculated
-    return _each(context, gap.noise, (gap.before.calculated, after, near), places, held_out=False)
+    return _cut_events(
+        context, gap.noise, (gap.before.calculated, after, near), places, held_out=False
+    )
 
 
-def on_held_out(
+def overlay_held_out(
     context: Context,
     withheld: Sequence[Event],
     gap: GapTest | None,
@@ -85,7 +87,7 @@ def on_held_out(
         return []
     if gap is not None:
         assert gap.context is not None
-        return _each(
+        return _cut_events(
             gap.context,
             gap.noise,
             (gap.before.calculated, gap.after.calculated, None),
@@ -98,7 +100,7 @@ def on_held_out(
         other.residual(unit, fit.names) + other.drive.measurements
         for unit, fit in zip(units, fits, strict=True)
     ]
-    return _each(other, noise, (before, None, near[0] if near else None), (), held_out=True)
+    return _cut_events(other, noise, (before, None, near[0] if near else None), (), held_out=True)
 
 
 def draw_graded(
@@ -120,10 +122,10 @@ def draw_graded(
     return [draw(overlay) for overlay in overlays]
 
 
-def of_fit(context: Context, fit: Refit, noise: Noise) -> list[Overlay]:
+def overlay_fit(context: Context, fit: Refit, noise: Noise) -> list[Overlay]:
     """The fitted events by one fit alone."""
     calculated = context.residual(fit.unit, fit.names) + context.drive.measurements
-    return _each(context, noise, (calculated, None, None), (), held_out=False)
+    return _cut_events(context, noise, (calculated, None, None), (), held_out=False)
 
 
 def find_remainder(
@@ -136,10 +138,10 @@ def find_remainder(
     rest = np.concatenate(
         [np.nan_to_num(o.measurements - m) for o, m in zip(overlays, curves, strict=True)], axis=1
     )
-    return remainders(rest, [o.event for o in overlays], noise, false_alarms)
+    return find_remainders(rest, [o.event for o in overlays], noise, false_alarms)
 
 
-def _each(
+def _cut_events(
     context: Context,
     noise: Noise,
     curves: tuple[np.ndarray, np.ndarray | None, np.ndarray | None],

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.inference.goodness_of_fit import extremes
+from tractexp.inference.goodness_of_fit import find_extremes
 from tractexp.inference.residual_statistics import (
     LOUDEST,
     ResidualWindow,
+    list_residual_windows,
     measure_energies,
-    residual_windows,
 )
 
 
@@ -27,13 +27,13 @@ class DisagreementInterval:
     share: float
 
 
-def places(at: Disagreement) -> list[DisagreementInterval]:
+def find_disagreement_intervals(at: Disagreement) -> list[DisagreementInterval]:
     """Intervals that stand out at the family-wise error of `false_alarms`, adjacent ones joined,
     the largest first.
     """
     context = at.context
-    windows = residual_windows(context.problem)
-    (mean, spread), highest = extremes(at.chance.left[LOUDEST])
+    windows = list_residual_windows(context.problem)
+    (mean, spread), highest = find_extremes(at.chance.left[LOUDEST])
     excess = measure_energies(at.projection.channels(context.problem), context.problem)[0] - mean
     loud = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
     total = np.maximum(excess, 0.0).sum()

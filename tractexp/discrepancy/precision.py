@@ -10,11 +10,11 @@ from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.identification.verdict import BOUND, judge
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
-from tractexp.inference.information import Information, free_standard_errors
-from tractexp.inference.interval import ParameterEstimate, interval_factor
+from tractexp.inference.information import Information, compute_free_standard_errors
+from tractexp.inference.interval import ParameterEstimate, compute_interval_factor
 
 
-def standard_errors(tests: Disagreement) -> dict[str, float]:
+def compute_standard_errors(tests: Disagreement) -> dict[str, float]:
     """Of the base model's parameters and those of the effects in a fit, from the curvature there.
 
     A parameter that rests on its bound has none; that of one without effect at the fit is inf.
@@ -22,7 +22,7 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
     at = tests.context.coordinates
     labels = {k: name for name, k in at.column.items() if k not in tests.tangent.held}
     columns = at.nuisances(tests.fit.names)
-    spread = free_standard_errors(tests.root)
+    spread = compute_free_standard_errors(tests.root)
     return {
         labels[k]: float(s * at.width(labels[k]))
         for k, s in zip(columns, spread, strict=True)
@@ -30,7 +30,7 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
     }
 
 
-def effect_sizes(
+def estimate_effect_sizes(
     context: Context, fit: Refit, names: Sequence[str], tests: Disagreement | None
 ) -> list[ParameterEstimate]:
     """How large the named effects are in a fit; with standard errors where its
@@ -41,14 +41,14 @@ def effect_sizes(
     values = [at.value(p.name, fit.unit) for p in own]
     if tests is None:
         return [ParameterEstimate(p, value, np.nan) for p, value in zip(own, values, strict=True)]
-    errors = standard_errors(tests)
+    errors = compute_standard_errors(tests)
     return [
         ParameterEstimate(p, value, errors.get(p.name, np.nan), freedom=tests.freedom)
         for p, value in zip(own, values, strict=True)
     ]
 
 
-def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np.ndarray]:
+def compute_covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np.ndarray]:
     """Covariance (k, k) of those of the named parameters that the fit tells, and which they are."""
     at = tests.context.coordinates
     columns = at.nuisances(tests.fit.names)
@@ -59,7 +59,7 @@ def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np
     return identified, (rows @ rows.T) * np.outer(width, width)
 
 
-def estimates(
+def list_estimates(
     tests: Disagreement, unit: np.ndarray, effects: Sequence[str]
 ) -> list[ParameterEstimate]:
     """The base model's parameters and those of the named effects at coordinates (D,), as the tests
@@ -69,13 +69,13 @@ def estimates(
     """
     context = tests.context
     at = context.coordinates
-    errors = standard_errors(tests)
+    errors = compute_standard_errors(tests)
     own = context.catalogue.parameters(effects)
     declared = {p.name: p for p in (*context.problem.parameters, *own)}
     names = [*(at.names[k] for k in at.base), *(p.name for p in own)]
     seen = [n for n in names if n in errors]
     values = {n: at.value(n, unit) for n in names}
-    words = _words(tests, seen, [values[n] for n in seen], [errors[n] for n in seen])
+    words = _judge_each(tests, seen, [values[n] for n in seen], [errors[n] for n in seen])
     held = {n for n in names if at.column[n] in tests.tangent.held}
     words |= {n: f"{BOUND}: better values lie beyond it" for n in held}
     return [
@@ -86,7 +86,7 @@ def estimates(
     ]
 
 
-def _words(
+def _judge_each(
     tests: Disagreement, names: Sequence[str], values: Sequence[float], errors: Sequence[float]
 ) -> dict[str, str]:
     """The verdict of each parameter, with all other coordinates left free beside them."""
@@ -101,6 +101,6 @@ def _words(
     information = Information.from_jacobian(
         names, np.array(values), upper - lower, R[:, own], R[:, others]
     )
-    factors = np.full(len(errors), interval_factor(tests.freedom))
+    factors = np.full(len(errors), compute_interval_factor(tests.freedom))
     assessment = judge(information, lower, upper, factors * np.array(errors), factors)
     return {name: str(verdict) for name, verdict in assessment.items()}

@@ -25,25 +25,25 @@ from tractexp.discrepancy.explanations import (
     WIDELY,
     Explanations,
     Names,
+    list_starts,
+    list_wide_starts,
     refit_sets,
     search_effect_sets,
-    starts,
-    wide_starts,
 )
-from tractexp.discrepancy.families import member_fits
+from tractexp.discrepancy.families import fit_members
 from tractexp.discrepancy.grades import Grader, fit_as_graded
-from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
-from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms
-from tractexp.discrepancy.proposal.library import terms
-from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, term_fits
-from tractexp.discrepancy.proposal.screen import Ground, screen
+from tractexp.discrepancy.least_squares import estimate_residual_noise, examine_least_squares
+from tractexp.discrepancy.proposal.library import list_terms
+from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, fit_terms
+from tractexp.discrepancy.proposal.screen import ScreeningFit, screen_terms
+from tractexp.discrepancy.proposal.term_context import build_term_context, carry_over
 from tractexp.discrepancy.ranking import MOST_NAMED, find_nearest, rank_sets
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
-from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Refit, best_of, key_by_names, refit
-from tractexp.inference.model_error import block_sums, noise_variance
-from tractexp.inference.wide_fit import wide_refits
+from tractexp.inference.cores import map_on_cores
+from tractexp.inference.fitting import Refit, key_by_names, refit, select_best_fits
+from tractexp.inference.model_error import estimate_noise_variance, sum_blocks
+from tractexp.inference.wide_fit import refit_sets_widely
 from tractexp.noise import Noise
 
 MOST_TRIED_FAMILIES = 2  # single effects whose families are tried, and to which a second is added
@@ -69,7 +69,7 @@ def predict_held_out(explained: Explanations, grader: Grader, seed: int) -> Evid
     leading = find_predicting(table, criteria) or [find_nearest(table, criteria)]
 
     def test(row: SetEvidence) -> SetEvidence:
-        tests = least_squares_tests(quiet, row.fit, noise, seed)
+        tests = examine_least_squares(quiet, row.fit, noise, seed)
         return replace(row, tests=tests, p_left=tests.p_left)
 
     base = test(table.base)
@@ -89,16 +89,16 @@ def predict_errors(explained: Explanations, grader: Grader) -> Evidence | None:
     """
     plain = explained.base.context.with_measured_power
     context = plain.held_to_usual
-    noise = residual_noise(plain, explained.chosen)
+    noise = estimate_residual_noise(plain, explained.chosen)
     criteria = context.criteria
     family = context.catalogue.textbook
     bare = fit_as_graded(context, noise, grader.grade((), context.window))
     if context.prior:  # its rows stand beside what the base model leaves, as in an identification
-        noise = residual_noise(plain, bare)
+        noise = estimate_residual_noise(plain, bare)
     there = context.move_to_events(grader.validate)
 
     def fill(fits: Sequence[Refit]) -> list[SetEvidence]:
-        predicted = each_apart(functools.partial(predict, there), fits, context.effort)
+        predicted = map_on_cores(functools.partial(predict, there), fits, context.effort)
         return [
             SetEvidence(fit, fit.names, family(fit.names), prediction=one)
             for fit, one in zip(fits, predicted, strict=True)
@@ -144,7 +144,7 @@ def search_best_pairs(
     names = [name for row in singles[:BEST_SINGLES] for name in row.fit.names]
     pairs = [tuple(sorted(pair)) for pair in itertools.combinations(names, 2)]
     wanted = [pair for pair in pairs if pair not in refits]
-    begin = [start for pair in wanted for start in starts([ground], refits, pair)]
+    begin = [start for pair in wanted for start in list_starts([ground], refits, pair)]
     if not begin:
         return []
     _say(context)("refitting sets of the effects that predict best")
@@ -173,11 +173,11 @@ def _find_best_term(context: Context, table: Evidence) -> SetEvidence:
     assert noise is not None
     assert there is not None
     context.effort.say("looking for a term of the library that predicts better")
-    under = context_of_terms(context).with_measured_power.held_to_usual
-    ground = Ground.from_coordinates(
-        under, carried_over(under, context, table.base.fit.unit), noise
+    under = build_term_context(context).with_measured_power.held_to_usual
+    ground = ScreeningFit.from_coordinates(
+        under, carry_over(under, context, table.base.fit.unit), noise
     )
-    found = term_fits(ground, screen(ground, terms()), [])
+    found = fit_terms(ground, screen_terms(ground, list_terms()), [])
     best = _fit_without_faults(found.context, noise, found.fits[:MOST_JUDGED_TERMS])
     beside = found.context.move_to_records(there.records)
     rows = [SetEvidence(fit, fit.names, fit.names, prediction=predict(beside, fit)) for fit in best]
@@ -233,18 +233,18 @@ def _search_all_sets(
     refits: dict[Names, Refit] = {(): bare}
 
     def add(fits: Iterable[Refit]) -> None:
-        refits.update(key_by_names(best_of([*refits.values(), *fits])))
+        refits.update(key_by_names(select_best_fits([*refits.values(), *fits])))
 
     add(search_effect_sets([ground], refits, 1, say))
-    add(wide_refits(context, noise, wide_starts(context, bare.unit, refits), WIDELY))
+    add(refit_sets_widely(context, noise, list_wide_starts(context, bare.unit, refits), WIDELY))
     carried = sorted((f for f in explained.refits.values() if f.names), key=lambda f: f.cost)[
         :CARRIED
     ]
     if carried:
         add(refit(context, noise, [(f.names, at.at_measured_power(f.unit)) for f in carried]))
-    singles = [f for f in best_of(refits.values()) if len(f.names) == 1]
+    singles = [f for f in select_best_fits(refits.values()) if len(f.names) == 1]
     of_family = {context.catalogue.textbook(f.names)[0] for f in singles[:MOST_TRIED_FAMILIES]}
-    add(member_fits(context, noise, refits, of_family))
+    add(fit_members(context, noise, refits, of_family))
     for single in select_grounds(context.catalogue, refits.values()):
         add(search_effect_sets([ground, ground.score_fit(context, single, noise)], refits, 2, say))
     return ground, refits
@@ -255,7 +255,7 @@ def select_grounds(catalogue: Catalogue, refits: Iterable[Refit]) -> list[Refit]
     best, each by the law that fits best. A weaker effect shows beside the right law of a stronger.
     """
     grounds: dict[str, Refit] = {}
-    for fit in best_of(refits):
+    for fit in select_best_fits(refits):
         family = catalogue.textbook(fit.names)
         if len(family) == 1 and family[0] in catalogue.of_load:
             grounds.setdefault(family[0], fit)
@@ -273,8 +273,12 @@ def predict(there: Context, fit: Refit) -> PredictedError:
     left = []
     noise = []
     response = []
-    for one, sums in zip(played, block_sums(played, SHARING), strict=True):
-        own = noise_variance(one.event) * (one.event.record.samples - one.event.start) / len(sums)
+    for one, sums in zip(played, sum_blocks(played, SHARING), strict=True):
+        own = (
+            estimate_noise_variance(one.event)
+            * (one.event.record.samples - one.event.start)
+            / len(sums)
+        )
         known = sums[:, 0] + own
         with np.errstate(over="ignore"):
             # without a steady state, and of a load that diverges, all is left, too

@@ -11,7 +11,7 @@ from tractexp.identification.adequacy import Grade
 from tractexp.text.wording import join_words
 
 
-def recommendation(investigation: Findings) -> str:
+def recommend_next(investigation: Findings) -> str:
     """What to do next, one sentence."""
     chosen = investigation.next_event
     if course := investigation.unrecorded_course:

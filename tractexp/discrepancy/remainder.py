@@ -157,7 +157,7 @@ class _Stretch:
             not domain.noise_from_model
             and np.count_nonzero(np.all(valid, axis=0)[before]) >= FEWEST_NOISE_SAMPLES
         ):
-            noise = estimate(_level(residual[:, before]), valid[:, before], [before])
+            noise = estimate(_remove_lines(residual[:, before]), valid[:, before], [before])
         return cls(
             event, residual, replace(noise, random_walk=None, input_modes=input_modes), drive
         )
@@ -204,13 +204,13 @@ class _Stretch:
         return sizes, replace(self, residual=residual)
 
 
-def _level(rows: np.ndarray) -> np.ndarray:
+def _remove_lines(rows: np.ndarray) -> np.ndarray:
     """Rows (C, n) about their straight lines: what a fit leaves before the dip may lie off zero."""
     x = np.linspace(-1.0, 1.0, rows.shape[1])
     return rows - np.stack([np.polynomial.Polynomial.fit(x, row, 1)(x) for row in rows])
 
 
-def remainders(
+def find_remainders(
     residual: np.ndarray, events: Sequence[Event], noise: Noise, false_alarms: float = 0.05
 ) -> list[Remainder]:
     """The shapes that stand out of residuals (C, N) [pu], measured less calculated, of events end
@@ -281,14 +281,14 @@ def _search_shapes(white: np.ndarray, first: int) -> tuple[int, list[tuple[float
         shapes += [(float(d), float(f)) for f in frequencies]
     best: dict[bool, tuple[float, _Shape, int]] = {}
     for decay, frequency in shapes:
-        gains = _gains(white[:, first:], decay, frequency)
+        gains = _compute_gains(white[:, first:], decay, frequency)
         channel, k = divmod(int(gains.argmax()), gains.shape[1])
         if (gain := float(gains[channel, k])) > best.get(frequency > 0, (-1.0,))[0]:
             best[frequency > 0] = gain, _Shape(first + k, decay, frequency), channel
     return len(white) * length * len(shapes), list(best.values())
 
 
-def _gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
+def _compute_gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
     """Drop of the sum of squares (C, n + 1 - `SHORTEST_SHAPE`) by a shape from each sample on, in
     each channel.
     """

@@ -10,13 +10,13 @@ fitted behind each window, too: one that leaves no such fault takes their place.
 
 from collections.abc import Sequence
 
-from tractexp.discrepancy.disagreement import Disagreement, disagreement, examine_fit
-from tractexp.inference.base_fit import BaseFit, fitted_from
+from tractexp.discrepancy.disagreement import Disagreement, examine_base_fit, examine_fit
+from tractexp.inference.base_fit import BaseFit, fit_from_starts
 from tractexp.inference.chance import BLURRED
 from tractexp.inference.context import Context
-from tractexp.inference.fitting import Refit, refit_from, rough_refit
+from tractexp.inference.fitting import Refit, refit_from, refit_roughly
 from tractexp.inference.noise_in_quiet import QuietNoise
-from tractexp.inference.recorder_window import windows_of
+from tractexp.inference.recorder_window import list_recorder_windows
 from tractexp.inference.records import Records
 from tractexp.noise import Noise
 
@@ -24,7 +24,9 @@ from tractexp.noise import Noise
 WINDOW_SHARE = 0.5
 
 
-def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
+def search_recorder_window(
+    base: BaseFit, first: Disagreement, seed: int
+) -> tuple[BaseFit, Disagreement]:
     """The base model's fit and tests behind the recorder's window, where there is one; else those
     given.
     """
@@ -39,12 +41,12 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
         return base, first
     # the context behind each window, and the base model fitted there
     tried: list[tuple[Context, Refit]] = []
-    for window in windows_of(context.events):
+    for window in list_recorder_windows(context.events):
         if tried and not tried[0][1].deviance < first.fit.deviance and window.averages:
             continue  # an average over several cycles is one of averages over one
         behind = context.move_to_records(Records.from_events(context.records.recorded, window))
         local_minima = (first.fit.unit, *base.local_minima)  # the load's: no window moves them far
-        begun = rough_refit(behind, noise, [((), start) for start in local_minima])[0]
+        begun = refit_roughly(behind, noise, [((), start) for start in local_minima])[0]
         tried.append((behind, refit_from(behind, noise, (), begun.unit)))
     believed = _choose_window(tried, first) if tried else None
     if believed is None:
@@ -52,8 +54,8 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
     behind, fit = believed
     assert behind.records.window is not None
     context.effort.say(f"{behind.records.window.describe()}: taken into account from here on")
-    base = fitted_from(behind, [fit.unit], base.local_minima)
-    return base, disagreement(base, seed)
+    base = fit_from_starts(behind, [fit.unit], base.local_minima)
+    return base, examine_base_fit(base, seed)
 
 
 def _choose_window(
@@ -75,7 +77,7 @@ def _choose_window(
     return best if first.fit.deviance - best[1].deviance > least else None
 
 
-def behind_window(
+def replace_faults_by_window(
     base: BaseFit, bare: Refit, best: Refit, noise: Noise, seed: int
 ) -> BaseFit | None:
     """The base model's fit behind the recorder's window that does away with the faults of the
@@ -87,7 +89,7 @@ def behind_window(
     if not context.domain.windowed or context.drive.windows:
         return None
     tests = examine_fit(base.quiet, best, noise, seed)
-    for window in windows_of(context.events) if tests.faults else ():
+    for window in list_recorder_windows(context.events) if tests.faults else ():
         behind = context.move_to_records(Records.from_events(context.records.recorded, window))
         fit = refit_from(behind, tests.noise, best.names, best.unit)
         if not fit.deviance < bare.deviance:
@@ -96,7 +98,7 @@ def behind_window(
         there = examine_fit(quiet, fit, tests.noise, seed)
         if there.adequate and not there.faults:
             context.effort.say(f"{window.describe()}: taken into account from here on")
-            return fitted_from(behind, [bare.unit], base.local_minima)
+            return fit_from_starts(behind, [bare.unit], base.local_minima)
         if there.p_left < tests.p_left:
             break
         tests = there

@@ -11,7 +11,7 @@ import numpy as np
 from tractexp.configuration.plugin import Plugin, build, discover
 from tractexp.errors import TASK, UserError
 from tractexp.exchange.circuit import TCircuit
-from tractexp.identification.result import Result, parts
+from tractexp.identification.result import Result, build_parts
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
 from tractexp.record.identity import label
@@ -49,7 +49,7 @@ class Identified:
 
         What carries the network alone in waveforms is static load there.
         """
-        motor, static, effects, integration, *_ = parts(self.result.model)
+        motor, static, effects, integration, *_ = build_parts(self.result.model)
         own = [e for e in effects if not (e.waves_only or e.name in self.result.shown_effects)]
         return compose(motor, static, own, integration)
 

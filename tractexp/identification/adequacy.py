@@ -30,7 +30,7 @@ from tractexp.inference.model_error import ModelError, describe_stall
 from tractexp.inference.observed import Observed
 from tractexp.inference.problem import Problem
 from tractexp.inference.residual_statistics import PER_EVENT
-from tractexp.inference.sandwich import off_walls
+from tractexp.inference.sandwich import is_off_bounds
 from tractexp.inference.separable import Sensitivities, SeparableBasis
 
 FIT_DRAWS = 199
@@ -90,7 +90,7 @@ class Adequacy:
         return {"grade": str(self.grade), "sentence": self.sentence, "p": self.p}
 
 
-def surprise(
+def run_residual_test(
     observed: Observed,
     likelihood: Likelihood,
     unit: np.ndarray,
@@ -120,18 +120,18 @@ def surprise(
     if likelihood.noise.mix is None or not observed.problem.quiet:
         return Surprise(None, "", None, "")
     rows, J = likelihood.jacobian(unit)
-    inside = off_walls(unit)
+    inside = is_off_bounds(unit)
     steady = _linear(likelihood)[inside[: likelihood.free]]
     J = J.only(inside)
     rng = np.random.default_rng(JUDGEMENT_SEED)
     drawn = likelihood.noise.draw(rng, FIT_DRAWS, np.diff(observed.drive.first).tolist())
     drawn *= likelihood.valid
-    drawn /= _level(likelihood, observed, rng)[:, None, None]
+    drawn /= _draw_level_errors(likelihood, observed, rng)[:, None, None]
     basis = J.basis()
-    split = of_each_event(J, steady)
+    split = build_event_basis(J, steady)
 
     def compute_statistics(rest: np.ndarray) -> dict[str, np.ndarray]:
-        by_test = residual_statistics.statistics(
+        by_test = residual_statistics.compute_residual_statistics(
             rest.reshape(len(rest), observed.drive.channels, -1), observed.problem
         )
         return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
@@ -151,11 +151,11 @@ def surprise(
         {name: rows[part] for name, rows in by_test.items()} for part in (slice(1), slice(1, None))
     )
     fit = GoodnessOfFit(compare_with_draws(values, draws))
-    ratio, where = loudest_stretch(own.reshape(observed.drive.channels, -1), observed.problem)
+    ratio, where = find_loudest_stretch(own.reshape(observed.drive.channels, -1), observed.problem)
     return Surprise(fit.p, fit.most_significant_test, ratio, where)
 
 
-def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
+def build_event_basis(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
     """The basis of what parameters of their own for each event could change.
 
     Parameters
@@ -201,7 +201,7 @@ def compare_with_squares(
     """
     likelihood = squares.with_initial_power
     rows, plain = likelihood.jacobian(unit)
-    inside = off_walls(unit)
+    inside = is_off_bounds(unit)
     k = plain.k
     off_bounds = plain.only(inside)
     reached = plain.only(inside & (np.arange(len(inside)) < k)).basis()
@@ -209,14 +209,14 @@ def compare_with_squares(
     def compare_draws(white: np.ndarray, drawn: np.ndarray) -> np.ndarray:
         raw = likelihood.whiten(drawn)
         likely = raw - off_bounds.times(J.fit(white))
-        shifted = raw + plain.times(np.pad(_means(likelihood, drawn), ((0, 0), (k, 0))))
+        shifted = raw + plain.times(np.pad(_draw_mean_errors(likelihood, drawn), ((0, 0), (k, 0))))
         rest = reached.project_out(shifted)
         return (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)
 
     return np.array([rows @ rows / max(least, 1e-300)]), compare_draws
 
 
-def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
+def _draw_mean_errors(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
     """By how much draws (b, C, N) would have P0 and Q0 of each event wrong, (b, 2 E), in ranges,
     for Eq. (8).
     """
@@ -227,7 +227,9 @@ def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
     return -wrong.reshape(len(drawn), -1) / plain.free_set.box.width[plain.free :]
 
 
-def _level(likelihood: Likelihood, observed: Observed, rng: np.random.Generator) -> np.ndarray:
+def _draw_level_errors(
+    likelihood: Likelihood, observed: Observed, rng: np.random.Generator
+) -> np.ndarray:
     """By how much each draw (DRAWS,) would have estimated its own noise wrongly, from so few quiet
     samples.
     """
@@ -248,7 +250,7 @@ def _linear(likelihood: Likelihood) -> np.ndarray:
     return np.array([name.partition("[")[0] not in beside for name in problem.space.names])
 
 
-def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]:
+def find_loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]:
     """The loudest window of a whitened residual.
 
     Parameters
@@ -265,7 +267,7 @@ def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]
     str
         Where it is: channel, event and times [s].
     """
-    windows = residual_statistics.residual_windows(problem)
+    windows = residual_statistics.list_residual_windows(problem)
     row = problem.drive.labels.index
     level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in windows]
     k = int(np.argmax(level))

@@ -7,7 +7,7 @@ import numpy as np
 from tractexp.configuration.run_command import suggest_run
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
-from tractexp.identification.plan import DipShape, Forecast, over_depth
+from tractexp.identification.plan import DipShape, IntervalForecast, forecast_over_depth
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import (
     BOUND,
@@ -16,8 +16,8 @@ from tractexp.identification.verdict import (
     IDENTIFIED_SHARE,
     UNIDENTIFIED,
     WEAK,
+    choose_scale,
     format_half_width,
-    size,
 )
 from tractexp.inference.information import SHARE
 from tractexp.inference.problem import Problem
@@ -53,7 +53,7 @@ def advise(
     """
     better = [
         f"{why}: {suggest_run('domain=waves')}"
-        for why in better_domain(uncertainty.likelihood.problem)
+        for why in advise_domain(uncertainty.likelihood.problem)
     ]
     sentences = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
     settings = ["task=discrepancy", f"data={data}"] if data else ["task=discrepancy"]
@@ -84,7 +84,7 @@ def advise(
                 else "the record does not change with it"
             )
             sentences.append(f"fix {tied[0]} by model.fixed: {why}")
-    sentences += _deeper(uncertainty)
+    sentences += _advise_depths(uncertainty)
     return (
         [*better, *sentences]
         if adequacy.grade is Grade.EFFECT_MISSING
@@ -94,12 +94,12 @@ def advise(
     )
 
 
-def better_domain(problem: Problem) -> list[str]:
+def advise_domain(problem: Problem) -> list[str]:
     """That another domain tells more of one of the events; [] where none does."""
     return [why for why in map(problem.domain.better, problem.events) if why][:1]
 
 
-def _deeper(uncertainty: Uncertainty) -> list[str]:
+def _advise_depths(uncertainty: Uncertainty) -> list[str]:
     """Which further dip would identify what is open but not structurally so."""
     verdicts = uncertainty.verdicts
     poor = [n for n in uncertainty.names if verdicts[n].word in (WEAK, UNIDENTIFIED)]
@@ -117,17 +117,22 @@ def _deeper(uncertainty: Uncertainty) -> list[str]:
     shape = DipShape.from_event(problem.events[deepest])
     noise = uncertainty.likelihood.noise.select_event(deepest)
     try:
-        forecasts = over_depth(problem, uncertainty.values, shape, uncertainty.information, noise)
+        forecasts = forecast_over_depth(
+            problem, uncertainty.values, shape, uncertainty.information, noise
+        )
     except UserError:  # this model or these values cannot be planned with
         return [without_figures]
     others = "these" if len(problem.events) > 1 else "this one"
     together = f"for {1000 * shape.duration:.0f} ms, fitted together with {others},"
     return [
-        _further(uncertainty, uncertainty.names.index(name), forecasts, together) for name in poor
+        _describe_depths(uncertainty, uncertainty.names.index(name), forecasts, together)
+        for name in poor
     ]
 
 
-def _further(uncertainty: Uncertainty, j: int, forecasts: Sequence[Forecast], together: str) -> str:
+def _describe_depths(
+    uncertainty: Uncertainty, j: int, forecasts: Sequence[IntervalForecast], together: str
+) -> str:
     """The depths of a further dip with which the interval of parameter `j` is narrow enough, in a
     sentence.
 
@@ -135,7 +140,7 @@ def _further(uncertainty: Uncertainty, j: int, forecasts: Sequence[Forecast], to
     may tell more.
     """
     name, low, high = uncertainty.names[j], uncertainty.lower[j], uncertainty.upper[j]
-    goal, bounds = _goal(uncertainty, j)
+    goal, bounds = _find_goal(uncertainty, j)
     half = np.array([f.half[j] for f in forecasts])
     width = lambda x: format_half_width(uncertainty.values[j], x, low, high)  # noqa: E731
     reached = (
@@ -146,7 +151,9 @@ def _further(uncertainty: Uncertainty, j: int, forecasts: Sequence[Forecast], to
     if (half <= goal).any():
         enough = half <= goal
         which = (
-            "any further dip" if enough.all() else f"a further dip of {_spans(forecasts, enough)}"
+            "any further dip"
+            if enough.all()
+            else f"a further dip of {_format_spans(forecasts, enough)}"
         )
         still = (
             f"{reached}and if it does so then, ask whether model.bounds.{name} is right"
@@ -168,7 +175,7 @@ def _further(uncertainty: Uncertainty, j: int, forecasts: Sequence[Forecast], to
     )
 
 
-def _goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
+def _find_goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
     """Half an interval that is narrow enough, and the bounds that the present one reaches.
 
     Where it reaches one, half of what is inside the bounds is asked for. Where curvature calls it
@@ -179,7 +186,7 @@ def _goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
     high = uncertainty.upper[j]
     (a, b), enough = (
         uncertainty.intervals[j],
-        IDENTIFIED_SHARE * size(uncertainty.values[j], low, high),
+        IDENTIFIED_SHARE * choose_scale(uncertainty.values[j], low, high),
     )
     bounds = [
         bound
@@ -194,7 +201,7 @@ def _goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
     return min(asked), bounds
 
 
-def _spans(forecasts: Sequence[Forecast], enough: np.ndarray) -> str:
+def _format_spans(forecasts: Sequence[IntervalForecast], enough: np.ndarray) -> str:
     """The depths of the forecasts (n,) that are `enough`, as text: '5 to 15 % or 27.5 to 95 %'."""
     depths = np.array([f.shape.depth for f in forecasts])
     spans = [(100 * depths[part][0], 100 * depths[part][-1]) for part in runs(enough)]

@@ -41,7 +41,7 @@ def compare_events(uncertainty: Uncertainty) -> dict[str, Any]:
     def errors(triangle: np.ndarray) -> np.ndarray:
         return Information(uncertainty.names, uncertainty.values, width, triangle).standard_errors
 
-    others, whole = without_each([own[rows] for rows in J.rows])
+    others, whole = leave_out_each([own[rows] for rows in J.rows])
     together = errors(whole)
     gains: dict[str, dict[str, float]] = {}
     for event, triangle in zip(likelihood.problem.events, others, strict=True):
@@ -53,7 +53,7 @@ def compare_events(uncertainty: Uncertainty) -> dict[str, Any]:
     return {"gains": gains, "odd_events": odd, "notes": notes}
 
 
-def without_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+def leave_out_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
     """Triangles that stand for all rows but those of each event.
 
     The products of a triangle's rows are those of the rows it stands for: T'T = R'R.
@@ -72,7 +72,7 @@ def without_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarr
 
     Examples
     --------
-    >>> others, whole = without_each([np.array([[3.0]]), np.array([[4.0]])])
+    >>> others, whole = leave_out_each([np.array([[3.0]]), np.array([[4.0]])])
     >>> [abs(float(t[0, 0])) for t in (*others, whole)]
     [4.0, 3.0, 5.0]
     """
@@ -113,10 +113,12 @@ def find_disagreeing_events(uncertainty: Uncertainty) -> tuple[list[str], list[s
     while len(left) > 1:
         suspects = [
             left[k]
-            for k in np.argsort(-_excess([linear[e] for e in left]), kind="stable")[:SUSPECTS]
+            for k in np.argsort(-_compute_excess([linear[e] for e in left]), kind="stable")[
+                :SUSPECTS
+            ]
         ]
         groups = [left, *([o for o in left if o != e] for e in suspects), *([e] for e in suspects)]
-        deviance = _deviances(likelihood, uncertainty.unit, groups)
+        deviance = _fit_groups(likelihood, uncertainty.unit, groups)
         n = len(suspects)
         excess = deviance[0] - deviance[1 : n + 1] - deviance[n + 1 :]
         worst = int(excess.argmax())
@@ -142,13 +144,13 @@ def _linear(rows: np.ndarray, J: Sensitivities) -> list[np.ndarray]:
     return [both[mine] for mine in J.rows]
 
 
-def _excess(linear: Sequence[np.ndarray]) -> np.ndarray:
+def _compute_excess(linear: Sequence[np.ndarray]) -> np.ndarray:
     """By how much the deviance of all events is above that of the rest plus that of each, (E,), in
     the linearized model.
 
     The last number of a triangle is the root of the deviance that is left.
     """
-    others, whole = without_each(linear)
+    others, whole = leave_out_each(linear)
     alone = [np.linalg.qr(rows).R for rows in linear]
     least = [
         np.array([triangle[-1, -1] ** 2 for triangle in triangles]) for triangles in (others, alone)
@@ -156,7 +158,7 @@ def _excess(linear: Sequence[np.ndarray]) -> np.ndarray:
     return whole[-1, -1] ** 2 - least[0] - least[1]
 
 
-def _deviances(
+def _fit_groups(
     likelihood: Likelihood, unit: np.ndarray, groups: Sequence[Sequence[int]]
 ) -> np.ndarray:
     """The deviances (groups,) of the best fits to groups of events, from coordinates (D,); as many
@@ -166,13 +168,17 @@ def _deviances(
     parts = [groups[k : k + together] for k in range(0, len(groups), together)]
     start = np.tile(unit, (together, 1))
     ends = [
-        descend(only(likelihood, part), start[: len(part)], apart=likelihood.separable_columns)
+        descend(
+            select_group_rows(likelihood, part),
+            start[: len(part)],
+            apart=likelihood.separable_columns,
+        )
         for part in parts
     ]
     return np.concatenate([descent.deviance for descent in ends])
 
 
-def only(likelihood: Likelihood, groups: Sequence[Sequence[int]]) -> Rows:
+def select_group_rows(likelihood: Likelihood, groups: Sequence[Sequence[int]]) -> Rows:
     """The function of rows in which lane k counts the events of `groups[k]` alone."""
     drive = likelihood.problem.drive
     masks = np.zeros((len(groups), *drive.measurements.shape), dtype=bool)

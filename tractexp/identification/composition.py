@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.inference.interval import interval_factor
+from tractexp.inference.interval import compute_interval_factor
 
 HOUR, WEEKDAY, SEASON, YEAR = TERMS = ("hour", "weekday", "season", "year")
 WEEKDAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
@@ -88,7 +88,7 @@ class Composition:
         labels, X = _describe_grid(term)
         X = X[:, : len(self.coefficients)]
         values = X @ self.coefficients
-        half = interval_factor() * np.sqrt(np.einsum("ni,ij,nj->n", X, self.covariance, X))
+        half = compute_interval_factor() * np.sqrt(np.einsum("ni,ij,nj->n", X, self.covariance, X))
         return [
             {"at": at, "value": float(v), "low": float(v - h), "high": float(v + h)}
             for at, v, h in zip(labels, values, half, strict=True)
@@ -130,14 +130,14 @@ def _describe_time(
     if moment is None or start is None:
         return row.tolist()
     hour = moment.hour + moment.minute / 60 + moment.second / 3600
-    row[1:5] = _harmonics(hour / 24, 2)
+    row[1:5] = _compute_harmonics(hour / 24, 2)
     row[5 + moment.weekday()] = 1.0
-    row[12:14] = _harmonics(moment.timetuple().tm_yday / DAYS_A_YEAR, 1)
+    row[12:14] = _compute_harmonics(moment.timetuple().tm_yday / DAYS_A_YEAR, 1)
     row[14] = (moment - start).total_seconds() / 86400 / DAYS_A_YEAR
     return row.tolist()
 
 
-def _harmonics(turn: float, count: int) -> np.ndarray:
+def _compute_harmonics(turn: float, count: int) -> np.ndarray:
     angles = 2 * np.pi * turn * np.arange(1, count + 1)
     return np.concatenate([np.cos(angles), np.sin(angles)])
 
@@ -150,13 +150,13 @@ def _describe_grid(term: str) -> tuple[Sequence[str], np.ndarray]:
     labels: Sequence[str]
     if term == HOUR:
         labels = [f"{hour:02d}:30" for hour in range(24)]
-        points = [_harmonics((hour + 0.5) / 24, 2) for hour in range(24)]
+        points = [_compute_harmonics((hour + 0.5) / 24, 2) for hour in range(24)]
     elif term == WEEKDAY:
         labels = list(WEEKDAYS)
         points = list(np.eye(7))
     elif term == SEASON:
         labels = MONTHS.split()
-        points = [_harmonics((month + 0.5) / 12, 1) for month in range(12)]
+        points = [_compute_harmonics((month + 0.5) / 12, 1) for month in range(12)]
     else:
         labels = ["first", "a year later"]
         points = [np.array([0.0]), np.array([1.0])]

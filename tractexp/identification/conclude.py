@@ -8,11 +8,11 @@ import numpy as np
 
 from tractexp.cache import provenance
 from tractexp.errors import MODEL, UserError
-from tractexp.identification.fit import TRAIN, Fit, model_errors, play
-from tractexp.identification.result import Result, by_event
+from tractexp.identification.fit import TRAIN, Fit, play, tabulate_model_errors
+from tractexp.identification.result import Result, name_by_event
 from tractexp.identification.search import REFUSED, SearchResult
 from tractexp.identification.verdict import BOUND_DISTANCE
-from tractexp.inference.model_error import relative_errors
+from tractexp.inference.model_error import compute_relative_errors
 from tractexp.inference.problem import Problem
 from tractexp.record import OwnBase
 from tractexp.record.identity import Identity
@@ -33,9 +33,9 @@ def conclude(
     Raises `UserError` where no candidate at all had a steady state.
     """
     refuse_failed(problem, end)
-    epsilon_p, epsilon_q = relative_errors([fit for fit in fits if fit.role == TRAIN])
+    epsilon_p, epsilon_q = compute_relative_errors([fit for fit in fits if fit.role == TRAIN])
     first = problem.events[0]
-    estimates = _values(problem, free)
+    estimates = _collect_values(problem, free)
     own = OwnBase.from_record(first.record)
     exponents = {p.name: p.power_exponent for p in problem.parameters}
     return Result(
@@ -46,8 +46,8 @@ def conclude(
         epsilon_q=epsilon_q,
         seed=seed,
         events=[f.to_dict() for f in fits],
-        model_error=model_errors(fits),
-        at_bound=at_bound(problem, free),
+        model_error=tabulate_model_errors(fits),
+        at_bound=list_at_bound(problem, free),
         units={p.name: p.unit for p in problem.parameters},
         bounds={p.name: list(p.bounds) for p in problem.parameters},
         model=dict(settings),
@@ -68,7 +68,7 @@ def conclude(
         own_base=asdict(own),
         parameters_on_given_base={}
         if own.ratio == 1
-        else own.values(by_event(*estimates.values()), exponents),
+        else own.values(name_by_event(*estimates.values()), exponents),
         tractexp_version=provenance.read_version(),
         commit=provenance.find_commit(),
     )
@@ -80,11 +80,11 @@ def refuse_failed(problem: Problem, end: SearchResult) -> None:
         why = problem.model.refusal(problem.full(end.values)[0], problem.drive) or "all diverged"
         raise UserError(
             f"none of the {end.simulations} parameter sets tried could be simulated: {why};"
-            f" widen {MODEL.bounds} or free {MODEL.fixed}{_meant(problem)}"
+            f" widen {MODEL.bounds} or free {MODEL.fixed}{_describe_base(problem)}"
         )
 
 
-def _meant(problem: Problem) -> str:
+def _describe_base(problem: Problem) -> str:
     """On which base bounds are meant, where that is not the file's."""
     own = OwnBase.from_record(problem.events[0].record)
     return "" if own.ratio == 1 else f", which are meant on the record's own base of {own}"
@@ -92,13 +92,13 @@ def _meant(problem: Problem) -> str:
 
 def describe_search(problem: Problem, end: SearchResult) -> dict[str, Any]:
     """Where the optimizer itself end, and what that took: what optimizers are compared by."""
-    epsilon_p, epsilon_q = relative_errors(play(problem, end.values))
+    epsilon_p, epsilon_q = compute_relative_errors(play(problem, end.values))
     errors = {"objective": end.objective, "epsilon_p": epsilon_p, "epsilon_q": epsilon_q}
     return (
-        _values(problem, end.values)
+        _collect_values(problem, end.values)
         | errors
         | _list_costs(end)
-        | {"at_bound": at_bound(problem, end.values)}
+        | {"at_bound": list_at_bound(problem, end.values)}
     )
 
 
@@ -110,7 +110,7 @@ def _list_costs(end: SearchResult) -> dict[str, Any]:
     }
 
 
-def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
+def _collect_values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
     """Parameters by name, and those with a value of their own in each event."""
     names = problem.model.names
     own = problem.by_event(free)[:, 0]
@@ -120,7 +120,7 @@ def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
     }
 
 
-def at_bound(problem: Problem, values: np.ndarray) -> list[str]:
+def list_at_bound(problem: Problem, values: np.ndarray) -> list[str]:
     """Names of the free parameters within a thousandth of their range of a bound."""
     unit = problem.space.to_unit(values)
     return [
@@ -130,9 +130,9 @@ def at_bound(problem: Problem, values: np.ndarray) -> list[str]:
     ]
 
 
-def active_bounds(
+def describe_active_bounds(
     problem: Problem, values: np.ndarray, nuisances: Collection[str] = ()
 ) -> list[str]:
     """The same without nuisances, as a sentence tells them: 'T_m at 1'."""
-    names = [name for name in at_bound(problem, values) if name not in nuisances]
+    names = [name for name in list_at_bound(problem, values) if name not in nuisances]
     return [f"{name} at {values[problem.space.index(name)]:.4g}" for name in names]

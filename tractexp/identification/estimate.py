@@ -21,20 +21,20 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import MODEL, TASK, UserError
-from tractexp.identification.adequacy import Surprise, surprise
-from tractexp.identification.residual_noise import drop_outliers, noise_at
-from tractexp.identification.uncertainty import Uncertainty, conclude, threshold
-from tractexp.inference.blocks import blocks_of, exceeds
+from tractexp.identification.adequacy import Surprise, run_residual_test
+from tractexp.identification.residual_noise import drop_outliers, estimate_noise_at
+from tractexp.identification.uncertainty import Uncertainty, compute_threshold, conclude
+from tractexp.inference.blocks import cut_blocks, exceeds
 from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.multistart import (
-    along_least_certain,
-    distinct,
     explore_minima,
+    place_along_least_certain,
     search_box,
+    select_distinct,
 )
 from tractexp.inference.observed import Observed
-from tractexp.inference.prior import held_in_words, weigh_prior
+from tractexp.inference.prior import describe_prior, weigh_prior
 from tractexp.inference.problem import Problem
 
 ESTIMATE_ROUNDS = 2  # of noise and fit in turn
@@ -102,7 +102,7 @@ class DescentEnds:
         first.
         """
         near = self.descent.deviance <= LARGEST_MINIMUM_RATIO * self.lowest
-        return distinct(
+        return select_distinct(
             Descent(self.descent.unit[near], self.descent.deviance[near], 0), self.likelihood.free
         )
 
@@ -116,7 +116,7 @@ class DescentEnds:
 
     def looked_beside(self) -> "DescentEnds":
         """These and the ends of descents from beside the best."""
-        beside = along_least_certain(self.likelihood, self.best)
+        beside = place_along_least_certain(self.likelihood, self.best)
         return self.join_descent(self.likelihood.descent(beside), "beside the best")
 
     def no_worse(self, unit: np.ndarray) -> bool:
@@ -131,7 +131,7 @@ class DescentEnds:
         rows = squares.rows(np.stack([unit[: squares.free], self.best]))
         polished, least = (rows**2).reshape(2, problem.drive.channels, -1).sum(axis=1)
         return not exceeds(
-            polished, least, blocks_of(problem.events, problem.drive, 3, from_dip=True)
+            polished, least, cut_blocks(problem.events, problem.drive, 3, from_dip=True)
         )
 
     @property
@@ -174,7 +174,7 @@ def estimate_without_search(problem: Problem) -> EstimationResult:
     UserError
         Where nothing of the box can be simulated.
     """
-    _, best = _of_box(problem)
+    _, best = _descend_from_box(problem)
     if best is None:
         raise UserError(
             f"no parameter set tried can be simulated before {problem.events[0].record.name}; give"
@@ -202,8 +202,8 @@ def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
     EstimationResult
     """
     if not problem.loss.quadratic:
-        return _robust(problem, values)
-    ends, best = _of_box(problem)
+        return _estimate_robust(problem, values)
+    ends, best = _descend_from_box(problem)
     own = ends.likelihood.descent(ends.likelihood.to_unit(values))
     whole = ends.join_descent(own, "search")
     if best is None or own.deviance[0] < ends.lowest - LEAST_MINIMUM_GAIN:
@@ -211,7 +211,7 @@ def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
     return replace(best, starts=whole.starts)
 
 
-def _robust(problem: Problem, values: np.ndarray) -> EstimationResult:
+def _estimate_robust(problem: Problem, values: np.ndarray) -> EstimationResult:
     """The estimate of a robust loss, from where the search ended."""
     observed = Observed.from_problem(problem)
     objective = float(observed.problem.objective(values[None])[0])
@@ -221,7 +221,7 @@ def _robust(problem: Problem, values: np.ndarray) -> EstimationResult:
     return _choose_estimate(ends.looked_beside(), robust=True)
 
 
-def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
+def _descend_from_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
     """The ends of descents from all over the box, and the estimate that they give; None where none
     can be simulated.
     """
@@ -235,10 +235,10 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
         ends = DescentEnds(observed, likelihood, result, ("box",) * len(result.unit))
         if not np.isfinite(ends.lowest):
             return ends, None
-        ends = _in_own_units(ends)
+        ends = _rescale_ends(ends)
         for _ in range(ESTIMATE_ROUNDS):
-            ends = _without_offsets(ends)
-        refined = ends.likelihood.descent(distinct(ends.descent, likelihood.free))
+            ends = _remove_offsets(ends)
+        refined = ends.likelihood.descent(select_distinct(ends.descent, likelihood.free))
         ends = ends.join_descent(refined, "box").looked_beside()
         _remembered[key] = ends, _choose_estimate(ends)
         if len(_remembered) > REMEMBERED:
@@ -246,7 +246,7 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
     return _remembered[key]
 
 
-def _in_own_units(ends: DescentEnds) -> DescentEnds:
+def _rescale_ends(ends: DescentEnds) -> DescentEnds:
     """The ends in mean squares of what the best leaves: there a descent's tolerance means the same
     for any record.
     """
@@ -255,7 +255,7 @@ def _in_own_units(ends: DescentEnds) -> DescentEnds:
     return replace(ends, likelihood=ends.likelihood.scale_noise(np.sqrt(variance)), descent=descent)
 
 
-def _without_offsets(ends: DescentEnds) -> DescentEnds:
+def _remove_offsets(ends: DescentEnds) -> DescentEnds:
     """The ends of waveforms without what their channels' offsets do in the sum of squares; other
     ends as they are.
 
@@ -276,11 +276,11 @@ def _choose_estimate(ends: DescentEnds, *, robust: bool = False) -> EstimationRe
     elsewhere.
     """
     observed = ends.observed
-    likelihood, units = _under_noise(ends, robust=robust)
-    surprising = surprise(observed, likelihood, units[0], ends.likelihood, ends.lowest)
+    likelihood, units = _fit_under_noise(ends, robust=robust)
+    surprising = run_residual_test(observed, likelihood, units[0], ends.likelihood, ends.lowest)
     if not surprising.adequate:
-        return _of_squares(ends, likelihood, surprising)
-    whole = noise_at(
+        return _estimate_by_squares(ends, likelihood, surprising)
+    whole = estimate_noise_at(
         observed,
         likelihood,
         units[0],
@@ -291,29 +291,31 @@ def _choose_estimate(ends: DescentEnds, *, robust: bool = False) -> EstimationRe
     result = likelihood.descent(units)
     best = int(result.deviance.argmin())
     if not ends.no_worse(result.unit[best]):
-        return _of_squares(ends, likelihood, surprising)
+        return _estimate_by_squares(ends, likelihood, surprising)
     others = result.unit[np.arange(len(units)) != best]
     return EstimationResult(
-        with_local_minima(conclude(likelihood, result.unit[best]), others), surprising, ends.starts
+        widen_by_local_minima(conclude(likelihood, result.unit[best]), others),
+        surprising,
+        ends.starts,
     )
 
 
-def _of_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> EstimationResult:
+def _estimate_by_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> EstimationResult:
     """The minimum of Eq. (8) as the estimate; with priors that of Eq. (8) and what machines usually
     are.
     """
     uncertainty = conclude(ends.likelihood, ends.best, noise)
     near = ends.near
     if ends.likelihood.problem.priors:
-        held = held_to_usual(ends.likelihood)
+        held = add_usual_prior(ends.likelihood)
         near = _find_prior_minima(held, near)
         uncertainty = conclude(
-            held, near[0], noise, [held_in_words(held.problem, held.values(near[0]))]
+            held, near[0], noise, [describe_prior(held.problem, held.values(near[0]))]
         )
-    return EstimationResult(with_local_minima(uncertainty, near), seen, ends.starts)
+    return EstimationResult(widen_by_local_minima(uncertainty, near), seen, ends.starts)
 
 
-def held_to_usual(squares: Likelihood) -> Likelihood:
+def add_usual_prior(squares: Likelihood) -> Likelihood:
     """The likelihood whose rows are in units of what is left, with a prior.
 
     A block of samples counts as one row of the prior.
@@ -329,13 +331,13 @@ def _find_prior_minima(likelihood: Likelihood, near: np.ndarray) -> np.ndarray:
     space = likelihood.problem.space
     defaults = likelihood.problem.defaults
     starts = np.concatenate([near, space.to_unit(defaults)[None]])
-    return distinct(
+    return select_distinct(
         likelihood.descent(np.concatenate([starts, explore_minima(likelihood).unit])),
         likelihood.free,
     )
 
 
-def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.ndarray]:
+def _fit_under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.ndarray]:
     """The likelihood of the noise that the fit leaves in quiet, and its maxima (n, D), the best
     first.
     """
@@ -347,7 +349,7 @@ def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.nda
         if robust:
             likelihood = drop_outliers(likelihood, units[:1])
         likelihood = replace(
-            likelihood, noise=noise_at(observed, likelihood, units[0], input_modes)
+            likelihood, noise=estimate_noise_at(observed, likelihood, units[0], input_modes)
         )
         result = likelihood.descent(units)
         order = np.argsort(result.deviance, kind="stable")
@@ -355,7 +357,7 @@ def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.nda
     return likelihood, units
 
 
-def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertainty:
+def widen_by_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertainty:
     """The judgement with other local minima that the records do not rule out: intervals reach over
     them.
 
@@ -376,7 +378,7 @@ def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertaint
     rows = uncertainty.likelihood.rows(units) if len(units) else np.empty((0, 1))
     above = (rows**2).sum(axis=1) - uncertainty.deviance
     apart = np.abs(units - uncertainty.unit).max(axis=1, initial=0.0) > SAME_MINIMUM_DISTANCE
-    beside = replace(uncertainty, local_minima=tuple(units[apart & (above < threshold())]))
+    beside = replace(uncertainty, local_minima=tuple(units[apart & (above < compute_threshold())]))
     verdicts = dict(uncertainty.verdicts)
     own = uncertainty.intervals
     for values in beside.values_elsewhere:

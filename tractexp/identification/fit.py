@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.domain import Playback, domain_of
 from tractexp.errors import UserError
-from tractexp.inference.model_error import model_error
+from tractexp.inference.model_error import compute_model_error
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
@@ -63,16 +63,17 @@ def explain_refusal(model: Model, values: np.ndarray, event: Event) -> str:
     )
 
 
-def model_errors(fits: Sequence[Fit]) -> dict[str, Any]:
+def tabulate_model_errors(fits: Sequence[Fit]) -> dict[str, Any]:
     """The model's error on the fitted events together, on those held out, and on each."""
     held_out = [f for f in fits if f.role != TRAIN]
     each = [
-        {"name": f.event.record.name, "role": f.role, **model_error([f]).to_dict()} for f in fits
+        {"name": f.event.record.name, "role": f.role, **compute_model_error([f]).to_dict()}
+        for f in fits
     ]
-    fitted = model_error([f for f in fits if f.role == TRAIN]).to_dict()
+    fitted = compute_model_error([f for f in fits if f.role == TRAIN]).to_dict()
     return {
         **fitted,
-        "held_out": model_error(held_out).to_dict() if held_out else None,
+        "held_out": compute_model_error(held_out).to_dict() if held_out else None,
         "events": each,
     }
 

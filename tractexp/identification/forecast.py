@@ -10,7 +10,7 @@ from tractexp.domain import domain_of
 from tractexp.domain.playback import LAST_SHARE, STALLED_POWER
 from tractexp.errors import UserError
 from tractexp.inference.interval import INTERVAL_LEVEL
-from tractexp.inference.model_error import STALL, in_percent
+from tractexp.inference.model_error import STALL, format_percent
 from tractexp.inference.prediction_band import (
     PredictionBand,
     find_largest_change,
@@ -199,7 +199,10 @@ def tell_of_dip(
         return None, f"{dip}: {STALL} in this model"
     half = forecast.find_half_width(calculate, drawn, t, start, first.f0) / abs(drawn)
     P, Q = half.tolist()
-    return [P, Q], f"{dip}: P within {in_percent(P)} and Q within {in_percent(Q)} of S"
+    return [
+        P,
+        Q,
+    ], f"{dip}: P within {format_percent(P)} and Q within {format_percent(Q)} of S"
 
 
 def _find_covariance_root(J: np.ndarray) -> np.ndarray:

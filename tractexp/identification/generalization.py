@@ -7,7 +7,7 @@ import numpy as np
 from tractexp.record import Event
 
 
-def by_depth(events: Sequence[Event], fitted: Sequence[Event]) -> list[str]:
+def compare_depths(events: Sequence[Event], fitted: Sequence[Event]) -> list[str]:
     """Whether each dip is within the depths that were fitted.
 
     Parameters
@@ -26,13 +26,13 @@ def by_depth(events: Sequence[Event], fitted: Sequence[Event]) -> list[str]:
     return ["interpolation" if event.depth <= deepest else "extrapolation" for event in events]
 
 
-def mean_residual(measured: np.ndarray, calculated: np.ndarray) -> float:
+def compute_mean_residual(measured: np.ndarray, calculated: np.ndarray) -> float:
     """Eq. (21) of the paper: the mean of |measured - calculated| [pu], both (N,), without gaps
     (nan).
 
     Examples
     --------
-    >>> mean_residual(np.array([1.0, np.nan, 0.5]), np.array([0.75, 0.75, 0.5]))
+    >>> compute_mean_residual(np.array([1.0, np.nan, 0.5]), np.array([0.75, 0.75, 0.5]))
     0.125
     """
     return float(np.nanmean(np.abs(measured - calculated)))

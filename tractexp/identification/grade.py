@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.adequacy import Adequacy, Grade, grade_errors
-from tractexp.identification.conclude import active_bounds
+from tractexp.identification.conclude import describe_active_bounds
 from tractexp.identification.division import doubt_estimate
 from tractexp.identification.estimate import EstimationResult, estimate, estimate_without_search
-from tractexp.identification.fit import Fit, explain_refusal, model_errors, play
+from tractexp.identification.fit import Fit, explain_refusal, play, tabulate_model_errors
 from tractexp.identification.forecast import forecast_next_dip
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.inference.interval import ParameterEstimate
@@ -103,7 +103,7 @@ class GradedModel:
         """The model's error as `result.json` has it: of the fitted events, of those held out, and
         of each.
         """
-        return model_errors(self.fits)
+        return tabulate_model_errors(self.fits)
 
     @functools.cached_property
     def next_dip(self) -> dict[str, Any]:
@@ -197,13 +197,13 @@ def _grade_played(
     """The graded model of an estimate that can simulate all held-out events."""
     values = estimation.uncertainty.values
     fits = play(problem, values, validate)
-    errors = model_errors(fits)
+    errors = tabulate_model_errors(fits)
     held_out = errors["held_out"]
     adequacy = grade_errors(
         estimation.surprise,
         ModelError.from_content(errors),
         held_out and ModelError.from_content(held_out),
-        active_bounds(problem, values, _nuisances(problem, shown)),
+        describe_active_bounds(problem, values, _list_nuisances(problem, shown)),
     )
     if said := _describe_swings(problem.events):
         adequacy = replace(adequacy, sentence=f"{adequacy.sentence}; {said}")
@@ -217,7 +217,7 @@ def _describe_swings(events: Sequence[Event]) -> str:
     return f"what counts as noise is a swing of the load as well: {told}" if told else ""
 
 
-def _nuisances(problem: Problem, shown: Collection[str]) -> list[str]:
+def _list_nuisances(problem: Problem, shown: Collection[str]) -> list[str]:
     """Parameters, as the problem names them, of effects that nobody asked for: their bounds tell
     nothing.
     """

@@ -20,7 +20,7 @@ from tractexp.cache import store
 from tractexp.domain import Domain, Playback
 from tractexp.domain.port import Complex, Port
 from tractexp.errors import UserError
-from tractexp.identification.projection import Projection, basis
+from tractexp.identification.projection import Projection, compute_port_basis
 from tractexp.record import Event
 
 MOST_VECTOR_POLES = 4  # poles of the vectors
@@ -47,7 +47,7 @@ class LinearNetwork:
 
     def response(self, port: Port) -> Complex:
         """The deviation (N,) [pu] of a port's current that it calculates."""
-        return port.steady_response + basis(port, self.poles) @ self.coefficients
+        return port.steady_response + compute_port_basis(port, self.poles) @ self.coefficients
 
     def squares(self, ports: Sequence[Port]) -> float:
         """The sum of squares that it leaves from the dips on [pu²]."""
@@ -113,7 +113,7 @@ class BlackBox:
         return self.domain.comparison(event, self.domain.outputs(event, responses))
 
 
-def black_boxes(
+def fit_black_boxes(
     domain: Domain, train: Sequence[Event], most: int = MOST_VECTOR_POLES
 ) -> list[BlackBox]:
     """The best networks of no pole, of one, and so on, for events together.
@@ -138,19 +138,19 @@ def black_boxes(
     """
     vectors, *zeros = zip(*map(domain.ports, train), strict=False)
     _refuse(vectors, ", ".join(e.record.name for e in train))
-    zero = [networks(ports, OF_ZERO)[-1] for ports in zeros]
-    return [BlackBox(domain, (one, *zero), vectors[0].turns) for one in networks(vectors, most)]
+    zero = [fit_networks(ports, OF_ZERO)[-1] for ports in zeros]
+    return [BlackBox(domain, (one, *zero), vectors[0].turns) for one in fit_networks(vectors, most)]
 
 
 def choose_network(boxes: Sequence[BlackBox], train: Sequence[Event]) -> BlackBox:
     """The network of the least information criterion for the events that all were fitted to."""
     vectors = [box.networks[0] for box in boxes]
     ports = [boxes[0].domain.ports(event)[0] for event in train]
-    by = information(vectors, ports)
+    by = compute_information_criterion(vectors, ports)
     return replace(boxes[int(np.argmin(by))], chosen_by=CRITERION)
 
 
-def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
+def fit_networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
     """The best networks of no pole, of one, and so on.
 
     They depend on the records alone, so that the store keeps them for the next model of these.
@@ -177,16 +177,20 @@ def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
 
 
 def _fit(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
-    """The networks of `networks`, each from the poles of the one before."""
+    """The networks of `fit_networks`, each from the poles of the one before."""
     fit = Projection.from_ports(ports)
     fits = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none)[0])]
-    while len(fits) <= most and _samples(ports) >= SAMPLES * unknowns(len(fits), ports[0]):
+    while len(fits) <= most and _count_samples(ports) >= SAMPLES * count_unknowns(
+        len(fits), ports[0]
+    ):
         poles = fit.optimum(np.append(fits[-1].poles, fit.start(fits[-1].poles)))
         fits.append(LinearNetwork(poles, fit.linear_part(poles)[0]))
     return fits
 
 
-def information(networks: Sequence[LinearNetwork], ports: Sequence[Port]) -> np.ndarray:
+def compute_information_criterion(
+    networks: Sequence[LinearNetwork], ports: Sequence[Port]
+) -> np.ndarray:
     """The Bayesian information criterion of networks.
 
     Samples count as much as the residual of the last network, which is correlated in time, allows.
@@ -211,26 +215,26 @@ def information(networks: Sequence[LinearNetwork], ports: Sequence[Port]) -> np.
     rests = [networks[-1].residual(port) for port in ports]
     in_turn = abs(sum(complex(np.nansum(rest[1:] * rest[:-1].conj())) for rest in rests))
     correlation = in_turn / max(float(squares[-1]), 1e-300)
-    worth = _samples(ports) * (1 - correlation) / (1 + correlation)
-    size = np.array([unknowns(len(one.poles), ports[0]) for one in networks])
+    worth = _count_samples(ports) * (1 - correlation) / (1 + correlation)
+    size = np.array([count_unknowns(len(one.poles), ports[0]) for one in networks])
     return worth * np.log(np.maximum(squares, 1e-300)) + size * np.log(max(worth, 1.0))
 
 
-def unknowns(poles: int, port: Port) -> int:
+def count_unknowns(poles: int, port: Port) -> int:
     """The number of real unknowns of a network with so many poles."""
     linear = poles if port.series else poles + 1 + (port.steady is None)
     return 2 * (poles + linear)
 
 
-def _samples(ports: Sequence[Port]) -> int:
+def _count_samples(ports: Sequence[Port]) -> int:
     """Real values from the dips on."""
     return 2 * sum(int(np.count_nonzero(np.isfinite(port.i[port.start :]))) for port in ports)
 
 
 def _refuse(ports: Sequence[Port], names: str) -> None:
     """Raise `UserError` for events of too few samples, or whose voltage does not move."""
-    samples = _samples(ports)
-    needed = SAMPLES * unknowns(0, ports[0])
+    samples = _count_samples(ports)
+    needed = SAMPLES * count_unknowns(0, ports[0])
     if samples < needed:
         raise UserError(
             f"{names}: {samples // 2} samples from the dip on are too few for a linear network,"

@@ -19,7 +19,7 @@ DRIFT_OVER_NOISE = 4.0  # standard errors of a slope, of noise whose every tenth
 NOISE_MEMORY = 10.0  # samples
 
 
-def with_load_drift(uncertainty: Uncertainty) -> Uncertainty:
+def add_load_drift(uncertainty: Uncertainty) -> Uncertainty:
     """The judgement with what a drift of the load that the voltage does not explain could do, where
     the records show one.
 

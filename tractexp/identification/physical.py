@@ -22,7 +22,7 @@ from tractexp.identification.verdict import (
     END_OF_RANGE,
     ParameterVerdict,
 )
-from tractexp.inference.model_error import model_error
+from tractexp.inference.model_error import compute_model_error
 from tractexp.parameter import spread_evenly
 from tractexp.record import Event
 
@@ -90,7 +90,7 @@ def find_free_optimum(
     FreeOptimum or None
         None where no range holds the estimate, or where a free fit stays within all of them.
     """
-    if not _names_at_range(uncertainty, held):
+    if not _list_at_range_ends(uncertainty, held):
         return None
     problem = uncertainty.likelihood.problem
     own = {p.name: p.bounds for p in problem.parameters if p.name not in held}
@@ -120,7 +120,8 @@ def say_ranges(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) ->
     told = {
         name: ParameterVerdict(END_OF_RANGE, f"{value:.4g}")
         for name, value in zip(uncertainty.names, uncertainty.values.tolist(), strict=True)
-        if name in _names_at_range(uncertainty, held) and uncertainty.verdicts[name].word == BOUND
+        if name in _list_at_range_ends(uncertainty, held)
+        and uncertainty.verdicts[name].word == BOUND
     }
     return replace(uncertainty, verdicts=uncertainty.verdicts | told)
 
@@ -128,14 +129,14 @@ def say_ranges(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) ->
 def _compare(
     free: Sequence[Fit], held: Sequence[Fit], fitted: int, away: dict[str, float]
 ) -> FreeOptimum:
-    errors = [model_error(fits[:fitted]).value for fits in (free, held)]
+    errors = [compute_model_error(fits[:fitted]).value for fits in (free, held)]
     predicted = [None, None]
     if len(held) > fitted:
-        predicted = [model_error(fits[fitted:]).value for fits in (free, held)]
+        predicted = [compute_model_error(fits[fitted:]).value for fits in (free, held)]
     return FreeOptimum(away, errors[0], errors[1], predicted[0], predicted[1])
 
 
-def _names_at_range(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) -> list[str]:
+def _list_at_range_ends(uncertainty: Uncertainty, held: Mapping[str, Sequence[float]]) -> list[str]:
     """Parameters that stand at an end of the range that they are held to."""
     width = uncertainty.upper - uncertainty.lower
     near = np.minimum(

@@ -14,8 +14,8 @@ import numpy as np
 from tractexp.domain import PHASORS, Domain, domain_of
 from tractexp.errors import TASK, UserError, check_range, list_allowed
 from tractexp.inference.information import Information
-from tractexp.inference.interval import interval_factor
-from tractexp.inference.likelihood import Likelihood, before_the_event
+from tractexp.inference.interval import compute_interval_factor
+from tractexp.inference.likelihood import Likelihood, estimate_noise_before
 from tractexp.inference.model_error import weigh_error
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive
@@ -60,7 +60,7 @@ class DipShape:
         """The shape of a recorded event, with the noise that a fit found there, or that before the
         dip.
         """
-        noise = noise or Noise((before_the_event(event),))
+        noise = noise or Noise((estimate_noise_before(event),))
         domain = domain_of(event)
         (noise_P, noise_Q, *_), memory = noise.levels, noise.memory(event.record.step)
         return cls(
@@ -115,7 +115,7 @@ class DipShape:
 
 
 @dataclass(frozen=True, eq=False)
-class Forecast:
+class IntervalForecast:
     """What recording a dip would tell of the parameters.
 
     Attributes
@@ -141,7 +141,7 @@ class Forecast:
         return self.half / np.maximum(np.abs(self.values), 1e-12)
 
 
-def like(problem: Problem, events: Sequence[Event]) -> Problem:
+def replace_events(problem: Problem, events: Sequence[Event]) -> Problem:
     """The same free parameters, bounds and fixed values on other events."""
     bounds = {p.name: p.bounds for p in problem.parameters}
     longest = problem.domain.longest_step(problem.events, problem.step.substeps)
@@ -149,13 +149,13 @@ def like(problem: Problem, events: Sequence[Event]) -> Problem:
     return Problem(problem.model, events, bounds, problem.fixed, substeps)
 
 
-def forecast(
+def forecast_intervals(
     problem: Problem,
     values: np.ndarray,
     shape: DipShape,
     earlier: Information | None = None,
     noise: Noise | None = None,
-) -> Forecast:
+) -> IntervalForecast:
     """The intervals that `shape` would give at free `values` (d,), added to what is `earlier`
     already.
 
@@ -170,13 +170,15 @@ def forecast(
             f"a planned dip is a voltage alone, but of this model the {readers}: nothing can be"
             " planned with it"
         )
-    planned = like(problem, [shape.event()])
-    informations = each(planned, values, noise or shape.noise)
+    planned = replace_events(problem, [shape.event()])
+    informations = compute_event_informations(planned, values, noise or shape.noise)
     if shape.error:
         more = _weigh_model_error(planned, values, shape)
         informations = [replace(i, J=i.J / math.sqrt(1 + more)) for i in informations]
     total = add_information([*([earlier] if earlier else []), *informations])
-    return Forecast(shape, total.names, total.values, interval_factor() * total.standard_errors)
+    return IntervalForecast(
+        shape, total.names, total.values, compute_interval_factor() * total.standard_errors
+    )
 
 
 def _weigh_model_error(planned: Problem, values: np.ndarray, shape: DipShape) -> float:
@@ -193,7 +195,9 @@ def _weigh_model_error(planned: Problem, values: np.ndarray, shape: DipShape) ->
     return weigh_error(shape.error, response, variance, 1 / shape.rate)
 
 
-def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> list[Information]:
+def compute_event_informations(
+    problem: Problem, values: np.ndarray, noise: Noise | None = None
+) -> list[Information]:
     """The information of each event of a problem at free `values` (d,), its own P0 and Q0 unknown.
 
     Raises `UserError` where these values have no steady state before the first event.
@@ -255,7 +259,7 @@ class Needed:
         )
 
 
-def column(names: Sequence[str], parameter: str) -> int:
+def find_column(names: Sequence[str], parameter: str) -> int:
     """The column of a parameter, `H` standing for `M`; raises `UserError` for one that
     is not free.
     """
@@ -268,22 +272,25 @@ def column(names: Sequence[str], parameter: str) -> int:
     return list(names).index(name)
 
 
-def over_depth(
+def forecast_over_depth(
     problem: Problem,
     values: np.ndarray,
     shape: DipShape,
     earlier: Information | None = None,
     noise: Noise | None = None,
-) -> list[Forecast]:
+) -> list[IntervalForecast]:
     """Forecasts for dips of every depth, otherwise of this `shape`."""
     return [
-        forecast(problem, values, replace(shape, depth=float(d)), earlier, noise) for d in DEPTHS
+        forecast_intervals(problem, values, replace(shape, depth=float(d)), earlier, noise)
+        for d in DEPTHS
     ]
 
 
-def depth_needed(forecasts: Sequence[Forecast], parameter: str, within: float) -> Needed:
+def find_depth_needed(
+    forecasts: Sequence[IntervalForecast], parameter: str, within: float
+) -> Needed:
     """The shallowest of these dips whose 95 % interval is ± `within` of the parameter's value."""
-    j = column(forecasts[0].names, parameter)
+    j = find_column(forecasts[0].names, parameter)
     depths, relative = np.array([(f.shape.depth, f.relative[j]) for f in forecasts]).T
     enough = np.flatnonzero(relative <= within)
     depth = None
@@ -310,18 +317,19 @@ class ChosenEvent:
     half: tuple[float, ...]  # half intervals of all parameters once it is added
 
 
-def best_events(
+def choose_best_events(
     problem: Problem, values: np.ndarray, least: float, most: int | None = None
 ) -> list[ChosenEvent]:
-    """The events of a problem that tell most together at free `values` (d,), as `best_of` chooses
-    them.
-    """
-    return best_of(
-        each(problem, values), [event.record.name for event in problem.events], least, most
+    """The events that tell most together at free `values` (d,), as `choose_best` does."""
+    return choose_best(
+        compute_event_informations(problem, values),
+        [event.record.name for event in problem.events],
+        least,
+        most,
     )
 
 
-def best_of(
+def choose_best(
     informations: Sequence[Information], names: Sequence[str], least: float, most: int | None = None
 ) -> list[ChosenEvent]:
     """The events that tell most together, greedily by the determinant of the information
@@ -345,7 +353,8 @@ def best_of(
             break
         chosen.append(best)
         half = (
-            interval_factor() * add_information([informations[e] for e in chosen]).standard_errors
+            compute_interval_factor()
+            * add_information([informations[e] for e in chosen]).standard_errors
         )
         choices.append(
             ChosenEvent(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist()))
@@ -353,12 +362,12 @@ def best_of(
     return choices
 
 
-def alone(problem: Problem, values: np.ndarray) -> Information:
+def compute_own_information(problem: Problem, values: np.ndarray) -> Information:
     """The information of a problem's only event at free `values` (d,), in as few rows as there are
     parameters.
 
     Of an archive, event by event: their Jacobian together, with P0 and Q0 of each, would not fit
     into memory.
     """
-    (information,) = each(problem, values)
+    (information,) = compute_event_informations(problem, values)
     return replace(information, J=np.linalg.qr(information.J, mode="r"))

@@ -100,7 +100,7 @@ class _Residuals:
         return np.nan_to_num((rows - self(unit)) / h[:, None], nan=0.0).T
 
 
-def least_squares_from(
+def descend_least_squares(
     evaluate: Evaluate,
     box: Box,
     start: np.ndarray,
@@ -178,7 +178,7 @@ def race(
     starts : iterable of (point (d,), objective)
         In the order in which they are tried.
     tolerance, trials : float, int
-        Of a descent to the end, as of `least_squares_from`.
+        Of a descent to the end, as of `descend_least_squares`.
 
     Yields
     ------
@@ -188,14 +188,14 @@ def race(
     left = []
     best = np.inf
     for start, objective in starts:
-        x, f = least_squares_from(evaluate, box, start, objective, ROUGH, ROUGH_TRIALS)
+        x, f = descend_least_squares(evaluate, box, start, objective, ROUGH, ROUGH_TRIALS)
         if f < best:
-            best = least_squares_from(evaluate, box, x, f, tolerance, trials)[1]
+            best = descend_least_squares(evaluate, box, x, f, tolerance, trials)[1]
         else:
             left.append((x, f))
         yield
     for x, f in sorted(left, key=lambda end: end[1]):
-        least_squares_from(evaluate, box, x, f, tolerance, trials)
+        descend_least_squares(evaluate, box, x, f, tolerance, trials)
         yield
 
 

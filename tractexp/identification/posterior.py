@@ -110,7 +110,9 @@ def sample(
 
     rng = np.random.default_rng(seed)
     start = np.clip(
-        uncertainty.unit + _spread(uncertainty) * rng.standard_normal((walkers, d)), 1e-6, 1 - 1e-6
+        uncertainty.unit + _choose_spread(uncertainty) * rng.standard_normal((walkers, d)),
+        1e-6,
+        1 - 1e-6,
     )
     start[~np.isfinite(log_probability(start))] = np.clip(uncertainty.unit, 1e-6, 1 - 1e-6)
     start = np.clip(start + 1e-7 * rng.standard_normal(start.shape), 0, 1)
@@ -132,7 +134,7 @@ def sample(
     )
 
 
-def _spread(uncertainty: Uncertainty) -> np.ndarray:
+def _choose_spread(uncertainty: Uncertainty) -> np.ndarray:
     """The standard deviations (D,) of the start, in ranges: the standard errors, at most a
     tenth.
     """

@@ -21,10 +21,10 @@ from tractexp.identification.profile_lanes import (
     End,
     Lanes,
     LikelihoodProfile,
+    descend_others,
     find_outermost,
-    others_free,
 )
-from tractexp.identification.uncertainty import Uncertainty, conclude, threshold
+from tractexp.identification.uncertainty import Uncertainty, compute_threshold, conclude
 from tractexp.identification.verdict import (
     BOUND,
     END_OF_RANGE,
@@ -33,7 +33,7 @@ from tractexp.identification.verdict import (
     UNIDENTIFIED,
     WEAK,
     ParameterVerdict,
-    size,
+    choose_scale,
 )
 from tractexp.text.progress import Counting, make_silent_counter
 
@@ -141,7 +141,7 @@ def revise_verdict(
         any(opened)
         or profile.minima
         or elsewhere
-        or (b - a) / 2 > IDENTIFIED_SHARE * size(value, low, high)
+        or (b - a) / 2 > IDENTIFIED_SHARE * choose_scale(value, low, high)
     ):
         word = WEAK
     else:
@@ -171,12 +171,14 @@ def check_by_profiles(
     Uncertainty
     """
     bounds = zip(uncertainty.lower, uncertainty.upper, strict=True)
-    sizes = np.array([size(v, *pair) for v, pair in zip(uncertainty.values, bounds, strict=True)])
+    sizes = np.array(
+        [choose_scale(v, *pair) for v, pair in zip(uncertainty.values, bounds, strict=True)]
+    )
     doubtful = uncertainty.information.identifiable & (uncertainty.half > DOUBTFUL * sizes)
     doubtful |= uncertainty.information.identifiable & uncertainty.elsewhere
     if not doubtful.any():
         return uncertainty
-    result = _of_doubtful(uncertainty, doubtful, parts)
+    result = _profile_doubtful(uncertainty, doubtful, parts)
     return replace(
         result.uncertainty,
         verdicts=result.verdicts,
@@ -185,22 +187,22 @@ def check_by_profiles(
     )
 
 
-def _of_doubtful(
+def _profile_doubtful(
     uncertainty: Uncertainty, doubtful: np.ndarray, parts: Callable[[int], Counting]
 ) -> Profiles:
     """Profiles of the doubtful (d,) parameters and of those that these lead beyond their interval
     by curvature.
     """
     names = [name for name, d in zip(uncertainty.names, doubtful, strict=True) if d]
-    result = profiles(uncertainty, names=names, parts=parts)
+    result = profile_parameters(uncertainty, names=names, parts=parts)
     wider = doubtful | result.wider & uncertainty.information.identifiable
     if (wider == doubtful).all():
         return result
-    whole = _of_doubtful(result.uncertainty, wider, parts)
+    whole = _profile_doubtful(result.uncertainty, wider, parts)
     return replace(whole, restarts=result.restarts + whole.restarts)
 
 
-def profiles(
+def profile_parameters(
     uncertainty: Uncertainty,
     points: int = 24,
     names: Sequence[str] | None = None,
@@ -232,7 +234,7 @@ def profiles(
         with parts(points) as ended:
             drawing.begin(points, ended)
         if drawing.better is None:
-            drawing.join(_elsewhere(uncertainty, column, drawing.curves), points)
+            drawing.join(_start_elsewhere(uncertainty, column, drawing.curves), points)
         for _ in names:  # what one lane went through may lead another on, and that the next
             if drawing.better is not None or not drawing.go_on(points):
                 break
@@ -241,7 +243,7 @@ def profiles(
             return Profiles(
                 uncertainty,
                 tuple(drawing.curves),
-                threshold(),
+                compute_threshold(),
                 simulations,
                 restarts,
                 drawing.find_wider(),
@@ -291,7 +293,7 @@ class _Drawing:
         ]
         if where:
             c, k = np.array(where).T
-            rise = self.rise[k, c] * threshold()
+            rise = self.rise[k, c] * compute_threshold()
             self.join(Lanes(self.uncertainty, c, self.unit[k], rise), points)
         return bool(where)
 
@@ -305,7 +307,7 @@ class _Drawing:
 
     def _find_outermost(self, c: int, interval: tuple[float, float]) -> list[int]:
         """The points that fit and lie farthest beyond an interval of the c-th parameter."""
-        unit = _in_range(self.uncertainty, c, interval)
+        unit = _clip_to_range(self.uncertainty, c, interval)
         return find_outermost(self.unit, self.rise, c, unit)
 
     def join(self, lanes: Lanes, points: int) -> None:
@@ -328,7 +330,7 @@ class _Drawing:
         self.rise = np.concatenate([self.rise, rise])
 
 
-def _in_range(
+def _clip_to_range(
     uncertainty: Uncertainty, c: int, interval: tuple[float, float]
 ) -> tuple[float, float]:
     """An interval of the c-th parameter in its range."""
@@ -337,14 +339,14 @@ def _in_range(
     return (interval[0] - low) / width, (interval[1] - low) / width
 
 
-def _elsewhere(
+def _start_elsewhere(
     uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[LikelihoodProfile]
 ) -> Lanes:
     """Lanes from the best place of each range beyond the profile's interval that fits as well."""
     begin = np.array([uncertainty.unit, *uncertainty.local_minima])
     wanted = []  # (column, value in the range)
     for c, profile in zip(column, curves, strict=True):
-        low, high = _in_range(uncertainty, c, profile.interval)
+        low, high = _clip_to_range(uncertainty, c, profile.interval)
         values = np.concatenate([GRID, begin[1:, c]])
         wanted += [
             (c, v)
@@ -360,10 +362,14 @@ def _elsewhere(
     start = np.tile(begin, (len(wanted), 1))
     rows = np.arange(len(start))
     start[rows, columns] = np.repeat([v for _, v in wanted], len(begin))
-    descent = others_free(uncertainty, start, columns, tolerance=0.05)
-    rise = (descent.deviance - uncertainty.deviance) * threshold() / uncertainty.limits[columns]
+    descent = descend_others(uncertainty, start, columns, tolerance=0.05)
+    rise = (
+        (descent.deviance - uncertainty.deviance)
+        * compute_threshold()
+        / uncertainty.limits[columns]
+    )
     best = [rows[columns == c][rise[columns == c].argmin()] for c in np.unique(columns)]
-    best = np.array([k for k in best if rise[k] < threshold()], dtype=int)
+    best = np.array([k for k in best if rise[k] < compute_threshold()], dtype=int)
     return Lanes(uncertainty, columns[best], descent.unit[best], rise[best], descent.simulations)
 
 

@@ -11,7 +11,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from tractexp.identification.uncertainty import Uncertainty, threshold
+from tractexp.identification.uncertainty import Uncertainty, compute_threshold
 from tractexp.inference.least_squares import Descent
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
@@ -105,7 +105,11 @@ class Lanes:
         """From coordinates `unit` (k, D), where the deviance is up by `rise` (k,) and so many
         `simulations` led to.
         """
-        self.uncertainty, self.limit, self.simulations = uncertainty, threshold(), simulations
+        self.uncertainty, self.limit, self.simulations = (
+            uncertainty,
+            compute_threshold(),
+            simulations,
+        )
         self.origin = unit
         self.risen = rise
         self.column = np.repeat(column, 2)
@@ -152,7 +156,7 @@ class Lanes:
         target = np.clip(here + sign * self.step[lanes], 0.0, 1.0)
         start = np.clip(self.unit[lanes] + self.slope[lanes] * (target - here)[:, None], 0.0, 1.0)
         start[np.arange(len(lanes)), column] = target
-        descent = others_free(self.uncertainty, start, column, tolerance=0.01)
+        descent = descend_others(self.uncertainty, start, column, tolerance=0.01)
         self.simulations += descent.simulations
         rise = (descent.deviance - self.uncertainty.deviance) * self.scale[lanes]
         moved = target - here
@@ -227,7 +231,7 @@ class Lanes:
         ]
 
 
-def others_free(
+def descend_others(
     uncertainty: Uncertainty, start: np.ndarray, columns: np.ndarray, tolerance: float
 ) -> Descent:
     """Descents from coordinates (n, D), each with one of the `columns` (n,) as it is."""

@@ -51,7 +51,7 @@ class Projection:
         recorded and `FASTEST` of the sampling rate.
         """
         seconds = max((len(port.u) - port.start) * port.step for port in ports)
-        current = _rows(ports, lambda port: port.i - port.steady_response)
+        current = _stack_ports(ports, lambda port: port.i - port.steady_response)
         return cls(ports, current, 1 / seconds, 1 / max(port.step for port in ports))
 
     def linear_part(self, poles: Complex) -> tuple[Complex, Complex, Complex]:
@@ -66,7 +66,7 @@ class Projection:
         (R,) complex
             What they leave of the current.
         """
-        responses = _rows(self.ports, lambda port: basis(port, poles))
+        responses = _stack_ports(self.ports, lambda port: compute_port_basis(port, poles))
         orthonormal, triangle = np.linalg.qr(responses)
         inside = orthonormal.conj().T @ self.current
         coefficients = np.linalg.lstsq(triangle, inside, rcond=None)[0]
@@ -92,7 +92,7 @@ class Projection:
         _, base, residual = self.linear_part(poles)
 
         def measure_correlation(pole: complex) -> float:
-            response = _rows(self.ports, lambda port: of_pole(port, pole))
+            response = _stack_ports(self.ports, lambda port: compute_response_of_pole(port, pole))
             apart = response - base @ (base.conj().T @ response)
             least = PARALLEL * np.linalg.norm(response) + np.finfo(float).tiny
             return float(abs(np.vdot(residual, apart)) / max(np.linalg.norm(apart), least))
@@ -122,34 +122,35 @@ class Projection:
         ).T
         first = np.concatenate([np.log(-poles.real), poles.imag])[: bounds.shape[1]]
         optimum = least_squares(
-            lambda x: _parts(self.linear_part(_poles(x, n))[2]),
+            lambda x: _stack_parts(self.linear_part(_decode_poles(x, n))[2]),
             np.clip(first, *bounds),
-            lambda x: self.jacobian(_poles(x, n)),  # pyright: ignore[reportArgumentType]
+            lambda x: self.jacobian(_decode_poles(x, n)),  # pyright: ignore[reportArgumentType]
             bounds=bounds,
             x_scale="jac",
             method="dogbox",
             max_nfev=MOST_PROJECTION_STEPS,
         )
-        return _poles(optimum.x, n)
+        return _decode_poles(optimum.x, n)
 
     def jacobian(self, poles: Complex) -> np.ndarray:
         """The derivatives (2 R, n or 2 n) of what is left, real parts above imaginary ones, by the
         logarithms of the decays and by the frequencies.
         """
         coefficients, base, _ = self.linear_part(poles)
-        moved = _rows(
-            self.ports, lambda port: np.stack([with_pole(port, p) for p in poles], axis=1)
+        moved = _stack_ports(
+            self.ports,
+            lambda port: np.stack([differentiate_pole_response(port, p) for p in poles], axis=1),
         )
         moved = moved * coefficients[: len(poles)]
         moved = base @ (base.conj().T @ moved) - moved
-        return _parts(
+        return _stack_parts(
             np.concatenate(
                 [moved * poles.real] + ([1j * moved] if not self.ports[0].series else []), axis=1
             )
         )
 
 
-def basis(port: Port, poles: Complex) -> Complex:
+def compute_port_basis(port: Port, poles: Complex) -> Complex:
     """The responses of the parts of a network to the voltage.
 
     Parameters
@@ -165,13 +166,13 @@ def basis(port: Port, poles: Complex) -> Complex:
         Of each pole, of the derivative and, where that is open, of a constant. Of a path in series
         those of its poles alone.
     """
-    columns = [of_pole(port, pole) for pole in poles]
+    columns = [compute_response_of_pole(port, pole) for pole in poles]
     if not port.series:
         columns += [np.gradient(port.u, port.step), *([port.u] if port.steady is None else [])]
     return np.array(columns, dtype=complex).reshape(len(columns), len(port.u)).T
 
 
-def of_pole(port: Port, pole: complex) -> Complex:
+def compute_response_of_pole(port: Port, pole: complex) -> Complex:
     """The response (N,) of s / (s - p) to a port's voltage; of a path in series that of 1 / (s -
     p).
     """
@@ -179,7 +180,7 @@ def of_pole(port: Port, pole: complex) -> Complex:
     return x if port.series else port.u + pole * x
 
 
-def with_pole(port: Port, pole: complex) -> Complex:
+def differentiate_pole_response(port: Port, pole: complex) -> Complex:
     """The derivative (N,) of the response of a pole by the pole."""
     x = compute_pole_response(port.u, pole, port.step)
     moved = compute_pole_response(x, pole, port.step)
@@ -219,20 +220,20 @@ def compute_pole_response(u: Complex, pole: complex, step: float) -> Complex:
     return sum_with_decay(driven, np.exp(z))
 
 
-def _rows(ports: Sequence[Port], of: Callable[[Port], Complex]) -> Complex:
+def _stack_ports(ports: Sequence[Port], of: Callable[[Port], Complex]) -> Complex:
     """What `of` gives of each port, (N, ...), at the samples that are compared, one port after the
     other.
     """
     return np.concatenate([of(port)[np.isfinite(port.i)] for port in ports])
 
 
-def _poles(x: np.ndarray, n: int) -> Complex:
+def _decode_poles(x: np.ndarray, n: int) -> Complex:
     """Poles (n,) of the logarithms of their decays and, where they may oscillate, their frequencies
     [rad/s].
     """
     return -np.exp(x[:n]) + 1j * (x[n:] if len(x) > n else np.zeros(n))
 
 
-def _parts(z: Complex) -> np.ndarray:
+def _stack_parts(z: Complex) -> np.ndarray:
     """Real parts above imaginary ones."""
     return np.concatenate([z.real, z.imag])

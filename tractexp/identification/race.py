@@ -16,7 +16,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.multistart import distinct, search_box
+from tractexp.inference.multistart import search_box, select_distinct
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model
 from tractexp.noise.color import SMALLEST_DEVIATION
@@ -29,7 +29,7 @@ WORSE_FITTED = "fitted it already leaves more than the best predicts"
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Structure:
     """A structure that takes part: the name of its choice, its model and what bounds it."""
 
     name: str
@@ -69,7 +69,7 @@ class Entry:
 
 
 def race_structures(
-    candidates: Sequence[Candidate],
+    candidates: Sequence[Structure],
     events: Sequence[Event],
     fixed: Mapping[str, float] | None = None,
     parts: Any = make_silent_counter,
@@ -118,7 +118,7 @@ class _Fitted:
     def predict(self) -> Entry:
         """The entry, with what it leaves of dips or stretches that it is not fitted to."""
         likelihood, squares = self.likelihood, 0.0
-        for held in _folds(likelihood.problem, self.compared):
+        for held in _list_folds(likelihood.problem, self.compared):
             rest = replace(likelihood, valid=likelihood.valid & ~held)
             left = likelihood.residuals(rest.descent(self.ends).best[None])[0]
             squares += float(np.sum(np.where(held & self.compared, left, 0.0) ** 2))
@@ -126,7 +126,7 @@ class _Fitted:
 
 
 def _fit(
-    candidate: Candidate, events: Sequence[Event], fixed: Mapping[str, float]
+    candidate: Structure, events: Sequence[Event], fixed: Mapping[str, float]
 ) -> _Fitted | Entry:
     """A structure fitted to all dips; its entry where it cannot be."""
     own = {name: value for name, value in fixed.items() if name in candidate.model.names}
@@ -139,10 +139,10 @@ def _fit(
         why = "nothing in its bounds can be simulated"
         return Entry(candidate.name, problem.space.dimension, np.inf, np.inf, why)
     compared = _mark_compared(problem)
-    size = _response(problem, compared)
+    size = _measure_response(problem, compared)
     left = likelihood.residuals(ends.best[None])[0]
     error = _share(float(np.sum(np.where(compared, left, 0.0) ** 2)), size)
-    starts = distinct(ends, likelihood.free)
+    starts = select_distinct(ends, likelihood.free)
     return _Fitted(candidate.name, likelihood, starts, compared, size, error)
 
 
@@ -169,12 +169,12 @@ def _subtract_means(problem: Problem) -> np.ndarray:
     return measured
 
 
-def _response(problem: Problem, counted: np.ndarray) -> float:
+def _measure_response(problem: Problem, counted: np.ndarray) -> float:
     """The load's response from each dip on: the sum of its squares [pu²]."""
     return max(float(np.sum(_subtract_means(problem)[counted] ** 2)), SMALLEST_DEVIATION**2)
 
 
-def _folds(problem: Problem, counted: np.ndarray) -> Iterator[np.ndarray]:
+def _list_folds(problem: Problem, counted: np.ndarray) -> Iterator[np.ndarray]:
     """What is left out in turn, masks (1, N): each event, or stretches of the only one in which the
     load answers equally much.
     """

@@ -17,7 +17,7 @@ from tractexp.noise.model import Noise, Pair
 OUTLIER = 5.0  # robust standard deviations from which a robust loss takes a sample for an outlier
 
 
-def noise_at(
+def estimate_noise_at(
     observed: Observed,
     likelihood: Likelihood,
     unit: np.ndarray,
@@ -50,12 +50,12 @@ def noise_at(
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
     residual = rows.reshape(measured.shape)
     values = likelihood.values(unit)
-    return observed.noise(residual, likelihood.valid, J, values, input_modes, whole) or noise_of(
-        likelihood, residual
-    )
+    return observed.noise(
+        residual, likelihood.valid, J, values, input_modes, whole
+    ) or fit_residual_noise(likelihood, residual)
 
 
-def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
+def fit_residual_noise(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
     """An autoregression of each event's and channel's residual (2, N); what the fit has absorbed is
     given back.
     """

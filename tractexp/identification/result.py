@@ -21,7 +21,7 @@ from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.fit import TRAIN
 from tractexp.identification.forecast import Forecast
 from tractexp.identification.search import History
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import format_percent
 from tractexp.model.drive import PHASORS
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.outcome import Plain
@@ -35,7 +35,9 @@ SMALL_Q = 0.3  # of S: with less, an epsilon_q beyond Eq. (20) may be a small er
 FILE = "result.json"  # in the folder of a run
 
 
-def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str, float | str | None]:
+def build_parts(
+    node: Mapping[str, Any],
+) -> tuple[Any, Any, list[Any], str, str, float | str | None]:
     """The motor, static load and effects a model configuration names, built; integration, domain,
     recorder's window.
     """
@@ -52,7 +54,7 @@ def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str, float
     )
 
 
-def by_event(
+def name_by_event(
     values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]
 ) -> dict[str, float]:
     """Parameters by name, with T_m[1], T_m[2], ... where each event has its own."""
@@ -99,7 +101,7 @@ class Result(Plain):
     # value, interval, of_S of the fitted events; held_out the same of those; events: name, role,
     # value, interval, of_S
     model_error: dict[str, Any] = field(default_factory=dict)
-    # the best one beside it: `yardstick`
+    # the best one beside it: `compare_with_network`
     linear_network: dict[str, Any] = field(default_factory=dict)
     # the band of P and Q for a dip that was not seen: `forecast_next_dip`
     next_dip: dict[str, Any] = field(default_factory=dict)
@@ -152,11 +154,11 @@ class Result(Plain):
         none, parameters that are missing or no finite numbers.
         """
         stored.check_fields(cls, content, where)
-        result = cls(**stored.without_nulls(cls, content))
+        result = cls(**stored.replace_nulls(cls, content))
         for name in ("parameters", "per_event", "before", "bounds"):
             stored.check_numbers(f"{where}: {name}", getattr(result, name))
         try:
-            motor, static, effects, *_ = parts(result.model)
+            motor, static, effects, *_ = build_parts(result.model)
             ratio = result.base.ratio
         except (KeyError, TypeError, ValueError, AttributeError, ZeroDivisionError) as error:
             raise UserError(
@@ -170,8 +172,8 @@ class Result(Plain):
                 " again"
             )
         stored.check_parameters(where, result.parameters, (motor, static, *effects))
-        for sentence in stored.outside(
-            by_event(result.parameters, result.per_event), result.bounds
+        for sentence in stored.describe_outside(
+            name_by_event(result.parameters, result.per_event), result.bounds
         ):
             warnings.warn(f"{where}: {sentence}", UserWarning, stacklevel=2)
         return result
@@ -189,7 +191,7 @@ class Result(Plain):
     def on_base_of(self, record: Record) -> dict[str, float]:
         """The parameters on the base that a record is on."""
         ratio = self.base.compute_ratio(record)
-        motor, static, effects, *_ = parts(self.model)
+        motor, static, effects, *_ = build_parts(self.model)
         exponents = {
             p.name: p.power_exponent for part in (motor, static, *effects) for p in part.parameters
         }
@@ -202,7 +204,7 @@ class Result(Plain):
         """The parameters whose values are others on the file's base, in one line; "" where it is
         the record's own.
         """
-        own = by_event(self.parameters, self.per_event)
+        own = name_by_event(self.parameters, self.per_event)
         values = [f"{n} = {v:.5g}" for n, v in self.parameters_on_given_base.items() if v != own[n]]
         return f"on {self.base.file}: {', '.join(values)}" if values else ""
 
@@ -211,13 +213,13 @@ class Result(Plain):
         """The estimate by the names of intervals and verdicts: T_m[1], T_m[2] where events have
         values of their own.
         """
-        values = by_event(self.parameters, self.per_event)
+        values = name_by_event(self.parameters, self.per_event)
         return {name: values[name] for name in self.verdicts or values}
 
     @property
     def nuisances(self) -> dict[str, float]:
         """The parameters of the effects that are in the model because the records show them."""
-        _, _, effects, *_ = parts(self.model)
+        _, _, effects, *_ = build_parts(self.model)
         names = [
             p.name
             for effect in effects
@@ -242,12 +244,11 @@ class Result(Plain):
         divided by.
         """
         holds = "holds" if self.acceptable else "does NOT hold"
-        sentence = (
-            f"acceptance of Eq. (20), epsilon_p and epsilon_q below {in_percent(ACCEPTED)}: {holds}"
-        )
+        limit = format_percent(ACCEPTED)
+        sentence = f"acceptance of Eq. (20), epsilon_p and epsilon_q below {limit}: {holds}"
         shares = [e["Q_over_S"] for e in self.events if e["role"] == TRAIN and "Q_over_S" in e]
         if shares and min(shares) < SMALL_Q and self.epsilon_q >= ACCEPTED > self.epsilon_p:
-            sentence += f" (epsilon_q divides by Q alone, here {in_percent(min(shares))} of S)"
+            sentence += f" (epsilon_q divides by Q alone, here {format_percent(min(shares))} of S)"
         return sentence
 
     def write(self, path: Path) -> Path:
@@ -290,10 +291,10 @@ class Result(Plain):
 
     def _drive(self, t: Any, U: Any, f: Any, P0: float | None, Q0: float | None) -> "Driven":
         """The model at a voltage that is checked."""
-        model = compose(*parts(self.model))
+        model = compose(*build_parts(self.model))
         drawn = {key: value for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
         stored.check_numbers("predict()", drawn)
-        signals = stored.signals({"t": t, "U": U, "f": f})
+        signals = stored.read_signals({"t": t, "U": U, "f": f})
         t, U, f = signals["t"], signals["U"], signals.get("f")
         dips = find_dips(t, U)
         start = max(dips[0][0], 1) if dips else None

@@ -16,8 +16,13 @@ import numpy as np
 
 from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError
-from tractexp.identification.uncertainty import Uncertainty, threshold
-from tractexp.identification.verdict import IDENTIFIED, IDENTIFIED_SHARE, ParameterVerdict, size
+from tractexp.identification.uncertainty import Uncertainty, compute_threshold
+from tractexp.identification.verdict import (
+    IDENTIFIED,
+    IDENTIFIED_SHARE,
+    ParameterVerdict,
+    choose_scale,
+)
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
 from tractexp.parameter import spread_evenly
@@ -56,7 +61,7 @@ class RivalStructure:
         return {"name": self.name, "objective_ratio": self.squares, "parameters": self.values}
 
 
-def with_rivals(
+def add_rivals(
     uncertainty: Uncertainty, parts: Callable[[int], Counting] = make_silent_counter
 ) -> Uncertainty:
     """The judgement with the structures that fit as well as the model, or better.
@@ -73,7 +78,7 @@ def with_rivals(
     Uncertainty
         A parameter that a rival moves beyond its interval has the objection in its verdict.
     """
-    structures = list(_structures(uncertainty.likelihood.problem.model))
+    structures = list(_list_structures(uncertainty.likelihood.problem.model))
     candidates = list[RivalStructure | None]()
     with parts(len(structures)) as ended:
         for name, model in structures:
@@ -99,12 +104,12 @@ def _find_moved_parameters(
         ]
         far, by = max(there, key=lambda one: abs(one[0] - value), default=(value, ""))
         half = max(abs(far - value), float(np.ptp(beside.intervals[j])) / 2)
-        wide = half > IDENTIFIED_SHARE * size(value, own.lower[j], own.upper[j])
+        wide = half > IDENTIFIED_SHARE * choose_scale(value, own.lower[j], own.upper[j])
         if by and ((wide and verdict.word == IDENTIFIED) or not low <= far <= high):
             yield name, verdict.add_objection(f"with {by} it is {far:.4g}", enough=wide)
 
 
-def _structures(model: Model) -> Iterator[tuple[str, Model]]:
+def _list_structures(model: Model) -> Iterator[tuple[str, Model]]:
     """Yield names of rivals and the models with them: another static load, or one effect more."""
     registered = discover()
     beside = model.integration, model.domain, model.window
@@ -112,7 +117,7 @@ def _structures(model: Model) -> Iterator[tuple[str, Model]]:
         cls = get("model/static", name)
         if cls.rival and type(model.static).rival and name != model.static.name:
             other = compose(model.motor, cls(), model.effects, *beside)
-            if _composes(other):
+            if _can_compose(other):
                 yield name, other
     there = {effect.name for effect in model.effects}
     for name in sorted(registered.get("effect", {}).keys() - there):
@@ -121,7 +126,7 @@ def _structures(model: Model) -> Iterator[tuple[str, Model]]:
             yield name, model.extend([cls()])
 
 
-def _composes(model: Model) -> bool:
+def _can_compose(model: Model) -> bool:
     """Whether the equations take all effects of the model: another static load may refuse one."""
     if not model.effects:
         return True
@@ -142,10 +147,10 @@ def _fit_rival(uncertainty: Uncertainty, name: str, model: Model) -> RivalStruct
         other = problem.vary(model, own)
     except UserError:
         return None
-    starts = _starts(uncertainty, other)
+    starts = _place_starts(uncertainty, other)
     likelihood, ended = uncertainty.descend_in(other, starts, RIVAL_ITERATIONS)
     least = float(ended.deviance.min())
-    if not least < uncertainty.deviance + threshold():
+    if not least < uncertainty.deviance + compute_threshold():
         return None
     free = likelihood.values(ended.best)
     values = dict(zip(other.space.names, free.tolist(), strict=True))
@@ -154,7 +159,7 @@ def _fit_rival(uncertainty: Uncertainty, name: str, model: Model) -> RivalStruct
     return RivalStructure(name, squares, shared, other, free)
 
 
-def _starts(uncertainty: Uncertainty, other: Problem) -> np.ndarray:
+def _place_starts(uncertainty: Uncertainty, other: Problem) -> np.ndarray:
     """Points (n, free) of a rival's box: the shared parameters as estimated, its own as usual and
     all over.
     """

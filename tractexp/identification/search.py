@@ -205,7 +205,7 @@ class _Counter:
         return x, r
 
 
-def _before_polish(limits: Limits, dimension: int) -> Limits:
+def _reserve_polish(limits: Limits, dimension: int) -> Limits:
     """The part of `limits` that a polished search may spend before the polish."""
     simulations = limits.simulations
     seconds = limits.seconds
@@ -237,7 +237,7 @@ def _begin_search(
     return iterations
 
 
-def _iterations(
+def _run_iterations(
     counter: _Counter, optimizer: Optimizer, rng: np.random.Generator
 ) -> Iterator[None]:
     """The optimizer's iterations, then, where asked for, the polish in what the limits have kept
@@ -248,7 +248,7 @@ def _iterations(
         return
     limits = counter.limits
     counter.elite = Elite(counter.box)
-    counter.limits = _before_polish(limits, counter.box.dimension)
+    counter.limits = _reserve_polish(limits, counter.box.dimension)
     try:
         yield from _begin_search(counter, optimizer, rng)
     except _Reached:
@@ -302,7 +302,7 @@ def search(
             progress(len(rows) - 1, counter.best, counter.simulations)
 
     try:
-        for _ in _iterations(counter, optimizer, np.random.default_rng(seed)):
+        for _ in _run_iterations(counter, optimizer, np.random.default_rng(seed)):
             note()
         if not counter.simulations:
             raise UserError(
@@ -313,14 +313,14 @@ def search(
     except _Stop as stop:
         status = str(stop)
     except KeyboardInterrupt as stop:
-        ended = _result(counter, rows, f"was stopped after {counter.simulations} simulations")
+        ended = _build_result(counter, rows, f"was stopped after {counter.simulations} simulations")
         raise Stopped.from_interrupt(stop, state=ended) from None
     if not rows or rows[-1][0] < counter.simulations:
         note()
-    return _result(counter, rows, status)
+    return _build_result(counter, rows, status)
 
 
-def _result(
+def _build_result(
     counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str
 ) -> SearchResult:
     """What a search found: the best of all its evaluations, and its history, one row (simulations,

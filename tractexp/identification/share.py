@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identification.profile_lanes import others_free
+from tractexp.identification.profile_lanes import descend_others
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import BOUND_DISTANCE
 from tractexp.inference.sized_problem import find_torque
@@ -74,7 +74,7 @@ def _draw_profile(uncertainty: Uncertainty, c: int, drawn: float) -> list[dict[s
     starts = np.tile(uncertainty.unit, (SHARES_HELD, 1))
     starts[:, c] = held
     columns = np.full(SHARES_HELD, c)
-    ended = others_free(uncertainty, starts, columns, tolerance=0.05)
+    ended = descend_others(uncertainty, starts, columns, tolerance=0.05)
     low = uncertainty.lower[c]
     high = uncertainty.upper[c]
     shares = (low + held * (high - low)) / drawn

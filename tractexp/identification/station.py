@@ -15,11 +15,11 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.identification.composition import Composition, estimate_composition
 from tractexp.identification.fit import TRAIN, VALIDATE, Fit, explain_refusal, respond
-from tractexp.inference.blocks import blocks_of
-from tractexp.inference.differences import central_differences
+from tractexp.inference.blocks import cut_blocks
+from tractexp.inference.differences import compute_central_differences
 from tractexp.inference.least_squares import descend
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.model_error import model_error
+from tractexp.inference.model_error import compute_model_error
 from tractexp.inference.multistart import search_box
 from tractexp.inference.prediction_band import PredictionBand, measure_band
 from tractexp.inference.sized_problem import SizedProblem
@@ -263,7 +263,7 @@ def _scatter_torques(likelihood: Likelihood, problem: SizedProblem, unit: np.nda
     squares = np.zeros(drive.events)
     counts = np.zeros(drive.events)
     whole = np.add.reduceat(weight, drive.first[:-1])
-    for block in blocks_of(problem.events, problem.drive):
+    for block in cut_blocks(problem.events, problem.drive):
         e = find_event(problem, block)
         left = max(whole[e] - weight[block].sum(), SMALLEST_SQUARE)
         squares[e] += (acting[block].sum() / left) ** 2
@@ -281,7 +281,7 @@ def find_event(problem: SizedProblem, block: slice) -> int:
 
 def _find_odd(fit: SharedFit, known: Mapping[int, str]) -> dict[int, str]:
     """Dips that the model of the others misses by far, and why they are left out."""
-    errors = np.array([model_error([one]).value for one in fit.fits])
+    errors = np.array([compute_model_error([one]).value for one in fit.fits])
     kept = [k for k in range(len(errors)) if k not in known and np.isfinite(errors[k])]
     if len(kept) < FEWEST_JUDGED_DIPS:
         return {}
@@ -307,7 +307,7 @@ def differentiate(
     torque of each row's dip.
     """
     lane = np.zeros(1, dtype=int)
-    rows, J = central_differences(
+    rows, J = compute_central_differences(
         likelihood.rows,
         unit[None],
         lane,
@@ -369,7 +369,7 @@ def _predict(fit: SharedFit, composition: Composition, dip: Dip, position: int) 
             None,
         )
     played = respond(fit.problem.model, values, dip.event, VALIDATE)
-    error = model_error([played]).value
+    error = compute_model_error([played]).value
     return Predicted(
         position,
         float(share),

@@ -17,11 +17,15 @@ from tractexp.identification.station import (
     differentiate,
     find_event,
 )
-from tractexp.inference.blocks import blocks_of
+from tractexp.inference.blocks import cut_blocks
 from tractexp.inference.information import Information
-from tractexp.inference.interval import interval_factor
+from tractexp.inference.interval import compute_interval_factor
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.sandwich import SINGULAR_ROUNDING, moves_without_blocks, robust_root
+from tractexp.inference.sandwich import (
+    SINGULAR_ROUNDING,
+    compute_moves_without_blocks,
+    compute_robust_root,
+)
 from tractexp.inference.sized_problem import SizedProblem
 
 CONSTANT_CHANCE = 1e-3  # of a constant that looks as if it differed from dip to dip
@@ -63,13 +67,13 @@ def judge_constants(spec: LoadSpec, fit: SharedFit) -> Constants:
     rows = rows.reshape(problem.drive.channels, -1)
     columns = own.T.reshape(*rows.shape, -1)
     blocks = _choose_blocks(problem)
-    moved = moves_without_blocks(
+    moved = compute_moves_without_blocks(
         columns,
         rows,
         blocks,
         own @ own.T,
     )
-    root, _, _ = robust_root(own.T, moved)
+    root, _, _ = compute_robust_root(own.T, moved)
     scale = problem.scale_to_own_power
     values = fit.constants * scale
     width = (problem.upper - problem.lower)[problem.constants]
@@ -82,7 +86,7 @@ def judge_constants(spec: LoadSpec, fit: SharedFit) -> Constants:
         SINGULAR_ROUNDING,
     )
     spreads = _find_spreads(problem, columns, rows, fit.constants)
-    factor = interval_factor(max(len(blocks) - 1, 1))
+    factor = compute_interval_factor(max(len(blocks) - 1, 1))
     return Constants(information, factor, spreads)
 
 
@@ -90,7 +94,7 @@ def _choose_blocks(problem: SizedProblem) -> list[slice]:
     """What is left out in turn: each dip, and stretches where there are few of them."""
     free = len(problem.constants)
     if problem.drive.events <= free:
-        return blocks_of(problem.events, problem.drive, free)
+        return cut_blocks(problem.events, problem.drive, free)
     return [problem.drive.part(e) for e in range(problem.drive.events)]
 
 
@@ -113,7 +117,7 @@ def _find_spreads(
     """
     from scipy.special import chdtri
 
-    blocks = blocks_of(problem.events, problem.drive)
+    blocks = cut_blocks(problem.events, problem.drive)
     events = [find_event(problem, block) for block in blocks]
     spreads = {}
     width = (problem.upper - problem.lower)[problem.constants]

@@ -10,12 +10,12 @@ import numpy as np
 
 from tractexp.cache import provenance
 from tractexp.identification.adequacy import Adequacy, Grade, Surprise, grade_errors
-from tractexp.identification.conclude import active_bounds, at_bound
-from tractexp.identification.fit import Fit, model_errors
+from tractexp.identification.conclude import describe_active_bounds, list_at_bound
+from tractexp.identification.fit import Fit, tabulate_model_errors
 from tractexp.identification.result import Result
 from tractexp.identification.station import LoadSpec, SharedFit
 from tractexp.identification.station_constants import Constants
-from tractexp.inference.model_error import model_error, relative_errors
+from tractexp.inference.model_error import compute_model_error, compute_relative_errors
 from tractexp.record import OwnBase
 from tractexp.record.identity import Identity
 
@@ -63,7 +63,7 @@ def build_result(
     torque = float(np.clip(share * event.P0, *_find_range(fit)))
     values = dict(zip(problem.model.names, fit.spell_parameters(torque).tolist(), strict=True))
     played = [fit.fits[k] for k in fit.regular]
-    epsilon_p, epsilon_q = relative_errors(played)
+    epsilon_p, epsilon_q = compute_relative_errors(played)
     squares = [_sum_squares(one) for one in played]
     return Result(
         parameters=values,
@@ -77,7 +77,7 @@ def build_result(
         status=f"fitted to {len(played)} dips",
         seed=0,
         events=[one.to_dict() for one in played],
-        at_bound=at_bound(problem, fit.values),
+        at_bound=list_at_bound(problem, fit.values),
         units={p.name: p.unit for p in problem.parameters},
         bounds={p.name: list(p.bounds) for p in problem.parameters},
         model=dict(node),
@@ -87,7 +87,7 @@ def build_result(
             "Q0": event.Q0,
             "frequency": event.record.base.frequency,
         },
-        model_error=model_errors(played),
+        model_error=tabulate_model_errors(played),
         adequacy=_grade(fit, played, predicted).to_dict(),
         next_dip=dict(next_dip),
         intervals=_scale_intervals(fit, constants, torque),
@@ -101,10 +101,10 @@ def build_result(
 
 def _grade(fit: SharedFit, played: Sequence[Fit], predicted: Sequence[Fit]) -> Adequacy:
     """What the model is good for, by what it leaves: noise is not asked."""
-    fitted = model_error(played)
-    ahead = model_error(predicted) if predicted else None
+    fitted = compute_model_error(played)
+    ahead = compute_model_error(predicted) if predicted else None
     torques = [fit.problem.space.names[k] for k in fit.problem.shares]
-    bounds = active_bounds(fit.problem, fit.values, torques)
+    bounds = describe_active_bounds(fit.problem, fit.values, torques)
     graded = grade_errors(NOT_JUDGED, fitted, ahead, bounds)
     if graded.grade is Grade.WRONG_MODEL:
         return graded

@@ -35,7 +35,7 @@ def check_fields(cls: type[Any], content: Any, where: str) -> None:
         check_kind(f"{where}: {name}", _restore_numbers(value), kinds[name])
 
 
-def without_nulls(cls: type[Any], content: Mapping[str, Any]) -> dict[str, Any]:
+def replace_nulls(cls: type[Any], content: Mapping[str, Any]) -> dict[str, Any]:
     """Content with nan in the place of a field's number that did not exist when it was saved."""
     kinds = get_type_hints(cls)
     return {
@@ -63,7 +63,7 @@ def check_numbers(where: str, numbers: Any) -> None:
     """Raise `UserError` for a value of a mapping, and of those and lists within it, that is no
     finite number.
     """
-    for key, value in _leaves(where, numbers):
+    for key, value in _list_leaves(where, numbers):
         try:
             finite = not isinstance(value, bool) and math.isfinite(value)
         # what is no number, or a whole one with hundreds of digits
@@ -73,14 +73,14 @@ def check_numbers(where: str, numbers: Any) -> None:
             raise UserError(f"{key} = {value!r:.40} is no finite number; identify again")
 
 
-def _leaves(where: str, value: Any) -> Iterator[tuple[str, Any]]:
+def _list_leaves(where: str, value: Any) -> Iterator[tuple[str, Any]]:
     """(place, value) of everything within a value that is neither mapping nor list."""
     if isinstance(value, Mapping):
         for key, inner in value.items():
-            yield from _leaves(f"{where}.{key}", inner)
+            yield from _list_leaves(f"{where}.{key}", inner)
     elif isinstance(value, list):
         for k, inner in enumerate(value):
-            yield from _leaves(f"{where}[{k}]", inner)
+            yield from _list_leaves(f"{where}[{k}]", inner)
     else:
         yield where, value
 
@@ -94,7 +94,7 @@ def check_parameters(where: str, values: Mapping[str, float], parts: Iterable[An
             )
 
 
-def outside(values: Mapping[str, float], bounds: Mapping[str, list[float]]) -> list[str]:
+def describe_outside(values: Mapping[str, float], bounds: Mapping[str, list[float]]) -> list[str]:
     """Sentences on the values that are outside their bounds, as fixed ones may be, and none that
     was searched.
     """
@@ -106,13 +106,15 @@ def outside(values: Mapping[str, float], bounds: Mapping[str, list[float]]) -> l
     ]
 
 
-def signals(given: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def read_signals(given: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Signals (N,) by name, t among them, that a model is to be driven by.
 
     Raises `UserError`, naming signal and sample, for what is no finite number, no array (N,) of two
     samples or more, for a voltage that is not above zero, and for times that are not uniform.
     """
-    arrays = {name: _signal(name, values) for name, values in given.items() if values is not None}
+    arrays = {
+        name: _read_signal(name, values) for name, values in given.items() if values is not None
+    }
     t = arrays["t"]
     for name, values in arrays.items():
         if values.shape != t.shape:
@@ -136,7 +138,7 @@ def signals(given: Mapping[str, Any]) -> dict[str, np.ndarray]:
     return arrays
 
 
-def _signal(name: str, values: Any) -> np.ndarray:
+def _read_signal(name: str, values: Any) -> np.ndarray:
     """A signal (N,) of a stored result. Raises `UserError` for what is no number, no row, or not
     finite, naming the sample.
     """

@@ -15,12 +15,12 @@ import numpy as np
 from tractexp.identification.verdict import ParameterVerdict, judge
 from tractexp.inference.differences import CENTRAL
 from tractexp.inference.information import Information
-from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
+from tractexp.inference.interval import INTERVAL_LEVEL, compute_interval_factor
 from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
-from tractexp.inference.residual_tests import jarque_bera, ljung_box
-from tractexp.inference.sandwich import scatter
+from tractexp.inference.residual_tests import run_jarque_bera, run_ljung_box
+from tractexp.inference.sandwich import estimate_scatter
 from tractexp.inference.separable import Sensitivities
 from tractexp.noise.color import FEWEST_NOISE_SAMPLES
 from tractexp.storage import files
@@ -65,7 +65,7 @@ class Uncertainty:
     rivals : tuple of RivalStructure
         Structures that fit as well.
     unrecorded : {channel: dict}
-        Inputs that the records lack, as of `with_unrecorded`.
+        Inputs that the records lack, as of `add_unrecorded`.
     """
 
     likelihood: Likelihood
@@ -161,7 +161,10 @@ class Uncertainty:
                 seen = white[c, part][valid[c, part]]
                 if len(seen) < FEWEST_NOISE_SAMPLES:
                     continue
-                tests = ljung_box(seen, self.of_noise.noise.pair(e)[c].order), jarque_bera(seen)
+                tests = (
+                    run_ljung_box(seen, self.of_noise.noise.pair(e)[c].order),
+                    run_jarque_bera(seen),
+                )
                 results += [
                     {"event": event.record.name, "channel": channel, **told} for told in tests
                 ]
@@ -270,13 +273,13 @@ class Uncertainty:
         }
 
 
-def threshold() -> float:
+def compute_threshold() -> float:
     """What the deviance may rise by within a 95 % interval: the chi-squared quantile of one degree
     of freedom.
 
     Examples
     --------
-    >>> round(threshold(), 2)
+    >>> round(compute_threshold(), 2)
     3.84
     """
     from scipy.special import chdtri
@@ -309,7 +312,9 @@ def conclude(
     """
     problem = likelihood.problem
     likelihood, deviance, information, factors, limits = (
-        _curvature(likelihood, unit) if likelihood.initial_power else _scatter(likelihood, unit)
+        _spread_by_curvature(likelihood, unit)
+        if likelihood.initial_power
+        else _spread_by_scatter(likelihood, unit)
     )
     information = replace(
         information, held=_find_immovable_parameters(likelihood, unit, information.blind)
@@ -353,31 +358,31 @@ def _find_immovable_parameters(
 Spread = tuple[Likelihood, float, Information, np.ndarray, np.ndarray]
 
 
-def _curvature(likelihood: Likelihood, unit: np.ndarray) -> Spread:
+def _spread_by_curvature(likelihood: Likelihood, unit: np.ndarray) -> Spread:
     """How far the maximum of a likelihood spreads, by its curvature."""
     problem = likelihood.problem
     free = likelihood.free
     rows, J = likelihood.jacobian(unit)
     width = problem.upper - problem.lower
     information = Information(problem.space.names, likelihood.values(unit), width, J.without_own)
-    factor = interval_factor(likelihood.samples - len(unit))
+    factor = compute_interval_factor(likelihood.samples - len(unit))
     return (
         likelihood,
         float(rows @ rows),
         information,
         np.full(free, factor),
-        np.full(free, threshold()),
+        np.full(free, compute_threshold()),
     )
 
 
-def _scatter(squares: Likelihood, unit: np.ndarray) -> Spread:
+def _spread_by_scatter(squares: Likelihood, unit: np.ndarray) -> Spread:
     """How far least squares spread, by their scatter over blocks, and the likelihood that is as
     wide.
     """
     left = float(np.sum(squares.of_records.rows(unit[None])[0] ** 2)) / max(
         squares.samples - len(unit), 1
     )
-    scattered = scatter(squares.scale_noise(np.sqrt(left)), unit)
+    scattered = estimate_scatter(squares.scale_noise(np.sqrt(left)), unit)
     likelihood = squares.scale_noise(np.sqrt(left) * scattered.spread)
     rows = likelihood.rows(unit[None])[0]
     factors = np.full(len(unit), scattered.quantile)

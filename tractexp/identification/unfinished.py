@@ -9,19 +9,19 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identification.plan import DipShape, forecast
+from tractexp.identification.plan import DipShape, forecast_intervals
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import (
     IDENTIFIED_SHARE,
     UNIDENTIFIED,
     WEAK,
+    choose_scale,
     format_half_width,
-    size,
 )
 from tractexp.record import Event
 
 
-def with_unfinished(uncertainty: Uncertainty) -> Uncertainty:
+def add_unfinished(uncertainty: Uncertainty) -> Uncertainty:
     """The judgement with what the recovery would tell, where every record ends in its dip: of each
     parameter that is not identified, and would be with it.
     """
@@ -36,7 +36,7 @@ def with_unfinished(uncertainty: Uncertainty) -> Uncertainty:
         value = uncertainty.values[j]
         low = uncertainty.lower[j]
         high = uncertainty.upper[j]
-        would_be_known = halves[j] <= IDENTIFIED_SHARE * size(value, low, high)
+        would_be_known = halves[j] <= IDENTIFIED_SHARE * choose_scale(value, low, high)
         if would_be_known and verdicts[name].word in (WEAK, UNIDENTIFIED):
             told = format_half_width(value, halves[j], low, high)
             why = f"the record ends in the dip: with the recovery it would be known to {told}"
@@ -51,7 +51,7 @@ def _forecast_recovery(uncertainty: Uncertainty, event: Event) -> np.ndarray:
     problem = uncertainty.likelihood.problem
     try:
         shape = DipShape.from_event(event)
-        planned = forecast(problem, uncertainty.values, shape)
+        planned = forecast_intervals(problem, uncertainty.values, shape)
         return planned.half
     except UserError:  # this model or these values cannot be planned with
         return np.full(len(uncertainty.names), np.inf)

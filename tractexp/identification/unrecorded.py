@@ -14,14 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.identification.uncertainty import Uncertainty, threshold
+from tractexp.identification.uncertainty import Uncertainty, compute_threshold
 from tractexp.identification.unrecorded_course import find_course
 from tractexp.identification.unrecorded_input import UnrecordedInput
-from tractexp.identification.verdict import IDENTIFIED_SHARE, UNIDENTIFIED, ParameterVerdict, size
+from tractexp.identification.verdict import (
+    IDENTIFIED_SHARE,
+    UNIDENTIFIED,
+    ParameterVerdict,
+    choose_scale,
+)
 from tractexp.inference.information import Information
 
 
-def with_unrecorded(uncertainty: Uncertainty, inputs: Sequence[UnrecordedInput]) -> Uncertainty:
+def add_unrecorded(uncertainty: Uncertainty, inputs: Sequence[UnrecordedInput]) -> Uncertainty:
     """The judgement with what inputs could do where none was recorded.
 
     Parameters
@@ -87,7 +92,9 @@ def _find_moves(uncertainty: Uncertainty, missing: UnrecordedInput) -> np.ndarra
         return np.zeros((1, len(uncertainty.names)))
     taken_up = sensitivities.times(sensitivities.fit(-changes))
     seen = np.sum((changes + taken_up) ** 2, axis=1)
-    hidden = threshold() if uncertainty.exact else max(float(left @ left), threshold())
+    hidden = (
+        compute_threshold() if uncertainty.exact else max(float(left @ left), compute_threshold())
+    )
     shares = np.sqrt(np.minimum(1.0, hidden / np.maximum(seen, 1e-300)))
     width = problem.upper - problem.lower
     seen_by = Information(uncertainty.names, uncertainty.values, width, sensitivities.without_own)
@@ -106,7 +113,9 @@ def _find_moved(
         value = float(own.values[j])
         verdict = own.verdicts[name]
         half = float(np.ptp(beside.intervals[j])) / 2
-        wide = max(half, moves[name]) > IDENTIFIED_SHARE * size(value, own.lower[j], own.upper[j])
+        wide = max(half, moves[name]) > IDENTIFIED_SHARE * choose_scale(
+            value, own.lower[j], own.upper[j]
+        )
         known = verdict.word != UNIDENTIFIED
         if known and (wide or moves[name] > high - low):
             why = f"{channel} was not recorded, and {missing['words']} moves it by"

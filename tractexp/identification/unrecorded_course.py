@@ -14,7 +14,7 @@ from tractexp.identification.fit import play
 from tractexp.identification.unrecorded_input import UnrecordedInput
 from tractexp.inference.least_squares import descend
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.model_error import model_error
+from tractexp.inference.model_error import compute_model_error
 from tractexp.inference.prior import weigh_prior
 from tractexp.inference.separable import SeparableColumns
 
@@ -40,8 +40,8 @@ def find_course(uncertainty: "Uncertainty", missing: UnrecordedInput) -> dict[st
     likelihood = replace(likelihood, problem=problem)
     unit, courses = _fit_course(likelihood, uncertainty, missing)
     values = likelihood.values(unit)
-    without = model_error(play(uncertainty.likelihood.problem, uncertainty.values)).value
-    error = model_error(play(missing.drive(problem, courses), values)).value
+    without = compute_model_error(play(uncertainty.likelihood.problem, uncertainty.values)).value
+    error = compute_model_error(play(missing.drive(problem, courses), values)).value
     if not error <= (1 - LEAST_EXPLAINED_BY_COURSE) * without:
         return {}
     strays = max(float(np.abs(course).max()) for course in courses)

@@ -138,13 +138,13 @@ class UnrecordedFrequency(UnrecordedInput):
 
     def list_courses(self, event: Event) -> np.ndarray:
         """A fall and swings, (k, N) [Hz]."""
-        t = _since_dip(event)
+        t = _measure_time_since_dip(event)
         swings = [np.sin(2 * np.pi * rate * t) for rate in SWINGS]
         return self.size * np.stack([1 - np.exp(-t / FALL), *swings])
 
     def list_parts(self, event: Event) -> np.ndarray:
         """Those, and swings that begin at an extreme, (k, N) [Hz]."""
-        t = _since_dip(event)
+        t = _measure_time_since_dip(event)
         late = [1 - np.cos(2 * np.pi * rate * t) for rate in SWINGS]
         return np.concatenate([self.list_courses(event), self.size * np.stack(late)])
 
@@ -225,5 +225,5 @@ def list_unrecorded_inputs(
     ]
 
 
-def _since_dip(event: Event) -> np.ndarray:
+def _measure_time_since_dip(event: Event) -> np.ndarray:
     return np.maximum(event.record.t - event.t_start, 0.0)

@@ -14,7 +14,7 @@ from tractexp.identification.fit import Fit, play
 from tractexp.identification.load_drift import find_load_drifts
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.model_error import model_error
+from tractexp.inference.model_error import compute_model_error
 from tractexp.inference.multistart import explore_minima
 from tractexp.inference.problem import Problem
 from tractexp.model.parts import OWN, Effect
@@ -186,8 +186,8 @@ def _tell(uncertainty: Uncertainty, likelihood: Likelihood, unit: np.ndarray) ->
     found = dict(zip(problem.space.names, values.tolist(), strict=True))
     return StartFit(
         dict(zip(names, own[:, at].tolist(), strict=True)),
-        100 * model_error(_play_started(likelihood, unit)).value,
-        100 * model_error(play(steady, uncertainty.values)).value,
+        100 * compute_model_error(_play_started(likelihood, unit)).value,
+        100 * compute_model_error(play(steady, uncertainty.values)).value,
         {name: found[name] for name in uncertainty.names},
     )
 

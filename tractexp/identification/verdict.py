@@ -61,12 +61,12 @@ class ParameterVerdict:
         return ": ".join(filter(None, (self.word, self.detail)))
 
 
-def brief(verdict: str) -> str:
+def shorten_verdict(verdict: str) -> str:
     """The word of a verdict that was written, without its reason.
 
     Examples
     --------
-    >>> brief("weakly identified: trades against C")
+    >>> shorten_verdict("weakly identified: trades against C")
     'weakly identified'
     """
     return verdict.partition(":")[0]
@@ -77,7 +77,7 @@ def rests_on_bound(verdict: str) -> bool:
     return verdict.startswith(BOUND)
 
 
-def size(value: float, low: float, high: float) -> float:
+def choose_scale(value: float, low: float, high: float) -> float:
     """What the width of an interval is measured against.
 
     Parameters
@@ -92,7 +92,7 @@ def size(value: float, low: float, high: float) -> float:
 
     Examples
     --------
-    >>> size(0.05, 0.0, 2.0), size(0.05, 0.01, 2.0)
+    >>> choose_scale(0.05, 0.0, 2.0), choose_scale(0.05, 0.01, 2.0)
     (0.2, 0.05)
     """
     return max(abs(value), NEAR_ZERO * (high - low)) if low <= 0 <= high else abs(value)
@@ -107,7 +107,7 @@ def format_half_width(value: float, half: float, low: float, high: float) -> str
     >>> format_half_width(0.5, 0.05, 0.1, 1.0), format_half_width(0.0, 0.05, -1.0, 1.0)
     ('± 10 %', '± 0.05')
     """
-    if size(value, low, high) != abs(value):
+    if choose_scale(value, low, high) != abs(value):
         return f"± {half:.2g}"
     return f"± {100 * half / abs(value):.2g} %" if half <= abs(value) else "wider than its value"
 
@@ -151,11 +151,13 @@ def _judge_parameter(
     high = value + half
     at = _list_near(value, lower, upper)[:1]
     if not information.identifiable[j]:
-        return ParameterVerdict(UNIDENTIFIED, _structural(information, information.unseen, j))
+        return ParameterVerdict(
+            UNIDENTIFIED, _explain_structural(information, information.unseen, j)
+        )
     if low <= lower and high >= upper:
         span = f"its 95 % interval holds its whole range {lower:g} .. {upper:g}"
         return ParameterVerdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factor)]))
-    if half > IDENTIFIED_SHARE * size(value, lower, upper):
+    if half > IDENTIFIED_SHARE * choose_scale(value, lower, upper):
         why = _trade(information, j, factor) or ["the record hardly changes with it"]
         edge = [f"the estimate is at its bound {bound}" for bound in at]
         return ParameterVerdict(WEAK, "; ".join([*why, *edge]))
@@ -186,7 +188,8 @@ def _trade(information: Information, j: int, factor: float) -> list[str]:
     if not partners:
         return []
     named = " and ".join(
-        f"{information.names[k]} (correlation {_number(correlation[k])})" for k in partners
+        f"{information.names[k]} (correlation {_format_correlation(correlation[k])})"
+        for k in partners
     )
     sentence = [f"trades against {named}"]
     k = partners[0]
@@ -206,17 +209,17 @@ def _trade(information: Information, j: int, factor: float) -> list[str]:
         ):
             return sentence  # a combination that is hardly known, or that nobody would think in
         sentence.append(
-            f"{combination(information.names, exponents)} is known to ± {100 * error:.2g} %"
+            f"{format_combination(information.names, exponents)} is known to ± {100 * error:.2g} %"
         )
     return sentence
 
 
-def _number(correlation: float) -> str:
+def _format_correlation(correlation: float) -> str:
     """A correlation with two digits, with four where it is nearly one."""
     return f"{correlation:.2f}" if abs(correlation) < 0.995 else f"{correlation:.4f}"
 
 
-def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
+def _explain_structural(information: Information, unseen: np.ndarray, j: int) -> str:
     """Which changes leave the record unchanged, and which combinations of these parameters it does
     see, in a sentence.
     """
@@ -236,16 +239,16 @@ def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
         exponents = np.zeros(len(names))
         exponents[pivot], exponents[k] = -direction[k], 1.0
         if np.abs(unseen @ exponents).max() < SHARE:
-            seen.append(combination(names, exponents))
+            seen.append(format_combination(names, exponents))
     return sentence + (f"; what it sees is {', '.join(seen)}" if seen else "")
 
 
-def combination(names: Sequence[str], exponents: np.ndarray) -> str:
+def format_combination(names: Sequence[str], exponents: np.ndarray) -> str:
     """A product of powers as text; powers of nearly 0 are left out.
 
     Examples
     --------
-    >>> combination(("X_prime", "M"), np.array([2.0, -1.0]))
+    >>> format_combination(("X_prime", "M"), np.array([2.0, -1.0]))
     'X_prime^2 / M'
     """
     above = []

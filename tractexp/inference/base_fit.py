@@ -10,8 +10,8 @@ import numpy as np
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit, refit, refit_from
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.multistart import valleys
-from tractexp.inference.noise_in_quiet import QuietNoise, white
+from tractexp.inference.multistart import find_local_minima
+from tractexp.inference.noise_in_quiet import QuietNoise, assume_white_noise
 from tractexp.noise import Noise
 
 BASE_FIT_ROUNDS = 2  # of noise and fit in turn
@@ -54,7 +54,7 @@ class BaseFit:
         ]
 
 
-def base_fit(context: Context) -> BaseFit:
+def fit_base_model(context: Context) -> BaseFit:
     """Fit the base model from all over its box.
 
     The search is that of its own kernel, which is the fastest; the fit has the faults of the
@@ -71,13 +71,13 @@ def base_fit(context: Context) -> BaseFit:
     """
     # the first may not stay the best: faults are free
     at = context.coordinates
-    ends = valleys(Likelihood.from_problem(context.kernels.bare))
+    ends = find_local_minima(Likelihood.from_problem(context.kernels.bare))
     minima = np.tile(at.null, (len(ends), 1))
     minima[:, [*at.base, *at.before]] = ends
-    return fitted_from(context, list(minima), list(minima))
+    return fit_from_starts(context, list(minima), list(minima))
 
 
-def fitted_from(
+def fit_from_starts(
     context: Context, starts: Sequence[np.ndarray], local_minima: Sequence[np.ndarray]
 ) -> BaseFit:
     """Fit the base model from given starts, noise and fit in turn.
@@ -97,7 +97,7 @@ def fitted_from(
     -------
     BaseFit
     """
-    noise = white(context)
+    noise = assume_white_noise(context)
     fit = refit(context, noise, [((), start) for start in starts])[0]
     quiet = QuietNoise.from_context(context, fit.unit)
     for _ in range(BASE_FIT_ROUNDS):

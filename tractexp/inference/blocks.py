@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.inference.interval import interval_factor
+from tractexp.inference.interval import compute_interval_factor
 from tractexp.model.drive import Drive
 from tractexp.record import Event
 
@@ -21,7 +21,7 @@ FEWEST_BLOCKS = 3  # blocks for each parameter: of records with fewer, blocks ar
 LEAST_SQUARES_DIFFERENCE = 0.02  # of a sum of squares, 1 % of an error: less is no difference
 
 
-def blocks_of(
+def cut_blocks(
     events: Sequence[Event], drive: Drive, parameters: int = 1, *, from_dip: bool = False
 ) -> list[slice]:
     """Blocks of the drive's samples, counted from the start of each dip.
@@ -122,6 +122,6 @@ def reach(without: np.ndarray, whole: float) -> float:
     count = len(without)
     if count < 2:
         return np.inf
-    return interval_factor(count - 1) * float(
+    return compute_interval_factor(count - 1) * float(
         np.sqrt((count - 1) / count * np.sum((without - whole) ** 2))
     )

@@ -158,7 +158,7 @@ class Catalogue:
 NOTHING = Catalogue((), {})  # of a model that is fitted as it is
 
 
-def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -> Catalogue:
+def build_catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -> Catalogue:
     """The registered effects that a model lacks.
 
     Parameters
@@ -194,11 +194,11 @@ def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -
             continue
         if effect.family:
             if effect.family not in here and not model.acceptance(effect).refusal:
-                members.append(candidate(effect))
-        elif why := missing_channel(effect, events) or model.acceptance(effect).refusal:
+                members.append(build_candidate(effect))
+        elif why := explain_missing_channel(effect, events) or model.acceptance(effect).refusal:
             untestable[name] = why
         else:
-            testable.append(candidate(effect))
+            testable.append(build_candidate(effect))
     _check_testable(only, untestable)
     heads = {c.name for c in testable}
     return Catalogue(
@@ -224,7 +224,7 @@ def _is_wanted(effect: Effect, only: Sequence[str]) -> bool:
     return effect.family in only if effect.family else isinstance(effect, Measurement)
 
 
-def missing_channel(effect: Effect, events: Sequence[Event]) -> str:
+def explain_missing_channel(effect: Effect, events: Sequence[Event]) -> str:
     """The sentence why the recorded channels do not show this effect, "" where they do."""
     for channel in effect.reads:
         enough = any if channel in COMPARED else all
@@ -235,7 +235,7 @@ def missing_channel(effect: Effect, events: Sequence[Event]) -> str:
     return ""
 
 
-def candidate(effect: Effect) -> Candidate:
+def build_candidate(effect: Effect) -> Candidate:
     """The candidate of an effect: its sizes, and at most about `MOST_SETTINGS` combinations of what
     is scanned of its other parameters.
     """

@@ -14,14 +14,14 @@ import numpy as np
 from tractexp.cache import store
 from tractexp.inference import residual_statistics
 from tractexp.inference.context import Context
-from tractexp.inference.cores import each_apart
+from tractexp.inference.cores import map_on_cores
 from tractexp.inference.goodness_of_fit import (
     ADEQUATE_P,
     SMALLEST_P,
     Scale,
     compare_with_draws,
 )
-from tractexp.inference.linearization import Linearization, rich_residuals
+from tractexp.inference.linearization import Linearization, remove_explained
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.score_test import ScoreTest
 from tractexp.noise import Noise
@@ -37,7 +37,7 @@ BLURRED = 0.5
 SCALE_DRAW_FACTOR = 10  # times as many are drawn for the scales alone
 
 
-def by_draws(p: float) -> str:
+def format_drawn_p(p: float) -> str:
     """A probability as a sentence tells it, no finer than 199 draws can.
 
     The tail of the statistics is extrapolated, so that a smaller number would say more than is
@@ -45,7 +45,7 @@ def by_draws(p: float) -> str:
 
     Examples
     --------
-    >>> by_draws(0.03), by_draws(0.004), by_draws(1e-6)
+    >>> format_drawn_p(0.03), format_drawn_p(0.004), format_drawn_p(1e-6)
     ('0.03', 'less than 0.005', 'less than 0.001')
     """
     least = 1 / (NULL_DRAWS + 1)
@@ -93,7 +93,7 @@ class Chance:
         return compare_with_draws(projection.statistics(context.problem), self.left, self.scales)
 
 
-def chance_at(
+def draw_chance(
     t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
 ) -> Chance:
     """Draw the null distribution of every statistic at a fit.
@@ -137,7 +137,7 @@ def chance_at(
     return Chance(least, dict(zip(names.tolist(), left, strict=True)))
 
 
-def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[str, Scale]:
+def draw_scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[str, Scale]:
     """Scales of the statistics of which the largest counts, by `SCALE_DRAW_FACTOR` times as many
     draws.
 
@@ -163,8 +163,8 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
     """
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        drawn = own.replace_residuals(_white(t, noise, np.random.default_rng((seed, k))))
-        by_test = residual_statistics.statistics(
+        drawn = own.replace_residuals(_draw_white(t, noise, np.random.default_rng((seed, k))))
+        by_test = residual_statistics.compute_residual_statistics(
             drawn.channels(t.context.problem), t.context.problem
         )
         return {
@@ -172,7 +172,7 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
             for name, values in by_test.items()
         }
 
-    parts = each_apart(part, range(1, SCALE_DRAW_FACTOR + 1), t.context.effort)
+    parts = map_on_cores(part, range(1, SCALE_DRAW_FACTOR + 1), t.context.effort)
     moments = {name: np.mean([p[name] for p in parts], axis=0) for name in parts[0]}
     return {
         name: Scale(mean, np.sqrt(square - mean**2) + 1e-12)
@@ -190,24 +190,24 @@ def _draw_null_distribution(
     """
     rng = np.random.default_rng(seed)
     if plain:
-        return _chance(t, own.replace_residuals(_white(t, noise, rng)), noise)
+        return _build_chance(t, own.replace_residuals(_draw_white(t, noise, rng)), noise)
     drawn = noise.draw(rng, NULL_DRAWS, np.diff(t.context.drive.first).tolist()) * t.context.valid
-    rest = rich_residuals(t, drawn)
+    rest = remove_explained(t, drawn)
 
     def anew(b: int) -> Chance:
         seen = quiet.estimate_noise(t.unit, rest[b])
-        return _chance(
+        return _build_chance(
             t,
             t.build_score_test(seen).replace_residuals(t.context.whiten(seen, drawn[b : b + 1])),
             noise,
         )
 
-    each = each_apart(anew, range(NULL_DRAWS), t.context.effort)
+    each = map_on_cores(anew, range(NULL_DRAWS), t.context.effort)
     left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}
     return Chance(np.concatenate([one.least_p for one in each]), left)
 
 
-def _white(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarray:
+def _draw_white(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarray:
     """Whitened noise (b, C N) of the events."""
     return noise.draw_white(rng, NULL_DRAWS, t.context.drive, t.context.valid)
 
@@ -222,7 +222,7 @@ def is_noise_exact(context: Context, noise: Noise) -> bool:
     return context.domain.noise_from_model or noise.worth(samples) >= QUIET_WORTH
 
 
-def _chance(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
+def _build_chance(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
     """The null distribution of projected draws.
 
     A fault of the measurement counts where the noise of the voltage is not loud.

@@ -12,11 +12,11 @@ from tractexp.cache import store
 from tractexp.domain import Domain, domain_of
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.criteria import Criteria
-from tractexp.inference.differences import finite, slopes, two_sided
+from tractexp.inference.differences import divide_differences, replace_diverged, step_both_ways
 from tractexp.inference.effort import Effort
 from tractexp.inference.free_set import FreeSet
 from tractexp.inference.kernels import Family, Kernels, Key
-from tractexp.inference.prior import departures, weigh_prior
+from tractexp.inference.prior import compute_departures, weigh_prior
 from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records
 from tractexp.inference.separable import SeparableColumns
@@ -321,7 +321,7 @@ class Context:
             both = self.residuals(
                 np.concatenate([unit[None], points[mine]]), names, beside[mine[0]]
             )
-            changes[mine] = finite(both[1:] - both[0])
+            changes[mine] = replace_diverged(both[1:] - both[0])
         return changes
 
     def _of_one_kernel(self, sets: Sequence[tuple[Sequence[str], str]]) -> list[list[int]]:
@@ -369,7 +369,7 @@ class Context:
         if self.prior:
             bare = self.kernels.bare
             values = bare.space.from_unit(unit[:, at.base])
-            prior.append(self.prior * departures(bare, values))
+            prior.append(self.prior * compute_departures(bare, values))
         return np.concatenate([white, *prior], axis=1)
 
     def linearize(
@@ -398,9 +398,9 @@ class Context:
         """
         at = self.coordinates
         k = len(columns)
-        points, width = two_sided(unit, columns)
+        points, width = step_both_ways(unit, columns)
         raw = self.residuals(np.concatenate([unit[None], points]), names)
-        white = self.whiten(noise, np.concatenate([raw[:1], slopes(raw[1:], width)]))
+        white = self.whiten(noise, np.concatenate([raw[:1], divide_differences(raw[1:], width)]))
         held = [(i, c) for i, c in enumerate(columns) if c in at.prior_deviation]
         prior = np.zeros((1 + k, len(held)))
         for row, (i, c) in enumerate(held):

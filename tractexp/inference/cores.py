@@ -27,7 +27,7 @@ Result = TypeVar("Result")
 _calls: list[Callable[[int], Any]] = []
 
 
-def cores() -> int:
+def count_cores() -> int:
     """The number of processes that an investigation may fork: the cores of this one, a container's
     limit considered.
 
@@ -43,7 +43,7 @@ def cores() -> int:
     return 1 if beside or not FORKS else cpu_count()
 
 
-def each_apart(
+def map_on_cores(
     function: Callable[[Item], Result], items: Sequence[Item], effort: Effort
 ) -> list[Result]:
     """Apply a function to independent items, on all cores.
@@ -68,7 +68,7 @@ def each_apart(
     UserError
         Where a process is killed, as systems do where memory is short.
     """
-    processes = min(cores(), len(items))
+    processes = min(count_cores(), len(items))
     with effort.parts(len(items)) as ended:
         if processes < 2:
             return [_count_result(function(item), ended) for item in items]
@@ -100,7 +100,7 @@ def _fork_processes(
                 processes, multiprocessing.get_context("fork"), _begin, (call,)
             ) as pool:
                 try:
-                    yield lambda positions: _results_in_order(
+                    yield lambda positions: _collect_in_order(
                         [pool.submit(_call, k) for k in positions]
                     )
                 except BaseException:
@@ -116,7 +116,7 @@ def _fork_processes(
         ) from error
 
 
-def _results_in_order(calls: Sequence[Future[Any]]) -> Iterator[Any]:
+def _collect_in_order(calls: Sequence[Future[Any]]) -> Iterator[Any]:
     """The results of calls, in their order.
 
     `Executor.map` does not serve: it cancels what is left, and Python 3.11's pool cannot end a call

@@ -26,7 +26,7 @@ DERIVED, CHOSEN = "derived", "chosen"
 NAMING_SHARE = 0.4
 
 
-def _criterion(
+def _declare_criterion(
     default: float, bounds: tuple[float, float], about: str, origin: str, why: str
 ) -> Any:
     """A threshold with its bounds, its meaning, and where its value comes from."""
@@ -41,21 +41,21 @@ class Criteria:
     `task.criteria.NAME=value`.
     """
 
-    false_alarms: float = _criterion(
+    false_alarms: float = _declare_criterion(
         0.05,
         (0.001, 0.5),
         "probability of naming or doubting anything where nothing is missing",
         DERIVED,
         "the usual level of a test; the user's to set",
     )
-    adequate_p: float = _criterion(
+    adequate_p: float = _declare_criterion(
         ADEQUATE_P,
         (0.0, 1.0),
         "p of what a fit leaves, below which it leaves something",
         CHOSEN,
         "the same as in an identification",
     )
-    further_name_p: float = _criterion(
+    further_name_p: float = _declare_criterion(
         1e-5,
         (0.0, 1.0),
         "p that a second name must undercut, and by which another law or place must explain more"
@@ -64,14 +64,14 @@ class Criteria:
         CHOSEN,
         "a second name spoils a right first one, or patches up a wrong one",
     )
-    rejected: float = _criterion(
+    rejected: float = _declare_criterion(
         0.05,
         (1e-9, 1.0),
         "relative likelihood, by Akaike's criterion, below which a rival is rejected",
         DERIVED,
         "one to twenty, the usual level of a test",
     )
-    shown: float = _criterion(
+    shown: float = _declare_criterion(
         10.8,
         (0.0, 1e6),
         "gain of the deviance by which held-out events show an explanation, and each of two effects"
@@ -82,7 +82,7 @@ class Criteria:
         "(2 x 1.645)^2: a true explanation of which so much is expected gains nothing in 5 % of"
         " cases",
     )
-    divides: float = _criterion(
+    divides: float = _declare_criterion(
         2.25,
         (1.0, 1e6),
         "factor by which a name must divide the error on the held-out events not to be doubted, and"
@@ -92,7 +92,7 @@ class Criteria:
         " imitations of five"
         " strangers by less than 1.6 but for one, by 3.6",
     )
-    ahead: float = _criterion(
+    ahead: float = _declare_criterion(
         1.5,
         (1.0, 1e6),
         "factor by which the error of a set that leaves more than noise must be below that of"

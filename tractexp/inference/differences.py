@@ -18,7 +18,7 @@ CENTRAL = 1e-5
 COORDINATE_STEP = 1e-4  # of a coordinate's range, for the residuals at a fit
 
 
-def forward_differences(
+def compute_forward_differences(
     rows: Rows,
     unit: np.ndarray,
     base: np.ndarray,
@@ -50,7 +50,8 @@ def forward_differences(
     --------
     >>> point = np.array([[0.2, 0.7]])
     >>> lane = np.zeros(1, dtype=int)
-    >>> forward_differences(lambda x, lanes: 3 * x, point, 3 * point, lane).round(6).tolist()
+    >>> J = compute_forward_differences(lambda x, lanes: 3 * x, point, 3 * point, lane)
+    >>> J.round(6).tolist()
     [[[3.0, 0.0], [-0.0, 3.0]]]
     """
     n, d = unit.shape
@@ -68,7 +69,7 @@ def forward_differences(
     return J
 
 
-def central_differences(
+def compute_central_differences(
     rows: Rows, unit: np.ndarray, lanes: np.ndarray, apart: SeparableColumns = NOT_SEPARABLE
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows, and their derivatives from both sides.
@@ -92,12 +93,12 @@ def central_differences(
     (n, R) array
         The rows at `unit`.
     (n, k + m, R) array
-        Derivatives per range, in the order of `forward_differences`.
+        Derivatives per range, in the order of `compute_forward_differences`.
 
     Examples
     --------
     >>> at = np.array([[0.5]]), np.zeros(1, dtype=int)
-    >>> base, slope = central_differences(lambda x, lanes: x**2, *at)
+    >>> base, slope = compute_central_differences(lambda x, lanes: x**2, *at)
     >>> base.tolist(), slope.round(9).tolist()
     ([[0.25]], [[[1.0]]])
     """
@@ -115,15 +116,17 @@ def central_differences(
     base, above, below = batch[:, 0], batch[:, 1 : len(moves) + 1], batch[:, len(moves) + 1 :]
     J = np.zeros_like(above)
     k = len(shared)
-    J[:, :k] = _from_both_sides(base, above[:, :k], below[:, :k], up[:, shared], down[:, shared])
+    J[:, :k] = _difference_both_sides(
+        base, above[:, :k], below[:, :k], up[:, shared], down[:, shared]
+    )
     for mine, own in zip(apart.rows, apart.coordinates, strict=True):
-        J[:, k:, mine] = _from_both_sides(
+        J[:, k:, mine] = _difference_both_sides(
             base[:, mine], above[:, k:, mine], below[:, k:, mine], up[:, own], down[:, own]
         )
     return base, J
 
 
-def _from_both_sides(
+def _difference_both_sides(
     base: np.ndarray, above: np.ndarray, below: np.ndarray, up: np.ndarray, down: np.ndarray
 ) -> np.ndarray:
     """Derivatives (n, k, R) from rows (n, R) and those (n, k, R) one step `up` and `down` (n, k)
@@ -137,18 +140,18 @@ def _from_both_sides(
     return (above - below) / np.where(span > 0, span, 1.0)[..., None]
 
 
-def finite(changes: np.ndarray) -> np.ndarray:
+def replace_diverged(changes: np.ndarray) -> np.ndarray:
     """Changes of a residual, 0 where a simulation diverges: that tells nothing of small changes.
 
     Examples
     --------
-    >>> finite(np.array([1.0, np.nan, np.inf])).tolist()
+    >>> replace_diverged(np.array([1.0, np.nan, np.inf])).tolist()
     [1.0, 0.0, 0.0]
     """
     return np.nan_to_num(changes, posinf=0.0, neginf=0.0)
 
 
-def two_sided(
+def step_both_ways(
     unit: np.ndarray, columns: Sequence[int] | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points a small step above and below a fit, for difference quotients.
@@ -169,7 +172,7 @@ def two_sided(
 
     Examples
     --------
-    >>> points, width = two_sided(np.array([0.5, 1.0]), [0, 1])
+    >>> points, width = step_both_ways(np.array([0.5, 1.0]), [0, 1])
     >>> width.round(6).tolist()
     [0.0002, 0.0001]
     """
@@ -180,8 +183,8 @@ def two_sided(
     return points.reshape(-1, len(unit)), points[0][at] - points[1][at]
 
 
-def slopes(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Difference quotients of what was computed at the points of `two_sided`.
+def divide_differences(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """Difference quotients of what was computed at the points of `step_both_ways`.
 
     Parameters
     ----------
@@ -197,10 +200,10 @@ def slopes(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
 
     Examples
     --------
-    >>> slopes(np.array([3.0, 1.0]), np.array([0.5])).tolist()
+    >>> divide_differences(np.array([3.0, 1.0]), np.array([0.5])).tolist()
     [4.0]
     """
     k = len(width)
     with np.errstate(over="ignore", invalid="ignore"):
         quotients = (rows[:k] - rows[k:]) / width.reshape(k, *[1] * (rows.ndim - 1))
-    return finite(quotients)
+    return replace_diverged(quotients)

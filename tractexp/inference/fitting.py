@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.cache import store
 from tractexp.inference import fit_effort
 from tractexp.inference.context import Context
-from tractexp.inference.cores import each_apart
+from tractexp.inference.cores import map_on_cores
 from tractexp.inference.least_squares import descend
 from tractexp.noise import Noise
 
@@ -62,7 +62,7 @@ def key_by_names(fits: Iterable[Refit]) -> dict[Names, Refit]:
     return {fit.names: fit for fit in fits}
 
 
-def best_of(fits: Iterable[Refit]) -> list[Refit]:
+def select_best_fits(fits: Iterable[Refit]) -> list[Refit]:
     """The best fit of each set, in order of cost."""
     best: dict[Names, Refit] = {}
     for fit in sorted(fits, key=lambda r: (r.cost, r.names)):
@@ -91,7 +91,7 @@ def refit(
     list of Refit
         The best of each set, in order of cost.
     """
-    return best_of(run_descents(context, noise, wanted, faults, fit_effort.EXACT_DESCENT))
+    return select_best_fits(run_descents(context, noise, wanted, faults, fit_effort.EXACT_DESCENT))
 
 
 def refit_from(
@@ -116,7 +116,7 @@ def leave_each_out(context: Context, fit: Refit) -> list[tuple[Names, np.ndarray
     ]
 
 
-def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
+def refit_roughly(context: Context, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
     """Fit sets of effects as far as is needed to rank those that are far apart.
 
     What falls behind in the first iterations is given up. Parameters and result are as of `refit`.
@@ -126,14 +126,14 @@ def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list
     begun = run_descents(
         context, noise, wanted, None, (fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1])
     )
-    best = best_of(begun)
+    best = select_best_fits(begun)
     far = find_lag([r.cost for r in best])
     promising = [r.names for r in best if r.cost <= best[0].cost + far]
     again = []
     for names in promising:
         starts = sorted((r for r in begun if r.names == names), key=lambda r: r.deviance)
         again += [(names, r.unit) for r in starts[: -(-len(starts) // 2)]]
-    return best_of(
+    return select_best_fits(
         [
             *best,
             *run_descents(
@@ -155,7 +155,7 @@ def find_lag(costs: Sequence[float]) -> float:
     return max(fit_effort.FAR_BEHIND, fit_effort.FAR_SHARE * (max(costs) - min(costs)))
 
 
-def no_worse_than_subsets(
+def refit_worse_than_subsets(
     context: Context, noise: Noise, refits: Mapping[Names, Refit], fits: Sequence[Refit]
 ) -> list[Refit]:
     """Refit any set that came out worse than a subset of it, from the best subset.
@@ -230,7 +230,7 @@ def run_descents(
 
     def all_descended() -> tuple[np.ndarray, ...]:
         groups = np.array_split(np.arange(len(wanted)), -(-len(wanted) // fit_effort.FITS_AT_ONCE))
-        units, deviances = zip(*each_apart(descend_group, groups, context.effort), strict=True)
+        units, deviances = zip(*map_on_cores(descend_group, groups, context.effort), strict=True)
         return (
             np.concatenate(units),
             np.concatenate(deviances),
@@ -265,7 +265,9 @@ def find_prior_columns(
     return measured, [*measured, *at.shapes(sorted({name for names in sets for name in names}))]
 
 
-def off_bounds(context: Context, unit: np.ndarray, to: float | None = None) -> list[np.ndarray]:
+def move_off_bounds(
+    context: Context, unit: np.ndarray, to: float | None = None
+) -> list[np.ndarray]:
     """Coordinates with what rests on a bound of the base model moved off it, for there it has no
     slope.
 

@@ -75,7 +75,7 @@ class FreeSet:
         null = problem.space.to_unit(problem.defaults)
         if not initial_power:
             return cls(problem.space, base, np.array([], dtype=int), null, len(base))
-        power = power_before(problem)
+        power = build_power_box(problem)
         return cls(
             box=join_boxes(problem.space, power),
             base=base,
@@ -107,7 +107,7 @@ class FreeSet:
         """
         members = tuple(p for member in catalogue.members for p in member.effect.parameters)
         parameters = join_boxes(whole.space, Box.from_parameters(members))
-        power = power_before(whole)
+        power = build_power_box(whole)
         nulls = {
             p.name: p.default if p.null is None else p.null for p in (*whole.parameters, *members)
         }
@@ -275,7 +275,7 @@ class FreeSet:
         )
 
 
-def power_before(problem: Problem) -> Box:
+def build_power_box(problem: Problem) -> Box:
     """The box of P0 and Q0 of each event, around what was measured before it.
 
     Parameters

@@ -74,7 +74,9 @@ def compare_with_draws(
         p of each.
     """
     scales = scales or {}
-    return {name: tail(draws[name], value, scales.get(name)) for name, value in values.items()}
+    return {
+        name: compute_tail_p(draws[name], value, scales.get(name)) for name, value in values.items()
+    }
 
 
 class Scale(NamedTuple):
@@ -97,7 +99,7 @@ class Scale(NamedTuple):
         return ((draws - self.mean) / self.spread).max(axis=1)
 
 
-def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> float:
+def compute_tail_p(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> float:
     """How often a statistic is at least as large as a value, given draws of it.
 
     Parameters
@@ -118,7 +120,7 @@ def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> fl
     Examples
     --------
     >>> draws = np.random.default_rng(1).chisquare(3, 2000)
-    >>> round(tail(draws, np.array([7.815])), 2)
+    >>> round(compute_tail_p(draws, np.array([7.815])), 2)
     0.05
     """
     from scipy.special import gammaincc
@@ -129,7 +131,7 @@ def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> fl
         return max(
             float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P
         )
-    scale, largest = extremes(draws) if scale is None else (scale, scale.largest(draws))
+    scale, largest = find_extremes(draws) if scale is None else (scale, scale.largest(draws))
     return max(
         _compute_exceedance(largest, float(scale.largest(np.atleast_2d(value))[0])), SMALLEST_P
     )
@@ -161,7 +163,7 @@ def _compute_exceedance(largest: np.ndarray, value: float) -> float:
     return float(-np.expm1(-(reduced ** (1 / k))))
 
 
-def extremes(draws: np.ndarray) -> tuple[Scale, np.ndarray]:
+def find_extremes(draws: np.ndarray) -> tuple[Scale, np.ndarray]:
     """The scale of draws, and the largest of each in it.
 
     Each draw is judged by the others: among many columns its own part in their mean and spread

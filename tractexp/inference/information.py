@@ -138,7 +138,7 @@ class Information:
         null = null * self.width / np.where(self.values == 0, self.width, self.values)
         alone = np.eye(len(self.names))[blind]
         null = null * ~blind
-        return _echelon(np.concatenate((alone, null[np.any(null != 0, axis=1)])))
+        return _reduce_to_echelon(np.concatenate((alone, null[np.any(null != 0, axis=1)])))
 
     @property
     def identifiable(self) -> np.ndarray:
@@ -176,7 +176,7 @@ class Information:
         return float(np.sqrt(slope @ self.covariance @ slope))
 
 
-def free_standard_errors(root: np.ndarray) -> np.ndarray:
+def compute_free_standard_errors(root: np.ndarray) -> np.ndarray:
     """The standard error of each coordinate, all others free.
 
     Parameters
@@ -192,7 +192,7 @@ def free_standard_errors(root: np.ndarray) -> np.ndarray:
 
     Examples
     --------
-    >>> free_standard_errors(np.array([[2.0, 0.0], [0.0, 0.0]])).tolist()
+    >>> compute_free_standard_errors(np.array([[2.0, 0.0], [0.0, 0.0]])).tolist()
     [0.5, inf]
     """
     seen = np.where(np.linalg.norm(root, axis=0) > BLIND, root, 0.0)
@@ -201,7 +201,7 @@ def free_standard_errors(root: np.ndarray) -> np.ndarray:
     return Information(names, 0 * ranges, ranges, seen).standard_errors
 
 
-def _echelon(rows: np.ndarray) -> np.ndarray:
+def _reduce_to_echelon(rows: np.ndarray) -> np.ndarray:
     """The reduced row echelon form by full pivoting: the same row space with as many zeros as it
     allows.
     """

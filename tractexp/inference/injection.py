@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp.inference.residual_statistics import windows
+from tractexp.inference.residual_statistics import list_windows
 from tractexp.model.parts import OWN, Effect
 from tractexp.parameter import Parameter
 
@@ -73,7 +73,7 @@ PERTURBATIONS = tuple(p.name for p in Injection.parameters[:5])
 PUSH = 1e-3  # how hard
 
 
-def perturbations(context: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def inject_perturbations(context: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points with a perturbation of one balance in one window.
 
     Parameters
@@ -91,7 +91,9 @@ def perturbations(context: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.
         Which balance is perturbed, as in `PERTURBATIONS`.
     """
     at = context.coordinates
-    spans = sorted({w for e in range(len(context.events)) for w in windows(context.problem, e)})
+    spans = sorted(
+        {w for e in range(len(context.events)) for w in list_windows(context.problem, e)}
+    )
     points = []
     groups = []
     for g, push in enumerate(PERTURBATIONS):

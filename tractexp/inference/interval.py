@@ -12,7 +12,7 @@ from tractexp.text.wording import format_with_error
 INTERVAL_LEVEL = 0.95
 
 
-def interval_factor(freedom: float = np.inf) -> float:
+def compute_interval_factor(freedom: float = np.inf) -> float:
     """Half of a 95 % interval over the standard error: Student's t at 97.5 %.
 
     Parameters
@@ -27,7 +27,7 @@ def interval_factor(freedom: float = np.inf) -> float:
 
     Examples
     --------
-    >>> round(interval_factor(), 2), round(interval_factor(4), 2)
+    >>> round(compute_interval_factor(), 2), round(compute_interval_factor(4), 2)
     (1.96, 2.78)
     """
     from scipy.special import stdtrit
@@ -70,7 +70,7 @@ class ParameterEstimate:
     @property
     def half(self) -> float:
         """Half of the 95 % interval, in the parameter's unit; nan without a standard error."""
-        return interval_factor(self.freedom) * self.error
+        return compute_interval_factor(self.freedom) * self.error
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -22,7 +22,7 @@ SPREAD = 1.0
 LEAST_JUMP = 0.02
 
 
-def jumps(context: Context, unit: np.ndarray) -> np.ndarray | None:
+def find_jump_errors(context: Context, unit: np.ndarray) -> np.ndarray | None:
     """The errors that a recorder's filter may make at the jumps of the effects.
 
     Parameters
@@ -38,12 +38,12 @@ def jumps(context: Context, unit: np.ndarray) -> np.ndarray | None:
         One standard deviation at one sample each. None where samples are averages over a window, in
         which no jump stays.
     """
-    return None if context.domain.windowed else _jumps(context, unit.tobytes())
+    return None if context.domain.windowed else _compute_jump_errors(context, unit.tobytes())
 
 
 # of the two fits that are examined side by side; it holds their context
 @functools.lru_cache(maxsize=2)
-def _jumps(context: Context, key: bytes) -> np.ndarray:
+def _compute_jump_errors(context: Context, key: bytes) -> np.ndarray:
     """The errors (k, C, N) [pu] at the jumps, for the bytes of the coordinates as a key that a
     cache can take.
     """
@@ -59,13 +59,13 @@ def _jumps(context: Context, key: bytes) -> np.ndarray:
     shapes = []
     for part in context.drive.parts:
         for c, change in enumerate(np.nan_to_num(added[:, part])):
-            for k, size in _at_jumps(change):
+            for k, size in _find_jump_samples(change):
                 shapes.append(np.zeros(context.drive.measurements.shape))
                 shapes[-1][c, part.start + k] = size
     return np.array(shapes).reshape(-1, *context.drive.measurements.shape)
 
 
-def _at_jumps(added: np.ndarray) -> list[tuple[int, float]]:
+def _find_jump_samples(added: np.ndarray) -> list[tuple[int, float]]:
     """The samples around the jumps of one channel (N,), each with the standard deviation [pu] of
     its error.
     """

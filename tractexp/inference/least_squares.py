@@ -10,7 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.inference.differences import Rows, central_differences, forward_differences
+from tractexp.inference.differences import (
+    Rows,
+    compute_central_differences,
+    compute_forward_differences,
+)
 from tractexp.inference.separable import NOT_SEPARABLE, NormalMatrix, SeparableColumns
 
 DAMPINGS = np.array([1e-3, 1e-1, 1e1, 1e3])  # tried together, relative to the lane's own
@@ -49,7 +53,7 @@ class Descent:
         return Descent(unit, deviance, self.simulations + more.simulations)
 
 
-def normal(
+def build_normal_matrix(
     rows: Rows,
     unit: np.ndarray,
     base: np.ndarray,
@@ -90,17 +94,17 @@ def normal(
     for first in range(0, n, together):
         part = slice(first, first + together)
         if central:
-            _, J = central_differences(rows, unit[part], lanes[part], apart)
+            _, J = compute_central_differences(rows, unit[part], lanes[part], apart)
         else:
-            J = forward_differences(rows, unit[part], base[part], lanes[part], apart)
-        parts.append(_products(J, base[part], unit.shape[1], apart))
+            J = compute_forward_differences(rows, unit[part], base[part], lanes[part], apart)
+        parts.append(_multiply_derivatives(J, base[part], unit.shape[1], apart))
     gradient, shared, cross, own = (np.concatenate(pieces) for pieces in zip(*parts, strict=True))
     return gradient, NormalMatrix(
         shared, cross, own, apart.find_shared_columns(unit.shape[1]), apart
     )
 
 
-def _products(
+def _multiply_derivatives(
     J: np.ndarray, base: np.ndarray, size: int, apart: SeparableColumns
 ) -> tuple[np.ndarray, ...]:
     """Gradient (n, D) and the blocks of a `NormalMatrix`, of derivatives (n, k + m, R) as the
@@ -181,21 +185,21 @@ def descend(
     frozen = np.zeros(unit.shape, dtype=bool) if frozen is None else frozen
     every = np.arange(n)
     base = rows(unit, every)
-    deviance = _squares(base)
+    deviance = _sum_squares(base)
     damping, active, spent = np.full(n, 1e-3), np.isfinite(deviance), n
     for _ in range(iterations):
         lanes = every[active]
         if not len(lanes):
             break
         x = unit[lanes]
-        gradient, H = normal(rows, x, base[lanes], lanes, apart, central=central)
+        gradient, H = build_normal_matrix(rows, x, base[lanes], lanes, apart, central=central)
         rest = frozen[lanes] | ((x <= 0) & (gradient > 0)) | ((x >= 1) & (gradient < 0))
         tried = damping[lanes, None] * DAMPINGS
-        trials = np.clip(x[:, None, :] + _steps(H, gradient, rest, tried), 0.0, 1.0)
+        trials = np.clip(x[:, None, :] + _solve_steps(H, gradient, rest, tried), 0.0, 1.0)
         spent += (len(lanes) + 2 * x.size if central else x.size) + trials.shape[0] * trials.shape[
             1
         ]
-        best, outcome, ends = _best(rows, trials, lanes, base.shape[1])
+        best, outcome, ends = _pick_best_trial(rows, trials, lanes, base.shape[1])
         pick = np.arange(len(lanes))
         gain = deviance[lanes] - outcome
         better = gain > 0
@@ -212,13 +216,13 @@ def descend(
         done = (
             (better & (gain < tolerance))
             | hopeless
-            | (~better & _flat(H, gradient, rest, tolerance))
+            | (~better & _is_flat(H, gradient, rest, tolerance))
         )
         active[lanes] = ~done
     return Descent(unit, deviance, spent)
 
 
-def _best(
+def _pick_best_trial(
     rows: Rows, trials: np.ndarray, lanes: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which of q trials (n, q, D) of each lane leaves the least, its sum of squares (n,) and its
@@ -232,13 +236,13 @@ def _best(
         candidates = rows(trials[part].reshape(-1, d), np.repeat(lanes[part], width)).reshape(
             -1, width, size
         )
-        squares = _squares(candidates)
+        squares = _sum_squares(candidates)
         best[part], outcome[part] = squares.argmin(axis=1), squares.min(axis=1)
         ends[part] = candidates[np.arange(len(candidates)), best[part]]
     return best, outcome, ends
 
 
-def _steps(
+def _solve_steps(
     H: NormalMatrix, gradient: np.ndarray, rest: np.ndarray, damping: np.ndarray
 ) -> np.ndarray:
     """Damped Newton steps (n, k, D) for k dampings; resting coordinates stay."""
@@ -250,13 +254,15 @@ def _steps(
     return np.clip(H.solve(-gradient * free, free, added), -LARGEST_STEP, LARGEST_STEP)
 
 
-def _flat(H: NormalMatrix, gradient: np.ndarray, rest: np.ndarray, tolerance: float) -> np.ndarray:
+def _is_flat(
+    H: NormalMatrix, gradient: np.ndarray, rest: np.ndarray, tolerance: float
+) -> np.ndarray:
     """Whether even the undamped step promises less than `tolerance`, (n,)."""
-    step = _steps(H, gradient, rest, np.full((len(gradient), 1), 1e-9))[:, 0]
+    step = _solve_steps(H, gradient, rest, np.full((len(gradient), 1), 1e-9))[:, 0]
     return -np.einsum("nd,nd->n", gradient, step) < tolerance
 
 
-def _squares(rows: np.ndarray) -> np.ndarray:
+def _sum_squares(rows: np.ndarray) -> np.ndarray:
     """Sums of squares over the last axis, inf where any is nan."""
     total = np.einsum("...r,...r->...", rows, rows)
     return np.where(np.isfinite(total), total, np.inf)

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import domain_of
-from tractexp.inference.differences import central_differences
+from tractexp.inference.differences import compute_central_differences
 from tractexp.inference.fit_problem import FitProblem
 from tractexp.inference.least_squares import Descent, descend
-from tractexp.inference.prior import departures
+from tractexp.inference.prior import compute_departures
 from tractexp.inference.problem import Problem
 from tractexp.inference.separable import Sensitivities
 from tractexp.noise.color import SMALLEST_DEVIATION, fit_autoregression, stretches
@@ -23,7 +23,7 @@ from tractexp.noise.model import Noise, Pair
 from tractexp.record import Event
 
 
-def before_the_event(event: Event) -> Pair:
+def estimate_noise_before(event: Event) -> Pair:
     """The noise of each channel before a dip: what is known of it before anything is fitted.
 
     Returns the autoregression of each channel, as loud as the event's level [pu].
@@ -60,7 +60,7 @@ class Likelihood(FitProblem):
         """The likelihood under `noise`, by default that of the samples before each dip; gaps do not
         count.
         """
-        noise = noise or Noise(tuple(before_the_event(e) for e in problem.events))
+        noise = noise or Noise(tuple(estimate_noise_before(e) for e in problem.events))
         return cls(problem=problem, valid=problem.drive.weights > 0, noise=noise)
 
     @classmethod
@@ -132,7 +132,7 @@ class Likelihood(FitProblem):
         """
         if not self.prior:
             return np.empty((len(unit), 0))
-        return self.prior * departures(self.problem, self.values(unit))
+        return self.prior * compute_departures(self.problem, self.values(unit))
 
     def jacobian(self, unit: np.ndarray) -> tuple[np.ndarray, Sensitivities]:
         """Whitened residuals, and their central differences.
@@ -149,7 +149,7 @@ class Likelihood(FitProblem):
         Sensitivities
             Per range of each coordinate.
         """
-        rows, J = central_differences(
+        rows, J = compute_central_differences(
             self.rows, unit[None], np.zeros(1, dtype=int), self.separable_columns
         )
         return rows[0], Sensitivities(J[0], self.free, self.separable_columns.rows)

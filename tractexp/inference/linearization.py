@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.inference.context import Context
-from tractexp.inference.differences import slopes, two_sided
+from tractexp.inference.differences import divide_differences, step_both_ways
 from tractexp.inference.fit_effort import BOUND_MARGIN
 from tractexp.inference.fitting import Refit
-from tractexp.inference.injection import PUSHES, perturbations
+from tractexp.inference.injection import PUSHES, inject_perturbations
 from tractexp.inference.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
 from tractexp.noise.span import compute_basis, project_out
@@ -114,7 +114,7 @@ class Linearization:
         )
 
 
-def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
+def linearize_fit(context: Context, fit: Refit, noise: Noise) -> Linearization:
     """Linearize everything at a fit, in one batch of simulations.
 
     What is fitted, and faults of the measurement, are nuisances. A parameter of the base model on a
@@ -137,13 +137,13 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     at = context.coordinates
     faults = {name: at.sizes([name]) for name in context.catalogue.of_measurement}
     nuisances = at.nuisances(fit.names)
-    moved, width = two_sided(fit.unit, nuisances)
-    points, spans, labels = _candidate_points(context, fit)
-    injected, groups = perturbations(context, fit.unit)
+    moved, width = step_both_ways(fit.unit, nuisances)
+    points, spans, labels = _place_candidate_points(context, fit)
+    injected, groups = inject_perturbations(context, fit.unit)
     k = len(nuisances)
     raw = context.residuals(np.concatenate([fit.unit[None], moved]), fit.names)
     base = raw[0]
-    nuisance = slopes(raw[1:], width)
+    nuisance = divide_differences(raw[1:], width)
     beside = [candidate.name for candidate, _, first, last in labels for _ in range(first, last)]
     changes = context.changes(
         fit.unit, np.concatenate([points, injected]), fit.names, beside + [PUSHES] * len(injected)
@@ -168,7 +168,7 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
         departure[i] = 0.0 if i in held else fit.unit[nuisances[i]] - at.null[nuisances[i]]
     # a relay's instants hang on the voltage's noise, which no draw has
     fitted = {*at.base, *at.sizes(fit.names)}
-    split = _by_event(
+    split = _split_by_event(
         context, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]]
     )
     active_bounds = tuple(nuisances[i] for i in sorted(held))
@@ -213,7 +213,7 @@ def find_active_bounds(
     return leaving & np.isin(columns, context.coordinates.base)
 
 
-def _by_event(context: Context, columns: np.ndarray) -> np.ndarray:
+def _split_by_event(context: Context, columns: np.ndarray) -> np.ndarray:
     """Columns (k, C, N) cut into one for each event, (k E, C, N)."""
     split = np.zeros((len(context.events), *columns.shape))
     for e, part in enumerate(context.drive.parts):
@@ -221,7 +221,7 @@ def _by_event(context: Context, columns: np.ndarray) -> np.ndarray:
     return split.reshape(-1, *columns.shape[1:])
 
 
-def _candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
+def _place_candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
     """One point per size and setting of each candidate outside the fit, and how far it steps [unit
     of the size].
     """
@@ -240,7 +240,7 @@ def _candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, np.ndar
     return np.array(points).reshape(-1, at.dimension), np.array(spans), labels
 
 
-def rich_residuals(t: Linearization, residuals: np.ndarray) -> np.ndarray:
+def remove_explained(t: Linearization, residuals: np.ndarray) -> np.ndarray:
     """Residuals without everything that any column explains: what noise is estimated from.
 
     Each is divided by what is left of its variance then, so that the noise does not come out too

@@ -77,7 +77,7 @@ class ModelError:
 
     def __str__(self) -> str:
         """ "3.1 % of its response (0.9 % of S)"."""
-        return f"{in_percent(self.value)} of its response ({in_percent(self.of_S)} of S)"
+        return f"{format_percent(self.value)} of its response ({format_percent(self.of_S)} of S)"
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Misfit:
         """The misfit of some events together."""
         currents = [one.epsilon_i**2 for one in played if one.epsilon_i is not None]
         of_currents = float(np.sqrt(np.mean(currents))) if currents else None
-        return cls(model_error(played), *relative_errors(played), of_currents)
+        return cls(compute_model_error(played), *compute_relative_errors(played), of_currents)
 
 
 M = TypeVar("M", bound=Misfit)
@@ -129,7 +129,7 @@ class Change(Generic[M]):
         return 1 - rest / square if 0 < square < np.inf and rest >= -square else np.nan
 
 
-def relative_errors(played: Sequence[Playback]) -> tuple[float, float]:
+def compute_relative_errors(played: Sequence[Playback]) -> tuple[float, float]:
     """epsilon_p and epsilon_q of Eq. (20) over some events together, as fractions."""
     measured = {c: np.concatenate([getattr(one.event.record, c) for one in played]) for c in "PQ"}
     calculated = {c: np.concatenate([getattr(one, c) for one in played]) for c in "PQ"}
@@ -174,15 +174,17 @@ def tell_error(entry: Mapping[str, Any]) -> str:
     if entry.get("stalls"):
         return STALL
     value = entry["value"]
-    return "beyond all measure" if value is None or not np.isfinite(value) else in_percent(value)
+    return (
+        "beyond all measure" if value is None or not np.isfinite(value) else format_percent(value)
+    )
 
 
-def in_percent(share: float) -> str:
+def format_percent(share: float) -> str:
     """A share to two digits, in percent.
 
     Examples
     --------
-    >>> in_percent(0.0057), in_percent(0.12), in_percent(1e6)
+    >>> format_percent(0.0057), format_percent(0.12), format_percent(1e6)
     ('0.57 %', '12 %', 'over 10000 %')
     """
     percent = 100 * share
@@ -191,7 +193,7 @@ def in_percent(share: float) -> str:
     return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
 
 
-def model_error(played: Sequence[Playback]) -> ModelError:
+def compute_model_error(played: Sequence[Playback]) -> ModelError:
     """The error of a model over some events together.
 
     Parameters
@@ -206,7 +208,7 @@ def model_error(played: Sequence[Playback]) -> ModelError:
     """
     if stalls := [one.event.record.name for one in played if one.stalls]:
         return ModelError.of_stall(stalls)
-    sums = np.concatenate(block_sums(played))  # (blocks, 3)
+    sums = np.concatenate(sum_blocks(played))  # (blocks, 3)
     left, response, power = sums.sum(axis=0)
     ratio = left / max(response, 1e-30)
     if not np.isfinite(left):  # no steady state
@@ -219,7 +221,7 @@ def model_error(played: Sequence[Playback]) -> ModelError:
     )
 
 
-def block_sums(played: Sequence[Playback], sharing: float = 0.0) -> list[np.ndarray]:
+def sum_blocks(played: Sequence[Playback], sharing: float = 0.0) -> list[np.ndarray]:
     """Sums over blocks of time, from each dip on.
 
     Blocks are shortened, to a cycle at most, until `sharing` of them share the response: the
@@ -243,14 +245,14 @@ def block_sums(played: Sequence[Playback], sharing: float = 0.0) -> list[np.ndar
     )
     length = min(LENGTH, seconds / BLOCKS)
     while True:
-        sums = [_block_sums(one, length) for one in played]
+        sums = [_sum_event_blocks(one, length) for one in played]
         response = np.concatenate([each[:, 1] for each in sums])
         if length <= COHERENT_SECONDS or response.sum() ** 2 >= sharing * np.sum(response**2):
             return sums
         length = max(length / 2, COHERENT_SECONDS)
 
 
-def _block_sums(played: Playback, length: float) -> np.ndarray:
+def _sum_event_blocks(played: Playback, length: float) -> np.ndarray:
     """Sums (3, blocks) from the dip on, by blocks of `length` [s]: squared residual in S and
     squared response less the noise's variance, and squared S; gaps are left out, and what cannot be
     simulated is infinite.
@@ -262,7 +264,7 @@ def _block_sums(played: Playback, length: float) -> np.ndarray:
     squares = np.stack(
         [np.abs(played.P + 1j * played.Q - S) ** 2, np.abs(S - S_0) ** 2, np.abs(S) ** 2]
     )
-    squares[:2] -= noise_variance(event)
+    squares[:2] -= estimate_noise_variance(event)
     valid = np.isfinite(S)
     squares[0, valid & ~np.isfinite(squares[0])] = np.inf  # without a steady state, or diverged
     squares = np.where(valid, squares, 0.0)[:, event.start :]
@@ -271,7 +273,7 @@ def _block_sums(played: Playback, length: float) -> np.ndarray:
     ).T
 
 
-def noise_variance(event: Event) -> float:
+def estimate_noise_variance(event: Event) -> float:
     """Variance of P plus that of Q before the dip [pu²], without mean, slope and slow
     part: drift.
     """

@@ -87,7 +87,7 @@ def explore_minima(likelihood: Likelihood, points: np.ndarray | None = None) -> 
     return likelihood.descent(promising, None, MORE, TOLERANCE)
 
 
-def distinct(ends: Descent, free: int) -> np.ndarray:
+def select_distinct(ends: Descent, free: int) -> np.ndarray:
     """The ends of descents that are different local minima.
 
     Parameters
@@ -105,7 +105,7 @@ def distinct(ends: Descent, free: int) -> np.ndarray:
     return ends.unit[best_distinct(ends.unit[:, :free], ends.deviance, DISTINCT, MOST, norm=2)]
 
 
-def valleys(likelihood: Likelihood) -> np.ndarray:
+def find_local_minima(likelihood: Likelihood) -> np.ndarray:
     """The distinct local minima of a likelihood, from all over the box and beside the best.
 
     Parameters
@@ -119,11 +119,11 @@ def valleys(likelihood: Likelihood) -> np.ndarray:
         Coordinates, the best first.
     """
     ends = explore_minima(likelihood)
-    beside = likelihood.descent(along_least_certain(likelihood, ends.best))
-    return distinct(ends.join_descent(beside), likelihood.free)
+    beside = likelihood.descent(place_along_least_certain(likelihood, ends.best))
+    return select_distinct(ends.join_descent(beside), likelihood.free)
 
 
-def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
+def place_along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
     """Points on either side of a minimum, in the direction that the records know least.
 
     Where q_v is near 2, for instance, the static load takes over the motor's U²/X' and any C will

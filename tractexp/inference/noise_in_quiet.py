@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.inference.context import Context
-from tractexp.inference.jumps import jumps
+from tractexp.inference.jumps import find_jump_errors
 from tractexp.inference.observed import Observed, estimate_noise
 from tractexp.noise import Noise
 
@@ -76,7 +76,9 @@ class QuietNoise:
         context = self.context
         problem = self.context.problem
         errors = [
-            shapes for shapes in (self.input_modes, jumps(context, unit)) if shapes is not None
+            shapes
+            for shapes in (self.input_modes, find_jump_errors(context, unit))
+            if shapes is not None
         ]
         shapes = np.concatenate(errors) if errors else None
         there = context.kernels.select_problem(context.coordinates.present(unit), unit)
@@ -92,7 +94,7 @@ class QuietNoise:
         )
 
 
-def white(context: Context) -> Noise:
+def assume_white_noise(context: Context) -> Noise:
     """White noise of the level before the dips: what is known before the first fit."""
     each = zip(*(e.levels for e in context.events), strict=True)
     levels = [float(np.sqrt(np.mean([level**2 for level in channel]))) for channel in each]

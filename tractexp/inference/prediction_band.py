@@ -24,7 +24,7 @@ import numpy as np
 
 from tractexp.domain import Playback
 from tractexp.errors import UserError
-from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
+from tractexp.inference.interval import INTERVAL_LEVEL, compute_interval_factor
 
 EVENT_SPREAD = 0.45
 SCATTER_STEP = 0.02  # standard errors by which the scatter of the calculated power is probed
@@ -68,7 +68,7 @@ class PredictionBand:
         """
         noise = find_noise_peak(samples) * np.array(self.noise)
         model = _find_next_event_factor(self.events) * np.array(self.share) * change
-        return np.sqrt(noise**2 + model**2 + (interval_factor() * scatter) ** 2)
+        return np.sqrt(noise**2 + model**2 + (compute_interval_factor() * scatter) ** 2)
 
 
 def measure_band(played: Sequence[Playback]) -> PredictionBand | None:

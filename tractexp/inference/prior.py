@@ -10,13 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.inference.blocks import blocks_of
+from tractexp.inference.blocks import cut_blocks
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.record import Event
 
 
-def departures(problem: Problem, values: np.ndarray) -> np.ndarray:
+def compute_departures(problem: Problem, values: np.ndarray) -> np.ndarray:
     """How far candidates are from what the model's motor usually is.
 
     Each usual quantity has a median and a factor, the spread of its logarithm: a departure is
@@ -64,12 +64,12 @@ def weigh_prior(events: Sequence[Event], drive: Drive, free: int) -> float:
         The root of the samples of a block: a block of samples then counts as one row of the prior.
     """
     samples = int(np.count_nonzero(drive.weights > 0))
-    return float(np.sqrt(samples / len(blocks_of(events, drive, free))))
+    return float(np.sqrt(samples / len(cut_blocks(events, drive, free))))
 
 
-def held_in_words(problem: Problem, values: np.ndarray) -> str:
+def describe_prior(problem: Problem, values: np.ndarray) -> str:
     """A sentence that the free values (d,) were held by a prior, and how far off it they are."""
-    (off,) = np.abs(departures(problem, values[None]))
+    (off,) = np.abs(compute_departures(problem, values[None]))
     far = (
         f", and is {off.max():.2g} standard deviations off where it is farthest"
         if len(off)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tractexp.inference.context import Context
-from tractexp.inference.differences import finite
+from tractexp.inference.differences import replace_diverged
 from tractexp.noise import Noise
 from tractexp.noise.span import project_out
 
@@ -72,7 +72,7 @@ def _expect_deviance(
     raw, rows = context.linearize(ground, noise, nuisances, ())
     Q = np.linalg.qr(rows[1:].T)[0]
     r = rows[0] - Q @ (rows[0] @ Q)
-    white = context.whiten(noise, finite(context.residuals(units, names) - raw))
+    white = context.whiten(noise, replace_diverged(context.residuals(units, names) - raw))
     changes = np.pad(white, ((0, 0), (0, len(r) - white.shape[1])))
     changes = project_out(changes, Q.T)
     power = np.einsum("nr,nr->n", changes, changes)

@@ -83,7 +83,7 @@ class RecorderWindow(Measurement):
         return sharpen_voltage(event, self.weights(event.record.step), self.window)
 
 
-def windows_of(events: Sequence[Event]) -> list[RecorderWindow]:
+def list_recorder_windows(events: Sequence[Event]) -> list[RecorderWindow]:
     """The windows that recorders of these events may have: the one they say, else whole cycles and
     those of the estimators, shortest first.
 

@@ -20,7 +20,7 @@ FEWEST_OSCILLATION_SAMPLES = 8  # samples of a stretch with an oscillation
 WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
 
 
-def windows(problem: Problem, event: int) -> list[tuple[float, float]]:
+def list_windows(problem: Problem, event: int) -> list[tuple[float, float]]:
     """The windows of one event: before the dip, both halves of it, then ever longer ones.
 
     Parameters
@@ -66,7 +66,7 @@ class ResidualWindow:
     end: float
 
 
-def statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
+def compute_residual_statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
     """The statistics of which the largest counts, by what each looks for.
 
     Parameters
@@ -93,14 +93,14 @@ def statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
     }
 
 
-def residual_windows(problem: Problem) -> list[ResidualWindow]:
+def list_residual_windows(problem: Problem) -> list[ResidualWindow]:
     """Every window of every event, for each channel that is compared; none shorter than two
     samples.
     """
     cells = []
     for e, event in enumerate(problem.events):
         first, step, origin = int(problem.drive.first[e]), event.record.step, event.record.t[0]
-        for a, b in windows(problem, e):
+        for a, b in list_windows(problem, e):
             i = round(a / step)
             j = min(round(b / step), event.record.samples)
             if j - i < 2:
@@ -124,12 +124,12 @@ def measure_energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
     channels : (b, C, N)
         Whitened, projected residuals: b of them, C channels, N samples of all events.
     problem : Problem
-        Whose `residual_windows` and quiet stretches before the dips count.
+        Whose `list_residual_windows` and quiet stretches before the dips count.
 
     Returns
     -------
     (b, k) array
-        A column for each of the k windows of `residual_windows`, in their order.
+        A column for each of the k windows of `list_residual_windows`, in their order.
     """
     square = channels**2
     quiet = np.mean(
@@ -140,7 +140,8 @@ def measure_energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
     square /= np.where(quiet > 0, quiet, 1.0)  # a current that is not compared is zero throughout
     row = problem.drive.labels.index
     return np.stack(
-        [square[:, row(c.channel), c.part].sum(axis=1) for c in residual_windows(problem)], axis=1
+        [square[:, row(c.channel), c.part].sum(axis=1) for c in list_residual_windows(problem)],
+        axis=1,
     )
 
 
@@ -246,7 +247,7 @@ def measure_tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
         ):
             stretch = own[:, :, part]
             if stretch.shape[2] >= FEWEST_OSCILLATION_SAMPLES:
-                power[:, k] += np.sum(_power(stretch), axis=1) / stretch.shape[2]
+                power[:, k] += np.sum(_compute_spectrum(stretch), axis=1) / stretch.shape[2]
     return power.reshape(len(channels), -1)
 
 
@@ -275,7 +276,7 @@ def measure_bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
     return np.concatenate(columns, axis=1)
 
 
-def _power(stretch: np.ndarray) -> np.ndarray:
+def _compute_spectrum(stretch: np.ndarray) -> np.ndarray:
     """The power (..., frequencies) of stretches (..., n), at the frequencies of one transform of
     `SPECTRUM_BINS` however long they are.
     """

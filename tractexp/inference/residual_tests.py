@@ -8,7 +8,7 @@ LAGS = 20
 REJECTED = 0.01  # p-value below which a test speaks
 
 
-def autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
+def compute_autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
     """The correlation of a row with itself later.
 
     Parameters
@@ -25,7 +25,7 @@ def autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
 
     Examples
     --------
-    >>> autocorrelation(np.array([1.0, -1.0, 1.0, -1.0]), 2).tolist()
+    >>> compute_autocorrelation(np.array([1.0, -1.0, 1.0, -1.0]), 2).tolist()
     [-0.75, 0.5]
     """
     centered = rows - rows.mean()
@@ -33,7 +33,7 @@ def autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
     return np.array([centered[k:] @ centered[:-k] for k in range(1, lags + 1)]) / (power or 1.0)
 
 
-def ljung_box(rows: np.ndarray, fitted: int = 0) -> dict[str, Any]:
+def run_ljung_box(rows: np.ndarray, fitted: int = 0) -> dict[str, Any]:
     """Whether a row is uncorrelated.
 
     Parameters
@@ -54,12 +54,12 @@ def ljung_box(rows: np.ndarray, fitted: int = 0) -> dict[str, Any]:
     """
     n = len(rows)
     lags = max(min(max(LAGS, fitted + 5), n // 4), fitted + 1)
-    r = autocorrelation(rows, lags)
+    r = compute_autocorrelation(rows, lags)
     statistic = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
     return tell_test("whiteness (Ljung-Box)", statistic, lags - fitted, ("colored", "white"))
 
 
-def jarque_bera(rows: np.ndarray) -> dict[str, Any]:
+def run_jarque_bera(rows: np.ndarray) -> dict[str, Any]:
     """Whether a row has the skewness and kurtosis of a normal distribution.
 
     As `scipy.stats.jarque_bera`, without the second that importing it takes.
@@ -82,7 +82,7 @@ def jarque_bera(rows: np.ndarray) -> dict[str, Any]:
     --------
     >>> spiky = np.zeros(100)
     >>> spiky[50] = 10.0
-    >>> jarque_bera(spiky)["p"] < 0.001
+    >>> run_jarque_bera(spiky)["p"] < 0.001
     True
     """
     z = (rows - rows.mean()) / (rows.std() or 1.0)

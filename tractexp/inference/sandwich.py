@@ -20,10 +20,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.inference.blocks import blocks_of
-from tractexp.inference.differences import central_differences
+from tractexp.inference.blocks import cut_blocks
+from tractexp.inference.differences import compute_central_differences
 from tractexp.inference.information import STRUCTURAL, Information
-from tractexp.inference.interval import interval_factor
+from tractexp.inference.interval import compute_interval_factor
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.separable import Sensitivities
 
@@ -56,7 +56,7 @@ class Scatter:
     spread: float
 
 
-def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
+def estimate_scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     """How far a fit by Eq. (8) scatters.
 
     Parameters inside their bounds are told with those on a bound held there; one on a bound as if
@@ -78,27 +78,27 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     rows, J = whole.jacobian(whole.place_parameters(unit[None])[0])
     free = likelihood.free
     drive = problem.drive
-    blocks = blocks_of(problem.events, drive, free)
-    held_by = _prior_jacobian(likelihood, unit)
+    blocks = cut_blocks(problem.events, drive, free)
+    held_by = _differentiate_prior(likelihood, unit)
     rows = rows.reshape(drive.channels, -1)
-    power = _of_power(whole, blocks)
+    power = _find_power_changes(whole, blocks)
 
     def influences(columns: np.ndarray) -> np.ndarray:
-        return _influences(J, rows, columns, blocks, power, held_by, likelihood.prior)
+        return _compute_influences(J, rows, columns, blocks, power, held_by, likelihood.prior)
 
     shared = np.concatenate([J.shared_columns, held_by])
     every = np.arange(free)
-    inside = every[off_walls(unit[:free])]
+    inside = every[is_off_bounds(unit[:free])]
     root = np.zeros((free, free))
     ratio = np.ones(free)
-    own, ratio[inside], spread = robust_root(shared[:, inside], influences(inside))
+    own, ratio[inside], spread = compute_robust_root(shared[:, inside], influences(inside))
     root[np.ix_(every[: len(own)], inside)] = own
     if len(inside) < free:
         held = np.setdiff1d(every, inside)
         rows = rows - (
             J.shared_columns @ np.linalg.lstsq(J.shared_columns, rows.ravel())[0]
         ).reshape(rows.shape)
-        full, wider, _ = robust_root(shared, influences(every))
+        full, wider, _ = compute_robust_root(shared, influences(every))
         ratio[held] = wider[held]
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(full.T @ full))[held], 0.0))
         seen = errors > 0  # what changes nothing has no error, and stays out of what is known
@@ -110,10 +110,10 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
         root,
         SINGULAR_ROUNDING,
     )
-    return Scatter(information, interval_factor(len(blocks) - 1), ratio, spread)
+    return Scatter(information, compute_interval_factor(len(blocks) - 1), ratio, spread)
 
 
-def off_walls(unit: np.ndarray) -> np.ndarray:
+def is_off_bounds(unit: np.ndarray) -> np.ndarray:
     """Which coordinates rest on no bound.
 
     Parameters
@@ -128,15 +128,17 @@ def off_walls(unit: np.ndarray) -> np.ndarray:
     return (unit > WALL) & (unit < 1 - WALL)
 
 
-def _prior_jacobian(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
+def _differentiate_prior(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
     """Derivatives (k, d) of the rows of a prior, per range of each parameter."""
-    _, J = central_differences(
+    _, J = compute_central_differences(
         lambda at, _: likelihood.prior_rows(at), unit[None], np.zeros(1, dtype=int)
     )
     return J[0].T
 
 
-def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> list[tuple[int, np.ndarray]]:
+def _find_power_changes(
+    likelihood: Likelihood, blocks: Sequence[slice]
+) -> list[tuple[int, np.ndarray]]:
     """The event of each block, and the change (2,) of its P0 and Q0 in ranges when the block is
     left out of their means.
     """
@@ -160,7 +162,7 @@ def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> list[tuple[int
     return changes
 
 
-def _influences(
+def _compute_influences(
     J: Sensitivities,
     rows: np.ndarray,
     columns: np.ndarray,
@@ -179,11 +181,11 @@ def _influences(
     cross = [flat[mine].T @ J.own(e) for e, mine in enumerate(J.rows)]
     total = flat.T @ flat + prior.T @ prior
     shifts = [cross[e] @ change for e, change in power]
-    moves = moves_without_blocks(flat.reshape(*rows.shape, -1), rows, blocks, total, shifts)
+    moves = compute_moves_without_blocks(flat.reshape(*rows.shape, -1), rows, blocks, total, shifts)
     return np.concatenate([moves, weight * prior @ np.linalg.pinv(total)])
 
 
-def moves_without_blocks(
+def compute_moves_without_blocks(
     J: np.ndarray,
     rows: np.ndarray,
     blocks: Sequence[slice],
@@ -227,7 +229,7 @@ def moves_without_blocks(
     return np.clip(moves, -1.0, 1.0)  # no estimate leaves its box
 
 
-def robust_root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def compute_robust_root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """Rows whose inverse products are the covariance of an estimate under a wrong model.
 
     Along the directions of J, in which independent residuals of unit variance have unit variance,

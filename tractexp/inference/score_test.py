@@ -111,7 +111,7 @@ class ScoreTest:
         ps = []
         for column, block in zip(self.columns, self.blocks, strict=True):
             signs = np.array([column.candidate.sign(p) for p in column.candidate.sizes])
-            drop, p = signed_drop(block, self.r, signs)
+            drop, p = compute_signed_drop(block, self.r, signs)
             drops.append(drop)
             ps.append(p)
         shape = (len(self.blocks), len(self.r))
@@ -188,7 +188,7 @@ class ScoreTest:
         by_test = {
             "pushes into the balances": self.variance_component(),
             "a further effect": -np.log(self.least_p)[:, None],
-            **residual_statistics.statistics(self.channels(problem), problem),
+            **residual_statistics.compute_residual_statistics(self.channels(problem), problem),
         }
         if len(problem.events) > 1:
             by_test[PER_EVENT] = (
@@ -197,7 +197,7 @@ class ScoreTest:
         return by_test
 
 
-def signed_drop(
+def compute_signed_drop(
     block: np.ndarray, r: np.ndarray, signs: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """By how much a least-squares multiple of some rows that keeps signs lowers squares.
@@ -224,7 +224,7 @@ def signed_drop(
 
     Examples
     --------
-    >>> drop, p = signed_drop(np.array([[1.0, 0.0]]), np.array([[3.0, 1.0]]), np.array([0]))
+    >>> drop, p = compute_signed_drop(np.array([[1.0, 0.0]]), np.array([[3.0, 1.0]]), np.array([0]))
     >>> drop.tolist(), p.round(4).tolist()
     ([9.0], [0.0027])
     """

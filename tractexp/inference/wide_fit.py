@@ -9,22 +9,22 @@ import numpy as np
 
 from tractexp.inference import fit_effort
 from tractexp.inference.context import Context
-from tractexp.inference.cores import each_apart
+from tractexp.inference.cores import map_on_cores
 from tractexp.inference.fitting import (
     Refit,
     Start,
-    best_of,
     find_lag,
     find_prior_columns,
     refit,
     run_descents,
+    select_best_fits,
 )
 from tractexp.inference.promising import select_promising_starts
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct
 
 
-def wide_refit(
+def refit_widely(
     context: Context,
     noise: Noise,
     wanted: Sequence[Start],
@@ -48,17 +48,19 @@ def wide_refit(
     list of Refit
         In order of cost.
     """
-    return _around(context, noise, _in_turns(context, noise, wanted, faults), faults, again)
+    return _search_around(
+        context, noise, _descend_in_turns(context, noise, wanted, faults), faults, again
+    )
 
 
-def _around(
+def _search_around(
     context: Context, noise: Noise, fits: list[Refit], faults: Sequence[str] | None, again: int
 ) -> list[Refit]:
     """Fits of one set searched further around the best of them as long as that gains, and the
     nearest then exactly.
     """
     for _ in range(again if context.coordinates.settings(fits[0].names) else 0):
-        others = _in_turns(context, noise, scatter_starts(context, fits[0]), faults)
+        others = _descend_in_turns(context, noise, scatter_starts(context, fits[0]), faults)
         if others[0].deviance > fits[0].deviance - fit_effort.LEAST_GAIN:
             break
         fits = others
@@ -66,7 +68,7 @@ def _around(
     return refit(context, noise, near, faults)
 
 
-def _in_turns(
+def _descend_in_turns(
     context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None
 ) -> list[Refit]:
     """The best of these starts, each moved and descended in turn as long as it gains more than it
@@ -75,7 +77,7 @@ def _in_turns(
     turning = _begin_fits(context, noise, wanted, faults)
     ended: list[Refit] = []
     for _ in range(fit_effort.MOST_TURNS):
-        moved = [(f.names, moved_across(context, noise, f, faults)) for f in turning]
+        moved = [(f.names, move_across(context, noise, f, faults)) for f in turning]
         after = run_descents(context, noise, moved, faults, fit_effort.ROUGH_DESCENT)
         better = [min(pair, key=lambda f: f.deviance) for pair in zip(turning, after, strict=True)]
         best = min(f.deviance for f in (*ended, *better))
@@ -129,14 +131,14 @@ def scatter_starts(context: Context, fit: Refit) -> list[Start]:
     return [(fit.names, unit) for unit in units]
 
 
-def wide_refits(
+def refit_sets_widely(
     context: Context,
     noise: Noise,
     wanted: Iterable[Sequence[Start]],
     most: int,
     others: Iterable[Refit] = (),
 ) -> list[Refit]:
-    """Fit several sets by `wide_refit`, those that come nearest in a few iterations.
+    """Fit several sets by `refit_widely`, those that come nearest in a few iterations.
 
     What is far behind the best of them and of `others` after these, or after its turns, is given
     up.
@@ -146,7 +148,7 @@ def wide_refits(
     context, noise
         As of `refit`.
     wanted : starts of each set
-        As of `wide_refit`.
+        As of `refit_widely`.
     most : int
         How many sets are searched to the end.
     others : iterable of Refit
@@ -164,20 +166,20 @@ def wide_refits(
         return [fits for fits in every if fits[0].cost <= min(best) + find_lag(best)]
 
     begun = near(
-        each_apart(
+        map_on_cores(
             lambda starts: _begin_fits(context, noise, starts, None), list(wanted), context.effort
         )
     )
     begun = sorted(begun, key=lambda fits: fits[0].cost)[:most]
     again = [[f.start for f in fits] for fits in begun]
-    turned = each_apart(
-        lambda starts: _in_turns(context, noise, starts, None), again, context.effort
+    turned = map_on_cores(
+        lambda starts: _descend_in_turns(context, noise, starts, None), again, context.effort
     )
-    ended = lambda fits: _around(context, noise, fits, None, fit_effort.SCATTER_ROUNDS)  # noqa: E731
-    return best_of(
+    ended = lambda fits: _search_around(context, noise, fits, None, fit_effort.SCATTER_ROUNDS)  # noqa: E731
+    return select_best_fits(
         [
             *itertools.chain(*turned),
-            *itertools.chain(*each_apart(ended, near(turned), context.effort)),
+            *itertools.chain(*map_on_cores(ended, near(turned), context.effort)),
         ]
     )
 
@@ -211,7 +213,7 @@ def _begin_fits(
     return [begun[k] for k in chosen]
 
 
-def moved_across(
+def move_across(
     context: Context, noise: Noise, fit: Refit, faults: Sequence[str] | None = None
 ) -> np.ndarray:
     """Move what an effect has beside its sizes, one parameter at a time and by any reach.

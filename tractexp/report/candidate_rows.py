@@ -10,9 +10,9 @@ from tractexp.discrepancy.decide import NONE, TIED, UNEXPLAINED
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.explain import find_status
 from tractexp.discrepancy.findings import Findings
-from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import effect_sizes
-from tractexp.inference.chance import by_draws
+from tractexp.discrepancy.judgement import judge_effects
+from tractexp.discrepancy.precision import estimate_effect_sizes
+from tractexp.inference.chance import format_drawn_p
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.text.wording import join_words
 
@@ -116,7 +116,7 @@ def _tell_set(findings: Findings, row: SetEvidence) -> CandidateRow:
     names = row.fit.names or findings.evidence.faults
     drop = row.lowered if row.fit.names else findings.bare.deviance - row.reported_fit.deviance
     status, why = _tell_fate(findings, row)
-    sizes = effect_sizes(findings.context, row.reported_fit, names, row.tests)
+    sizes = estimate_effect_sizes(findings.context, row.reported_fit, names, row.tests)
     return CandidateRow(names, max(drop, 0.0), FITTED, status, tuple(sizes), why)
 
 
@@ -139,7 +139,7 @@ def _tell_fate(findings: Findings, row: SetEvidence) -> tuple[str, str]:
     if status == "not adequate":
         return (
             status,
-            f"chance leaves as much as it does with a probability of {by_draws(row.p_left)}",
+            f"chance leaves as much as it does with a probability of {format_drawn_p(row.p_left)}",
         )
     return "denied", "does not hold on the held-out events"
 
@@ -151,7 +151,7 @@ def _list_singles(findings: Findings) -> list[CandidateRow]:
     refits, scores = findings.explanations.refits, {s.name: s for s in findings.first.scores}
     base, at = findings.first.fit.deviance, findings.context.coordinates
     rows = []
-    for j in judgements(findings):
+    for j in judge_effects(findings):
         score, fit = scores.get(j.name), refits.get((j.name,))
         drop = base - fit.deviance if fit else score.drop if score else np.nan
         sizes: list[ParameterEstimate] = []

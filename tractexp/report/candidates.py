@@ -10,8 +10,8 @@ from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.decide import TIED
 from tractexp.discrepancy.explain import find_status
 from tractexp.discrepancy.findings import Findings
-from tractexp.discrepancy.judgement import judgements
-from tractexp.inference.chance import by_draws
+from tractexp.discrepancy.judgement import judge_effects
+from tractexp.inference.chance import format_drawn_p
 from tractexp.report.candidate_rows import (
     CHOSEN,
     FITTED,
@@ -127,7 +127,7 @@ def _add_sets(page: Report, findings: Findings) -> None:
             f"{r.fit.deviance:.1f}",
             f"{r.behind:.1f}",
             find_status(r, findings.verdict, findings.evidence, findings.context),
-            "" if r.tests is None else by_draws(r.p_left),
+            "" if r.tests is None else format_drawn_p(r.p_left),
         ]
         for r in findings.evidence.rows[:MOST_SETS]
     ]
@@ -146,7 +146,7 @@ def _add_sets(page: Report, findings: Findings) -> None:
 def _add_further_gains(page: Report, findings: Findings) -> None:
     """Add what the other effects would gain once the chosen ones are in the model."""
     rows = []
-    for j in judgements(findings):
+    for j in judge_effects(findings):
         size = ""
         if j.score is not None:
             size = ", ".join(

@@ -2,7 +2,7 @@
 
 from tractexp.blocks import Report
 from tractexp.discrepancy.findings import Findings
-from tractexp.inference.chance import BLURRED, by_draws
+from tractexp.inference.chance import BLURRED, format_drawn_p
 from tractexp.text.wording import format_probability
 
 
@@ -12,7 +12,7 @@ def places(page: Report, findings: Findings) -> None:
     page.heading("Is there a disagreement, and where?")
     text = (
         "What the base model leaves would come about by chance with a probability of"
-        f" {by_draws(first.p_left)}"
+        f" {format_drawn_p(first.p_left)}"
     )
     text += (
         "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."

@@ -12,11 +12,11 @@ from tractexp.blocks import Report, Table
 from tractexp.discrepancy.decide import UNEXPLAINED
 from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.nearest import Nearest
-from tractexp.discrepancy.precision import estimates
+from tractexp.discrepancy.precision import list_estimates
 from tractexp.discrepancy.readings import read_shapes
-from tractexp.discrepancy.recommend import recommendation
+from tractexp.discrepancy.recommend import recommend_next
 from tractexp.discrepancy.remainder import Remainder
-from tractexp.inference.model_error import in_percent, tell_error
+from tractexp.inference.model_error import format_percent, tell_error
 from tractexp.record.identity import Identity, describe_identities, title
 from tractexp.report.candidates import add_candidates
 from tractexp.report.disagreement import noise, places
@@ -169,7 +169,7 @@ def report(
     kind = (
         "plain" if findings.names and not findings.verdict.complete else KIND[findings.verdict.word]
     )
-    page.verdict(head, *sentences, f"Next: {recommendation(findings)}.", kind=kind)
+    page.verdict(head, *sentences, f"Next: {recommend_next(findings)}.", kind=kind)
     overlaid(
         page.heading("Measured, before, after" if findings.names else "Measured and calculated"),
         findings.graded_overlays,
@@ -247,7 +247,9 @@ def _describe_gap_with_nearest(near: Nearest) -> list[list[str]]:
 
 def _format_error(entry: Mapping[str, Any]) -> str:
     """A model's error with its interval, as a table has it."""
-    ends = [in_percent(end) for end in entry["interval"] if end is not None and np.isfinite(end)]
+    ends = [
+        format_percent(end) for end in entry["interval"] if end is not None and np.isfinite(end)
+    ]
     return tell_error(entry) + (
         f" ({ends[0].removesuffix(' %')} to {ends[1]})" if len(ends) == 2 else ""
     )
@@ -335,7 +337,7 @@ def _add_nearest(page: Report, findings: Findings, near: Nearest) -> None:
     """The candidates that come nearest, with their shares and sizes."""
     assert near.row.tests is not None
     by_name = {
-        e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)
+        e.parameter.name: e for e in list_estimates(near.row.tests, near.row.fit.unit, near.names)
     }
     own = [
         (by_name[p.name], p)

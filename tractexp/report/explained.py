@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.findings import Findings
-from tractexp.inference.residual_statistics import residual_windows
+from tractexp.inference.residual_statistics import list_residual_windows
 from tractexp.text.wording import join_words
 
 MOST_TRIED = 8  # sets, those that lower the deviance most
@@ -34,7 +34,7 @@ def answer_clicks(findings: Findings) -> list[list[Answer]]:
     deviation, fits = noise.deviation(drive), [row.reported_fit for row in rows]
     left = [context.residual(fit.unit, fit.names) / deviation for fit in fits]
     answers: list[list[Answer]] = [[] for _ in problem.events]
-    for window in residual_windows(problem):
+    for window in list_residual_windows(problem):
         c = drive.labels.index(window.channel)
         loudness = [_measure_loudness(one[c, window.part]) for one in left]
         best = sorted(zip(loudness[1:], names[1:], strict=True))[:MOST_TOLD]

@@ -11,8 +11,8 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import use_of
 from tractexp.discrepancy.findings import Findings
-from tractexp.discrepancy.forms import CATALOGUE, forms
-from tractexp.identification.verdict import brief
+from tractexp.discrepancy.forms import CATALOGUE, describe_forms
+from tractexp.identification.verdict import shorten_verdict
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.model.sites import KINDS
 from tractexp.text.wording import format_with_error, join_alternatives, join_words
@@ -24,7 +24,7 @@ def laws(page: Report, findings: Findings) -> None:
     """Where each effect named acts, what it does there and by which law; curves that were found."""
     if not findings.names:
         return
-    entries = forms(findings)
+    entries = describe_forms(findings)
     page.heading("Where it acts, and by which law")
     rows = [
         [
@@ -77,7 +77,15 @@ def parameters(page: Report, findings: Findings) -> None:
         p, was = e.parameter, before.get(e.parameter.name)
         entries = [value(was) if was else "not in it"] if findings.names else []
         rows.append(
-            [p.name, p.about, p.unit, *entries, value(e), interval(*e.interval), brief(e.verdict)]
+            [
+                p.name,
+                p.about,
+                p.unit,
+                *entries,
+                value(e),
+                interval(*e.interval),
+                shorten_verdict(e.verdict),
+            ]
         )
     stages = ["before", "after"] if findings.names else ["value"]
     is_exact = findings.final_grade.uncertainty.exact
@@ -97,7 +105,7 @@ def parameters(page: Report, findings: Findings) -> None:
     if why := [
         f"{e.parameter.name} is {e.verdict}."
         for e in parameter_estimates
-        if brief(e.verdict) != e.verdict
+        if shorten_verdict(e.verdict) != e.verdict
     ]:
         with page.fold_blocks("Why some are known badly, and what of them is known"):
             page.items(why)

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 from tractexp.blocks import Report
+from tractexp.identification.network_comparison import describe_poles
 from tractexp.identification.verdict import IDENTIFIED, TRADES
-from tractexp.identification.yardstick import poles_in_words
 from tractexp.report.fit_sentences import describe_rivals, describe_search_end
 from tractexp.report.fit_tables import digits, errors, parameters
 from tractexp.report.race import tabulate_race
@@ -82,7 +82,7 @@ def yardstick(fit: "Identification") -> list[str]:
     """
     poles = fit.result.linear_network.get("poles")
     what = "pole" if len(poles or ()) == 1 else "poles"
-    beside = f" The network's {what}: {poles_in_words(poles)}." if poles else ""
+    beside = f" The network's {what}: {describe_poles(poles)}." if poles else ""
     return [finish_sentence(fit.yardstick) + beside] if fit.yardstick else []
 
 

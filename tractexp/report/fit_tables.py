@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from tractexp.blocks import Table
-from tractexp.identification.verdict import brief
-from tractexp.inference.model_error import in_percent, tell_error
+from tractexp.identification.verdict import shorten_verdict
+from tractexp.inference.model_error import format_percent, tell_error
 from tractexp.record.identity import Identity
 from tractexp.report.fitted_curves import ROLES
 from tractexp.text.wording import epsilon
@@ -44,7 +44,7 @@ def parameters(fit: "Identification") -> Table:
             "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
             "{:g} .. {:g}".format(*e.bounds),
             e.search,
-            brief(e.verdict),
+            shorten_verdict(e.verdict),
         ]
         for e in fit.parameters.values()
         if e.name not in fit.result.nuisances
@@ -111,8 +111,8 @@ def error_table(events: Sequence[Any], of_events: Sequence[Any], epsilons: Seque
             e["name"],
             ROLES[e["role"]],
             tell_error(m),
-            "" if m.get("stalls") else " .. ".join(map(in_percent, m["interval"])),
-            "" if m.get("stalls") else in_percent(m["of_S"]),
+            "" if m.get("stalls") else " .. ".join(map(format_percent, m["interval"])),
+            "" if m.get("stalls") else format_percent(m["of_S"]),
             *(epsilon(e[key]) for key in epsilons),
         ]
         for e, m in zip(events, of_events, strict=True)

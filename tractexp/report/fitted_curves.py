@@ -14,8 +14,8 @@ from tractexp.blocks.chart import Chart
 from tractexp.errors import UserError
 from tractexp.identification.fit import play
 from tractexp.identification.forecast import draw_dip
+from tractexp.identification.network_comparison import play_network
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.yardstick import play_network
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart, show_units
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, spectrum_chart, wave_chart

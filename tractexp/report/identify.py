@@ -10,11 +10,11 @@ import numpy as np
 from tractexp.blocks import Report, style
 from tractexp.blocks.chart import Chart
 from tractexp.configuration.run_command import get_command
-from tractexp.identification.result import by_event
+from tractexp.identification.result import name_by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
-from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
+from tractexp.inference.residual_tests import LAGS, REJECTED, compute_autocorrelation
 from tractexp.record.identity import describe_identities, title
 from tractexp.report.fit_sentences import describe_rivals, describe_search_end
 from tractexp.report.fit_summary import headline, machine, samples, yardstick
@@ -107,7 +107,7 @@ def _add_parameters(page: Report, fit: "Identification", uncertainty: Uncertaint
         page.text(f"{finish_sentence(on_given_base)} {base}")
     page.chart(
         _chart_estimates(
-            uncertainty, by_event(result.search["parameters"], result.search["per_event"])
+            uncertainty, name_by_event(result.search["parameters"], result.search["per_event"])
         ),
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the"
         " upper bound); cross: where the search ended.",
@@ -221,7 +221,7 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
             rows = white[c, part][seen]
             chart.line(name, event.record.t[seen], rows, color, panel, width=0.8)
             x = np.arange(1, min(LAGS, len(rows) // 4) + 1)
-            lags.points(name, x + 0.2 * c, autocorrelation(rows, len(x)), color, size=5)
+            lags.points(name, x + 0.2 * c, compute_autocorrelation(rows, len(x)), color, size=5)
             limit = 1.96 / np.sqrt(max(len(rows), 1))
             lags.level(limit).level(-limit)
         caption = (

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from tractexp.blocks import Report, Table
 from tractexp.configuration.run_command import get_command
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import format_percent
 from tractexp.record.identity import title_of
 from tractexp.report.fit_tables import error_table
 from tractexp.report.fitted_curves import chart_all_events
@@ -42,7 +42,8 @@ def numbers(fit: "NetworkFit") -> Table:
     """The errors that networks of fewer and of more poles leave."""
     keys = ["model_error", "held_out"] if fit.validate else ["model_error"]
     rows = [
-        [row["poles"], *(in_percent(row[key]) for key in keys)] for row in fit.content["by_poles"]
+        [row["poles"], *(format_percent(row[key]) for key in keys)]
+        for row in fit.content["by_poles"]
     ]
     chosen = f"The number of poles is chosen by {fit.content['chosen_by']}."
     return Table(["poles", "model error, fitted", "held out"][: 1 + len(keys)], rows, "", chosen)

@@ -14,7 +14,7 @@ from tractexp.blocks import Report, Table
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
 from tractexp.domain import PHASORS, WAVES
-from tractexp.identification.plan import INERTIA, ChosenEvent, Forecast, Needed, column
+from tractexp.identification.plan import INERTIA, ChosenEvent, IntervalForecast, Needed, find_column
 from tractexp.inference.problem import Problem
 from tractexp.text.wording import finish_sentence, list_first
 
@@ -44,7 +44,7 @@ class Planned:
     origin: str  # where the values are from, in words
     dip: str  # what was planned, in words
     needed: Needed
-    scans: Mapping[str, tuple[Sequence[float], Sequence[Forecast]]]
+    scans: Mapping[str, tuple[Sequence[float], Sequence[IntervalForecast]]]
     chosen: Sequence[ChosenEvent]  # none where there is one event
     least: float  # share by which an event must narrow the intervals to be chosen
     most: int | None  # events asked for
@@ -157,7 +157,7 @@ def _chart_halves(planned: Planned, label: str, legend: bool) -> Chart:
         pixels=440 if legend else 320,
         legend=legend,
     )
-    bold = column(forecasts[0].names, needed.parameter)
+    bold = find_column(forecasts[0].names, needed.parameter)
     for j, (name, (color, dash)) in enumerate(
         zip(forecasts[0].names, itertools.cycle(LINES), strict=False)
     ):

@@ -9,10 +9,10 @@ from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.findings import Findings
-from tractexp.discrepancy.precision import effect_sizes
-from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.precision import estimate_effect_sizes
+from tractexp.discrepancy.proposal.library import find_term
 from tractexp.inference.interval import ParameterEstimate
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import format_percent
 from tractexp.text.wording import join_words
 
 ADDED, TIED, OTHER, BASE = PALETTE[2], PALETTE[4], PALETTE[0], MEASURED
@@ -48,7 +48,7 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
         [
             [
                 _label(findings, row),
-                in_percent(row.held_out_prediction.error),
+                format_percent(row.held_out_prediction.error),
                 _format_factor(
                     np.sqrt(
                         evidence.base.held_out_prediction.excess / row.held_out_prediction.excess
@@ -88,7 +88,7 @@ def _describe_stalls(findings: Findings) -> list[str]:
 def _label(findings: Findings, row: SetEvidence) -> str:
     """A set's names."""
     if row is findings.evidence.term:
-        return term(row.names[0]).words
+        return find_term(row.names[0]).words
     return join_words(row.names) or "the base model"
 
 
@@ -131,4 +131,4 @@ def _tell_sizes(findings: Findings, row: SetEvidence) -> list[ParameterEstimate]
     """How large its effects are, with standard errors where they were reckoned."""
     if row is findings.evidence.term:
         return []
-    return effect_sizes(findings.context, row.fit, row.names, row.tests)
+    return estimate_effect_sizes(findings.context, row.fit, row.names, row.tests)

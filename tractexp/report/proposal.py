@@ -14,7 +14,7 @@ from tractexp.discrepancy.proposal.generate import PLUGIN
 from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, to_dict
-from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
+from tractexp.discrepancy.proposal.wording import describe_chance, describe_proposal
 from tractexp.inference.model_error import tell_error
 from tractexp.report.extended import interval
 from tractexp.text.wording import (
@@ -32,7 +32,7 @@ EVENTS = 4  # whose charts are shown at once
 def headlines(findings: Findings) -> list[str]:
     """The sentences on a proposal in the box at the top."""
     return [
-        finish_sentence(s) for s in proposed_in_words(to_dict(findings.proposed, PLUGIN), None)[:2]
+        finish_sentence(s) for s in describe_proposal(to_dict(findings.proposed, PLUGIN), None)[:2]
     ]
 
 
@@ -122,7 +122,7 @@ def _add_explanation(page: Report, proposal: Proposal) -> None:
         rows,
         "Errors are of the response, both models as least squares fit them; explained is the"
         " term's part of what it gains and what pushes into the balances or the other terms tried"
-        f" would gain beside it, beyond chance; {chance(proposal.judged.p)}.",
+        f" would gain beside it, beyond chance; {describe_chance(proposal.judged.p)}.",
     )
 
 

@@ -13,9 +13,9 @@ from tractexp.identification.verdict import (
     IDENTIFIED,
     UNIDENTIFIED,
     WEAK,
-    brief,
+    shorten_verdict,
 )
-from tractexp.inference.model_error import in_percent, tell_error
+from tractexp.inference.model_error import format_percent, tell_error
 from tractexp.record.identity import UNKNOWN, Identity, label
 from tractexp.text.wording import (
     count_noun,
@@ -109,7 +109,7 @@ def tabulate_parameters(fit: "Identification") -> Table:
 
 def name_verdict(verdict: str) -> str:
     """A verdict on a parameter in a word or two."""
-    return SHORT.get(brief(verdict), brief(verdict))
+    return SHORT.get(shorten_verdict(verdict), shorten_verdict(verdict))
 
 
 def describe_error(result: Result) -> str:
@@ -127,4 +127,4 @@ def _tell_error(entry: Mapping[str, Any]) -> str:
     interval = entry.get("interval")
     if entry.get("stalls") or not isinstance(interval, list | tuple) or None in interval:
         return tell_error(entry)
-    return f"{tell_error(entry)} ({' to '.join(map(in_percent, interval))})"
+    return f"{tell_error(entry)} ({' to '.join(map(format_percent, interval))})"

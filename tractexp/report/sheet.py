@@ -12,7 +12,7 @@ from tractexp.configuration.run_command import build_folder_command, get_command
 from tractexp.errors import UserError
 from tractexp.exchange.format import choose_format
 from tractexp.exchange.rating import SOURCE, rate_machine
-from tractexp.identification.verdict import brief
+from tractexp.identification.verdict import shorten_verdict
 from tractexp.record.identity import describe_identities, title
 from tractexp.report.fit_sentences import describe_rivals
 from tractexp.report.fit_summary import name_verdicts
@@ -90,7 +90,7 @@ def _tabulate(fit: "Identification") -> Table:
             format_with_error(e.value, e.standard_error or 0.0),
             e.unit,
             "{:.4g} to {:.4g}".format(*e.interval) if e.interval else "",
-            brief(e.verdict),
+            shorten_verdict(e.verdict),
         ]
         for e in fit.own_parameters
     ]

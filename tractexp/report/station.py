@@ -13,7 +13,7 @@ from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
 from tractexp.identification.composition import DAYS_A_YEAR, HOUR
 from tractexp.inference.interval import INTERVAL_LEVEL
-from tractexp.inference.model_error import in_percent, tell_error
+from tractexp.inference.model_error import format_percent, tell_error
 from tractexp.text.wording import count_noun, list_first, shorten
 
 MOST_SCREEN_ROWS, MOST_SCREEN_LOADS = 8, 4  # loads of the first screen, and those it describes
@@ -92,7 +92,7 @@ def _tell_share(load: Mapping[str, Any]) -> str:
 
 
 def _format_percent(value: float | None) -> str:
-    return "" if value is None else in_percent(value)
+    return "" if value is None else format_percent(value)
 
 
 def screen(content: Mapping[str, Any]) -> Report:
@@ -350,7 +350,7 @@ def _draw_dip(curve: Mapping[str, Any]) -> Chart:
         ["U [pu]", "P [pu]", "Q [pu]"],
         heights=(0.6, 1.0, 1.0),
         pixels=420,
-        title=f"{curve['event']}: {in_percent(curve['error'])} missed",
+        title=f"{curve['event']}: {format_percent(curve['error'])} missed",
         legend=False,
     )
     t, U = (np.array(curve[key], dtype=float) for key in ("t", "U"))

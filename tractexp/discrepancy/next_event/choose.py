@@ -9,19 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, driven, imagine_dips
-from tractexp.discrepancy.next_event.same import same
+from tractexp.discrepancy.next_event.imagined import (
+    ImaginedDip,
+    drive_imagined,
+    imagine_dips,
+    record_imagined,
+)
+from tractexp.discrepancy.next_event.same import prove_same
 from tractexp.discrepancy.next_event.separation import (
     FEW,
     Separation,
     Side,
     linearize_side,
-    seen,
+    view_events,
 )
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit, refit
-from tractexp.inference.model_error import in_percent
+from tractexp.inference.model_error import format_percent
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
@@ -143,7 +148,9 @@ class NextEvent:
         )
         what = self.best.event.words
         p = self.probability
-        missed = f", where they miss {in_percent(self.error)} of a response" if self.error else ""
+        missed = (
+            f", where they miss {format_percent(self.error)} of a response" if self.error else ""
+        )
         if p >= DECIDED:
             return f"record {what}: it tells {them} with a probability of {p:.0%}{missed}"
         several = f", {self.best.repeated} of them are sure to" if self.best.repeated else ""
@@ -153,7 +160,7 @@ class NextEvent:
         )
 
 
-def next_event(
+def find_next_event(
     context: Context,
     noise: Noise,
     bare: Refit,
@@ -198,7 +205,7 @@ def next_event(
     for group in (list(alike) for _, alike in itertools.groupby(by_rate, key=lambda e: e.rate)):
         for event, views in zip(
             group,
-            zip(*(seen(context, noise, s, group, error) for s in sides), strict=True),
+            zip(*(view_events(context, noise, s, group, error) for s in sides), strict=True),
             strict=True,
         ):
             events.append(event)
@@ -217,13 +224,13 @@ def next_event(
             ignored[a, b] = ignored[b, a] = True
     tried = [EventTrial.from_draws(e, d, ignored) for e, d in zip(events, denied, strict=True)]
     best = _choose_mildest_event(context, noise, sides, tried, ignored, seed, error)
-    pairs = [(a, b, same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
+    pairs = [(a, b, prove_same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
     hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, pairs, strict=True) if s is None)
     return NextEvent(tuple(labels), best, tuple(tried), context.criteria, proved, hopeless, error)
 
 
-def mildest(tried: Sequence[EventTrial], decided: float) -> EventTrial:
+def pick_mildest(tried: Sequence[EventTrial], decided: float) -> EventTrial:
     """Of the events that are sure enough the one that asks for least, or else of the surest."""
     enough = [t for t in tried if t.least >= min(decided, max(t.least for t in tried) - NEARLY)]
     return min(enough, key=lambda t: t.event.burden)
@@ -242,7 +249,7 @@ def _choose_mildest_event(
     left = list(tried)
     checked = []
     while left and len(checked) < CHECKED:
-        best = mildest(left, DECIDED)
+        best = pick_mildest(left, DECIDED)
         chance = best.least
         if checked and chance < min(LEAST_CHANCE, max(t.least for t in checked)):
             break
@@ -276,12 +283,12 @@ def _compute_refitted_chances(
     plain = context.domain.recordable and context.records.window is None and not event.burden[0]
     places = []
     for a in range(1, len(sides)):
-        moved = _fitted_to(context, noise, sides, sides[a], event) if plain else []
+        moved = _fit_sides(context, noise, sides, sides[a], event) if plain else []
         there = [
             side if k == a or not moved else linearize_side(context, noise, moved[k])
             for k, side in enumerate(sides)
         ]
-        views = [seen(context, noise, side, [event], error)[0] for side in there]
+        views = [view_events(context, noise, side, [event], error)[0] for side in there]
         places.append((Separation(there, context.criteria, seed=seed), views))
 
     def repeat_event(times: int) -> EventTrial:
@@ -297,16 +304,18 @@ def _compute_refitted_chances(
     return replace(once, repeated=next(enough, None))
 
 
-def _fitted_to(
+def _fit_sides(
     context: Context, noise: Noise, sides: Sequence[Side], truth: Side, event: ImaginedDip
 ) -> list[Refit]:
     """Every side fitted to the records and one event more, in which `truth` holds exactly."""
     at = context.coordinates
     middle = at.without_faults(truth.fit.unit, ())
     power = context.kernels.simulate(
-        truth.fit.names, middle[None], Drive.from_events([driven(context, event)])
+        truth.fit.names, middle[None], Drive.from_events([drive_imagined(context, event)])
     )[0]
-    whole = context.move_to_events((*context.records.recorded, as_recorded(context, event, power)))
+    whole = context.move_to_events(
+        (*context.records.recorded, record_imagined(context, event, power))
+    )
     wide = [whole.coordinates.widen_coordinates(side.fit.unit) for side in sides]
     input_modes = (
         None if noise.input_modes is None else QuietNoise.from_context(whole, wide[0]).input_modes

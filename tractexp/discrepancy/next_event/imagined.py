@@ -125,22 +125,22 @@ def imagine_dips(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDi
     return dips
 
 
-def driven(context: Context, event: ImaginedDip) -> Excitation | WaveformDrive:
+def drive_imagined(context: Context, event: ImaginedDip) -> Excitation | WaveformDrive:
     """The voltage of an imagined event, at the power before the first recorded one."""
     like = context.events[0]
     dips = context.domain.dips
     step = like.record.step / event.rate
     t = np.arange(round((dips.lead + dips.length) / step)) * step
-    course = _course(t - dips.lead, event.duration, dips.edge)
+    course = _compute_course(t - dips.lead, event.duration, dips.edge)
     return context.domain.dip(like, step, course, event.depth, event.jump, event.unbalance)
 
 
-def _course(since: np.ndarray, duration: float, edge: float) -> np.ndarray:
+def _compute_course(since: np.ndarray, duration: float, edge: float) -> np.ndarray:
     """How much of a dip is there (N,), 0 to 1, at times [s] since it began."""
     return np.clip(since / edge, 0, 1) - np.clip((since - duration) / edge, 0, 1)
 
 
-def noise_of(noise: Noise, drive: Drive, rate: int, step: float) -> Noise:
+def transfer_noise(noise: Noise, drive: Drive, rate: int, step: float) -> Noise:
     """The records' noise on an imagined event; at another rate as loud, and forgotten in the same
     time.
     """
@@ -152,9 +152,9 @@ def noise_of(noise: Noise, drive: Drive, rate: int, step: float) -> Noise:
     return Noise((tuple(forgetting_noise(level, a) for level in noise.levels),))
 
 
-def as_recorded(context: Context, event: ImaginedDip, power: np.ndarray) -> Event:
+def record_imagined(context: Context, event: ImaginedDip, power: np.ndarray) -> Event:
     """An imagined dip as if it had been recorded without noise, with this power (2, N) [pu]."""
-    like, dips, drive = context.events[0], context.domain.dips, driven(context, event)
+    like, dips, drive = context.events[0], context.domain.dips, drive_imagined(context, event)
     assert isinstance(drive, Excitation)
     t = np.arange(len(drive.U)) * drive.step
     start, end = (

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from tractexp.discrepancy.gap import curves
-from tractexp.discrepancy.next_event.choose import NextEvent, next_event
+from tractexp.discrepancy.gap import compute_curves
+from tractexp.discrepancy.next_event.choose import NextEvent, find_next_event
 from tractexp.domain import domain_of
 from tractexp.errors import TASK, UserError
-from tractexp.inference.base_fit import base_fit
-from tractexp.inference.catalogue import Catalogue, catalogue
+from tractexp.inference.base_fit import fit_base_model
+from tractexp.inference.catalogue import Catalogue, build_catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.effort import Effort
@@ -22,7 +22,7 @@ from tractexp.record import Event
 from tractexp.text.wording import join_words
 
 
-def event_for(
+def choose_event_for(
     model: Model,
     events: Sequence[Event],
     rivals: Sequence[Sequence[str]],
@@ -65,16 +65,16 @@ def event_for(
     events = domain_of(model).events(events)
     check_events(events, ())
     named = sorted({name for names in sets for name in names})
-    missing = catalogue(model, events, named)
+    missing = build_catalogue(model, events, named)
     _check(missing, named)
     with Effort(tell).tell_when_silent() as effort:
         context = Context.from_records(
             model, missing, Records.from_events(events), bounds, fixed, Criteria(), effort, substeps
         )
-        base = base_fit(context)
+        base = fit_base_model(context)
         effort.say(f"fitting {len(sets)} explanations")
         noise = base.noise
-        begin = [start for names in sets for start in _starts(context, base.fit.unit, names)]
+        begin = [start for names in sets for start in _list_starts(context, base.fit.unit, names)]
         for _ in range(2):  # the second time under the noise that the best of them leaves
             fits = refit(context, noise, begin)
             noise = base.quiet.of_fit(fits[0].unit, fits[0].names)
@@ -83,8 +83,8 @@ def event_for(
             refit(context, noise, [((), base.fit.unit), *begin]), key=lambda fit: bool(fit.names)
         )
         labels = [join_words(list(fit.names)) for fit in fits]
-        error = min(curves(context, f.unit, noise, f.names).error.certain for f in fits)
-        return next_event(context, noise, bare, fits, labels, error=error)
+        error = min(compute_curves(context, f.unit, noise, f.names).error.certain for f in fits)
+        return find_next_event(context, noise, bare, fits, labels, error=error)
 
 
 def _check(missing: Catalogue, named: Sequence[str]) -> None:
@@ -105,7 +105,7 @@ def _check(missing: Catalogue, named: Sequence[str]) -> None:
             )
 
 
-def _starts(context: Context, unit: np.ndarray, names: Names) -> list[Start]:
+def _list_starts(context: Context, unit: np.ndarray, names: Names) -> list[Start]:
     """The base fit with every setting of each effect and its sizes at what matters least, either
     way.
     """

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, drive_imagined
 from tractexp.inference.context import Context
-from tractexp.inference.differences import slopes, two_sided
+from tractexp.inference.differences import divide_differences, step_both_ways
 from tractexp.inference.fitting import Refit
 from tractexp.inference.least_squares import descend
 from tractexp.model.drive import Drive
@@ -29,7 +29,7 @@ RICH = (0.1, 0.3, 0.5, 0.7)  # depths
 TURNED = (0.0, 20.0, -30.0)  # degrees
 
 
-def same(context: Context, one: Refit, other: Refit) -> dict[str, Any] | None:
+def prove_same(context: Context, one: Refit, other: Refit) -> dict[str, Any] | None:
     """The proof that two explanations are the same function of the voltage, None where they are
     not: the `rank` of their joint Jacobian, how far each is `off` the other where it follows it
     [pu], and the `reason` why no dip tells them apart.
@@ -38,7 +38,7 @@ def same(context: Context, one: Refit, other: Refit) -> dict[str, Any] | None:
         ImaginedDip(*shape)
         for shape in itertools.product(RICH, context.domain.dips.durations[::2], TURNED)
     ]
-    drive = Drive.from_events([driven(context, event) for event in events])
+    drive = Drive.from_events([drive_imagined(context, event) for event in events])
     pairs = []
     for truth, rival in ((one, other), (other, one)):
         for size in (1.0, 0.5):
@@ -80,7 +80,7 @@ def _follow_truth(
     truth = answer[valid]
     if not len(truth):
         return None
-    columns = _of_load(context, rival.names)
+    columns = _list_load_columns(context, rival.names)
     start = _scale_effects(context, rival, 1.0)
 
     def simulate_points(points: np.ndarray, whose: Sequence[str]) -> np.ndarray:
@@ -94,8 +94,8 @@ def _follow_truth(
         return units
 
     def compute_slopes(unit: np.ndarray, whose: Sequence[str], inside: Sequence[int]) -> np.ndarray:
-        points, width = two_sided(unit, inside)
-        return slopes(simulate_points(points, whose), width)
+        points, width = step_both_ways(unit, inside)
+        return divide_differences(simulate_points(points, whose), width)
 
     def come_nearest(point: np.ndarray, rows: np.ndarray) -> np.ndarray:
         miss = lambda points, _: (simulate_points(whole(points), rival.names) - truth)[:, rows]  # noqa: E731
@@ -115,7 +115,7 @@ def _follow_truth(
         if off > LARGEST_FOLLOWED_DISTANCE:
             return None
     own = (
-        compute_slopes(point, names, _of_load(context, names)),
+        compute_slopes(point, names, _list_load_columns(context, names)),
         compute_slopes(whole(nearest_point[None])[0], rival.names, columns),
     )
     ranks = [_rank(rows) for rows in (*own, np.concatenate(own))]
@@ -137,7 +137,7 @@ def _find_recovering_samples(answer: np.ndarray, drive: Drive) -> np.ndarray:
     return alive
 
 
-def _of_load(context: Context, names: Sequence[str]) -> list[int]:
+def _list_load_columns(context: Context, names: Sequence[str]) -> list[int]:
     """Columns of the base model's and the effects' parameters."""
     at = context.coordinates
     return [*at.base, *at.parameters(names)]

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven, noise_of
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, drive_imagined, transfer_noise
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
-from tractexp.inference.differences import slopes, two_sided
+from tractexp.inference.differences import divide_differences, step_both_ways
 from tractexp.inference.fitting import Refit
 from tractexp.inference.linearization import find_active_bounds
 from tractexp.inference.model_error import weigh_error
@@ -101,7 +101,7 @@ def linearize_side(context: Context, noise: Noise, fit: Refit) -> Side:
     )
 
 
-def seen(
+def view_events(
     context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDip], error: float = 0.0
 ) -> list[EventView]:
     """What an explanation predicts of events that are sampled alike, with the faults of the
@@ -111,10 +111,10 @@ def seen(
     """
     at = context.coordinates
     names = side.fit.names
-    drives = [driven(context, event) for event in events]
+    drives = [drive_imagined(context, event) for event in events]
     inside = list(side.columns[: len(side.columns) - len(at.before)])
     middle = at.without_faults(side.fit.unit, ())
-    points, width = two_sided(middle, inside)
+    points, width = step_both_ways(middle, inside)
     # (E, n, C, N)
     moved = _simulate_drives(context, names, np.concatenate([middle[None], points]), drives)
     before = [
@@ -135,18 +135,20 @@ def seen(
     missed = [0.0] * len(events)
     if error:
         still = replace(events[0], depth=0.0, jump=0.0, unbalance=0.0)
-        (rest,) = _simulate_drives(context, names, middle[None], [driven(context, still)])[0]
+        (rest,) = _simulate_drives(context, names, middle[None], [drive_imagined(context, still)])[
+            0
+        ]
         variance = float(np.mean(np.square(noise.levels)))
         step = drives[0].step
         responses = [float(np.mean((rows[0] - rest) ** 2)) for rows in moved]
         missed = [weigh_error(error, response, variance, step) for response in responses]
-    white = noise_of(noise, one, events[0].rate, context.events[0].record.step)
+    white = transfer_noise(noise, one, events[0].rate, context.events[0].record.step)
     chances = []
     for e in range(len(events)):
         rows = np.concatenate([moved[e], *(b[e] for b in before)])
         rows = white.whiten(np.where(one.weights > 0, rows, 0.0), one, one.weights > 0)
         K = np.zeros((len(side.columns) + 2, rows.shape[1]))
-        K[:k] = slopes(rows[1 : 1 + 2 * k], width) * side.free[:k, None]
+        K[:k] = divide_differences(rows[1 : 1 + 2 * k], width) * side.free[:k, None]
         K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * POWER_DIFFERENCE)
         chances.append(EventView(rows[0], K, missed[e]))
     return chances

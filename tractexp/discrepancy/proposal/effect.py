@@ -13,9 +13,9 @@ from tractexp.discrepancy.proposal.library import (
     SOURCE,
     TIMED,
     Signal,
+    name_shape,
+    name_size,
     pick_of,
-    shape_of,
-    size_of,
 )
 from tractexp.errors import Unfit
 from tractexp.model.parts import Effect
@@ -43,7 +43,9 @@ class Library(Effect):
         """A size for each balance, and a switch for each signal and clock."""
         for balance in self.balances:
             for size in balance.sizes:
-                yield size.parameter(size_of(self.name, balance, size), f"size in {balance.words}")
+                yield size.parameter(
+                    name_size(self.name, balance, size), f"size in {balance.words}"
+                )
         for chosen in (*self.signals, *self.clocks):
             name = pick_of(self.name, chosen.name)
             yield Parameter(
@@ -51,22 +53,22 @@ class Library(Effect):
             )
         for signal in self.signals:
             for shape in signal.shapes:
-                yield shape.parameter(shape_of(signal, shape))
+                yield shape.parameter(name_shape(signal, shape))
 
     def edit(self, eq: Any, **parameters: Any) -> None:
         """Add to each balance its size times the signals that are switched on."""
         clock = {"clock": self._clock(eq, parameters)} if self.clocks else {}
         total = 0
         for signal in self.signals:
-            own = {s.name: parameters[shape_of(signal, s)] for s in signal.shapes}
-            if present(eq, signal):
+            own = {s.name: parameters[name_shape(signal, s)] for s in signal.shapes}
+            if is_present(eq, signal):
                 total += parameters[pick_of(self.name, signal.name)] * signal.build(
                     eq, **clock, **own
                 )
         g = eq.define(f"{self.name}_signal", total, "g")
         for balance in self.balances:
             if all(site in eq for site in balance.places_in(eq)):
-                own = {s.name: parameters[size_of(self.name, balance, s)] for s in balance.sizes}
+                own = {s.name: parameters[name_size(self.name, balance, s)] for s in balance.sizes}
                 balance.build(eq, g, **own)
 
     def _clock(self, eq: Any, parameters: dict[str, Any]) -> Any:
@@ -75,7 +77,7 @@ class Library(Effect):
         return eq.define(f"{self.name}_clock", sum(times), "t")
 
 
-def present(eq: Any, signal: Signal) -> bool:
+def is_present(eq: Any, signal: Signal) -> bool:
     """Whether the equations have what a signal follows."""
     if signal.needs == "omega":
         try:

@@ -50,13 +50,13 @@ TIME = (
 )
 
 
-def parameters_of(term: Term) -> dict[str, str]:
+def list_term_parameters(term: Term) -> dict[str, str]:
     """The parameters of a term by the names they have in its plugin, to their own names."""
     own = [*(s.name for s in term.balance.sizes), *(s.name for s in term.signal.shapes)]
     return {PREFIX + name: name for name in own}
 
 
-def source(term: Term, values: Mapping[str, float], records: str) -> str:
+def write_source(term: Term, values: Mapping[str, float], records: str) -> str:
     """The text of a plugin file for a term with these sizes and this setting."""
     functions = [
         _copy_source(term.signal.build, "signal"),
@@ -94,8 +94,8 @@ def source(term: Term, values: Mapping[str, float], records: str) -> str:
             records=quoting.python(records),
             parameters="\n".join(_declare_parameters(term, values)),
             relevant=f"{{{relevant}}}",
-            arguments=", ".join(parameters_of(term)),
-            body="\n".join(_body(term)),
+            arguments=", ".join(list_term_parameters(term)),
+            body="\n".join(_write_body(term)),
         )
     )
 
@@ -119,7 +119,7 @@ def _declare_parameters(term: Term, values: Mapping[str, float]) -> list[str]:
     return lines
 
 
-def _body(term: Term) -> list[str]:
+def _write_body(term: Term) -> list[str]:
     """The lines of the effect that edit the equations."""
     shaped = [f"{s.name}={PREFIX}{s.name}" for s in term.signal.shapes]
     clock = ["clock=clock(eq)"] if term.clock else []

@@ -14,16 +14,16 @@ from tractexp.discrepancy.gap import (
     SHOWN,
     Curves,
     GapTest,
+    compute_curves,
+    compute_gap,
     compute_pushed_changes,
-    curves,
-    gap,
     share_gone,
 )
 from tractexp.discrepancy.grades import fit_as_graded
 from tractexp.discrepancy.held_out import carry_fits
-from tractexp.discrepancy.least_squares import residual_noise
-from tractexp.discrepancy.proposal.bed import carried_over
+from tractexp.discrepancy.least_squares import estimate_residual_noise
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, TermFits
+from tractexp.discrepancy.proposal.term_context import carry_over
 from tractexp.identification.grade import GradedModel
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
@@ -65,7 +65,7 @@ class TermAssessment:
         return [why for why, true in rows.items() if true]
 
 
-def term_assessments(
+def assess_terms(
     original: Context, result: TermFits, events: Sequence[Event], p: Sequence[float]
 ) -> list[TermAssessment]:
     """The best fits judged on held-out events, in their order; `p` of each by chance.
@@ -114,10 +114,10 @@ def _assess_models(
 
     def assess_fit(fit: Refit, unit: np.ndarray) -> GapTest:
         perturbations = compute_pushed_changes(
-            original, carried_over(original, context, unit), (), noise
+            original, carry_over(original, context, unit), (), noise
         )
         changes = np.nan_to_num(np.concatenate([terms, perturbations]))
-        return gap(context, bare, unit, fit.names, noise, fitted, changes=changes)
+        return compute_gap(context, bare, unit, fit.names, noise, fitted, changes=changes)
 
     return [assess_fit(fit, unit) for fit, unit in zip(fits, units, strict=True)]
 
@@ -135,7 +135,7 @@ def measure_changes(
     at = context.coordinates
     found = at.without_faults(fit.unit, ())
     base = fit_as_graded(context, result.noise, graded)
-    noise = residual_noise(context, base)
+    noise = estimate_residual_noise(context, base)
     nested = found.copy()  # from the base model's, so that the term leaves no more
     nested[at.base] = base.unit[at.base]
     nested[at.sizes(fit.names)] = at.null[at.sizes(fit.names)]
@@ -144,7 +144,7 @@ def measure_changes(
     fitted, held_out = (
         Change(
             *(
-                curves(seen, seen.coordinates.at_measured_power(one.unit), noise, one.names)
+                compute_curves(seen, seen.coordinates.at_measured_power(one.unit), noise, one.names)
                 for one in (base, best)
             )
         )

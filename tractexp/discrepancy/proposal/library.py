@@ -170,7 +170,7 @@ class Term:
         return self.balance.latex.replace("{g}", self.signal.latex)
 
 
-def size_of(kind: str, balance: Balance, size: Size) -> str:
+def name_size(kind: str, balance: Balance, size: Size) -> str:
     """What the library's effect of a kind calls a size: of several, each is that of a balance of
     its own.
     """
@@ -178,7 +178,7 @@ def size_of(kind: str, balance: Balance, size: Size) -> str:
     return f"{kind}_{balance.name}{part}_size"
 
 
-def shape_of(signal: Signal, shape: Shape) -> str:
+def name_shape(signal: Signal, shape: Shape) -> str:
     """What it calls a parameter of a signal."""
     return f"{signal.kind}_{signal.name}_{shape.name}"
 
@@ -188,27 +188,27 @@ def pick_of(kind: str, name: str) -> str:
     return f"{kind}_pick_{name}"
 
 
-def _level(low: float, high: float, grid: Grid, latex: str) -> Shape:
+def _declare_level(low: float, high: float, grid: Grid, latex: str) -> Shape:
     """A level of a signal, over its value before the event."""
     return Shape("level", grid, (low, high), "1", "level, over the value before the event", latex)
 
 
-def _time(grid: Grid) -> Shape:
+def _declare_time(grid: Grid) -> Shape:
     """A time constant [s]."""
     return Shape("time", grid, (0.002, 3.0), "s", "time constant", "T")
 
 
-def _spread(first: float, last: float, step: float) -> Grid:
+def _space_evenly(first: float, last: float, step: float) -> Grid:
     """Values in even steps."""
     return tuple(round(first + k * step, 6) for k in range(round((last - first) / step) + 1))
 
 
-def _instant(grid: Grid) -> Shape:
+def _declare_instant(grid: Grid) -> Shape:
     """An instant [s] at which a signal begins."""
     return Shape("instant", grid, (0.0, 30.0), "s", "instant at which it begins", "t_1")
 
 
-_FREQUENCY = Shape("frequency", _spread(2.0, 44.0, 1.5), (0.5, 100.0), "Hz", "frequency", "f")
+_FREQUENCY = Shape("frequency", _space_evenly(2.0, 44.0, 1.5), (0.5, 100.0), "Hz", "frequency", "f")
 _PHASE = Shape("phase", (0.0, 1.5707963), (-6.3, 6.3), "rad", "phase", r"\varphi")
 _SQUARE = r"\frac{|E|^2}{|E_0|^2}"
 _LAGS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
@@ -220,20 +220,20 @@ SIGNALS = (
            (Shape("exponent", (-2.0, -1.0, 0.5, 1.0, 2.0, 3.0), (-4.0, 8.0), "1", "exponent",
                   "a"),)),
     Signal("knee", ANSWER, "what the voltage lacks to a level", r"[u_1 - u]_+",
-           (_level(0.2, 0.99, _LEVELS, "u_1"),)),
+           (_declare_level(0.2, 0.99, _LEVELS, "u_1"),)),
     Signal("knee_squared", ANSWER, "what the voltage lacks to a level, squared", r"[u_1 - u]_+^2",
-           (_level(0.2, 0.99, _LEVELS, "u_1"),)),
+           (_declare_level(0.2, 0.99, _LEVELS, "u_1"),)),
     Signal("below", ANSWER, "a switch while the voltage is below a level", r"1_{u < u_1}",
-           (_level(0.2, 0.985, _LEVELS, "u_1"),)),
+           (_declare_level(0.2, 0.985, _LEVELS, "u_1"),)),
     Signal("rate", ANSWER, "the slope of the voltage", r"\dot u"),
     Signal("lag", ANSWER, "the voltage as a lag sees it", r"(x - 1),\quad T\,\dot x = u - x",
-           (_time(_LAGS),)),
+           (_declare_time(_LAGS),)),
     Signal("washout", ANSWER, "the voltage less what a lag sees of it", r"(u - x),\quad T\,\dot x ="
         r" u - x",
-           (_time(_LAGS),)),
+           (_declare_time(_LAGS),)),
     Signal("relay", ANSWER, "a relay that trips below a level and returns", r"g,\quad g \in \{0,"
         r" 1\}", (
-        _level(0.3, 0.97, (0.55, 0.7, 0.8, 0.9), "u_1"),
+        _declare_level(0.3, 0.97, (0.55, 0.7, 0.8, 0.9), "u_1"),
         Shape("margin", (0.03, 0.1), (0.005, 0.4), "1", "recovered is this much above the level",
               "h"),
         Shape("delay", _DELAYS, (0.0, 1.0), "s", "time below the level before it trips", "T_1"),
@@ -244,7 +244,7 @@ SIGNALS = (
     Signal("field", ANSWER, "the square of the flux", rf"({_SQUARE} - 1)", needs="E"),
     Signal("field_knee", ANSWER, "the square of the flux beyond a level",
            rf"([{_SQUARE} - e_1]_+ - [1 - e_1]_+)",
-           (_level(0.1, 0.99, (0.4, 0.5, 0.6, 0.7, 0.8, 0.9), "e_1"),), needs="E"),
+           (_declare_level(0.1, 0.99, (0.4, 0.5, 0.6, 0.7, 0.8, 0.9), "e_1"),), needs="E"),
     Signal("slip", ANSWER, "the slip", r"(s - s_0)", needs="omega"),
     Signal("slip_squared", ANSWER, "the square of the slip", r"(s^2 - s_0^2)", needs="omega"),
     Signal("current", ANSWER, "the motor's current", r"(\frac{|I|}{|I_0|} - 1)",
@@ -253,14 +253,16 @@ SIGNALS = (
         r" - 1)",
            needs="stator_current"),
     Signal("constant", ANSWER, "a constant", ""),
-    Signal("step", TIMED, "a step", r"1_{t \geq t_1}", (_instant(_spread(0.0, 1.8, 0.01)),)),
+    Signal("step", TIMED, "a step", r"1_{t \geq t_1}",
+           (_declare_instant(_space_evenly(0.0, 1.8, 0.01)),)),
     Signal("ramp", TIMED, "a straight line that begins", r"[t - t_1]_+",
-           (_instant(_spread(0.0, 1.8, 0.04)),)),
+           (_declare_instant(_space_evenly(0.0, 1.8, 0.04)),)),
     Signal("decay", TIMED, "a step that decays", r"1_{t \geq t_1}\,e^{-(t - t_1)/T}",
-           (_instant(_spread(0.0, 0.9, 0.03)), _time((0.03, 0.1, 0.3)))),
+           (_declare_instant(_space_evenly(0.0, 0.9, 0.03)), _declare_time((0.03, 0.1, 0.3)))),
     Signal("ring", TIMED, "an oscillation that begins and decays",
            r"1_{t \geq t_1}\,e^{-(t - t_1)/T} \cos(2 \pi f (t - t_1) + \varphi)",
-           (_instant((0.0, 0.15, 0.3, 0.45)), _time((0.06, 0.25)), _FREQUENCY, _PHASE)),
+           (_declare_instant((0.0, 0.15, 0.3, 0.45)), _declare_time((0.06, 0.25)), _FREQUENCY,
+            _PHASE)),
 )  # fmt: skip
 
 CLOCKS = (
@@ -408,12 +410,12 @@ BALANCES = (
 
 
 @functools.cache
-def terms() -> tuple[Term, ...]:
+def list_terms() -> tuple[Term, ...]:
     """Every term of the library."""
-    return tuple(_terms())
+    return tuple(_yield_terms())
 
 
-def _terms() -> Iterator[Term]:
+def _yield_terms() -> Iterator[Term]:
     """Each signal in each balance that may have it, by each clock where it is one of time."""
     for balance, signal in itertools.product(BALANCES, SIGNALS):
         if signal.kind not in balance.kinds or signal.name in balance.without:
@@ -422,6 +424,6 @@ def _terms() -> Iterator[Term]:
             yield Term(balance, signal, clock)
 
 
-def term(name: str) -> Term:
+def find_term(name: str) -> Term:
     """The term of that name."""
-    return next(t for t in terms() if t.name == name)
+    return next(t for t in list_terms() if t.name == name)

@@ -10,18 +10,18 @@ import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.gap import Curves
-from tractexp.discrepancy.next_event.choose import NextEvent, next_event
+from tractexp.discrepancy.next_event.choose import NextEvent, find_next_event
 from tractexp.discrepancy.proposal import generate
-from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
 from tractexp.discrepancy.proposal.judge import (
     TermAssessment,
+    assess_terms,
     list_tied_terms,
     measure_changes,
-    term_assessments,
 )
-from tractexp.discrepancy.proposal.library import Term, terms
-from tractexp.discrepancy.proposal.refit import TermFits, standard_errors, term_fits
-from tractexp.discrepancy.proposal.screen import Ground, compute_library_p, screen
+from tractexp.discrepancy.proposal.library import Term, list_terms
+from tractexp.discrepancy.proposal.refit import TermFits, compute_term_errors, fit_terms
+from tractexp.discrepancy.proposal.screen import ScreeningFit, compute_library_p, screen_terms
+from tractexp.discrepancy.proposal.term_context import build_term_context, carry_over, list_sizes
 from tractexp.identification.grade import GradedModel
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.fitting import Refit
@@ -89,20 +89,20 @@ def propose(
         return ProposalResult(
             why="a term is proposed only where a held-out event confirms it, and none was held out"
         )
-    under = context_of_terms(context)
-    ground = Ground.from_coordinates(under, carried_over(under, context, bare.unit), noise)
+    under = build_term_context(context)
+    ground = ScreeningFit.from_coordinates(under, carry_over(under, context, bare.unit), noise)
     context.effort.say("screening a library of terms")
-    screened = screen(ground, among or terms())
+    screened = screen_terms(ground, among or list_terms())
     context.effort.say("refitting the most promising terms")
-    result = term_fits(
-        ground, screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]]
+    result = fit_terms(
+        ground, screened, [carry_over(under, context, v) for v in base.minima_but(bare.unit)[:1]]
     )
     context.effort.say("judging terms on the held-out events")
     p = [
         compute_library_p(result.term(fit), result.bare.deviance - fit.deviance, len(screened))
         for fit in result.fits
     ]
-    ranked = term_assessments(context, result, validate, p)
+    ranked = assess_terms(context, result, validate, p)
     tried = tuple((result.term(w.fit), w) for w in ranked)
     standing = [w for w in ranked if not w.objections(context.criteria)]
     if not standing:
@@ -112,10 +112,10 @@ def propose(
             f"of the terms tried the best is {result.term(ranked[0].fit).words}, but {objections}",
             tried,
         )
-    return ProposalResult(_proposal(result, first, standing, validate, graded), "", tried)
+    return ProposalResult(_build_proposal(result, first, standing, validate, graded), "", tried)
 
 
-def _proposal(
+def _build_proposal(
     result: TermFits,
     first: Disagreement,
     standing: Sequence[TermAssessment],
@@ -126,7 +126,7 @@ def _proposal(
     chosen, *others = standing
     term = result.term(chosen.fit)
     values = result.values(chosen.fit)
-    errors = standard_errors(result, chosen.fit)
+    errors = compute_term_errors(result, chosen.fit)
     estimates = tuple(
         ParameterEstimate(p, values[p.name], errors[p.name]) for p in term.parameters(values)
     )
@@ -142,17 +142,17 @@ def _proposal(
             (result.term(o.fit), o.train.explained_share, o.validate.explained_share)
             for o in alternatives
         ),
-        alike=tuple(alike(result, chosen.fit, first)),
-        source=generate.source(term, values, records),
-        next_event=_next_event(result, [chosen.fit, *(o.fit for o in alternatives)]),
+        alike=tuple(find_alike(result, chosen.fit, first)),
+        source=generate.write_source(term, values, records),
+        next_event=_choose_next_event(result, [chosen.fit, *(o.fit for o in alternatives)]),
     )
 
 
-def _next_event(result: TermFits, fits: Sequence[Refit]) -> NextEvent | None:
+def _choose_next_event(result: TermFits, fits: Sequence[Refit]) -> NextEvent | None:
     """What to record to tell a term from its near-synonyms."""
     if len(fits) == 1:
         return None
-    return next_event(
+    return find_next_event(
         result.context, result.noise, result.bare, fits, [result.term(fit).words for fit in fits]
     )
 
@@ -160,7 +160,7 @@ def _next_event(result: TermFits, fits: Sequence[Refit]) -> NextEvent | None:
 def change(result: TermFits, fit: Refit) -> np.ndarray:
     """What a term adds to what is calculated (C, N) [pu], all else as it was fitted with it."""
     without = result.context.coordinates.place_values(
-        fit.unit, {label: 0.0 for _, label in sizes_of(result.term(fit))}
+        fit.unit, {label: 0.0 for _, label in list_sizes(result.term(fit))}
     )
     with_it, alone = result.context.residuals(np.array([fit.unit, without]), fit.names)
     return with_it - alone
@@ -190,7 +190,7 @@ def _find_acting_places(result: TermFits, fit: Refit) -> list[dict[str, Any]]:
     return terms
 
 
-def alike(result: TermFits, fit: Refit, first: Disagreement) -> list[tuple[str, float]]:
+def find_alike(result: TermFits, fit: Refit, first: Disagreement) -> list[tuple[str, float]]:
     """Textbook effects that could make most of what a term changes, the base model giving way: best
     first.
     """

@@ -12,22 +12,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
-from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, terms
-from tractexp.discrepancy.proposal.screen import Ground, TermScore, scores
+from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, find_term, list_terms
+from tractexp.discrepancy.proposal.screen import ScreeningFit, TermScore, score_terms
+from tractexp.discrepancy.proposal.term_context import add_terms, place, read_values
 from tractexp.inference.context import Context
-from tractexp.inference.cores import each_apart
+from tractexp.inference.cores import map_on_cores
 from tractexp.inference.fitting import (
     Refit,
     Start,
-    best_of,
-    off_bounds,
+    move_off_bounds,
     refit,
     refit_from,
-    rough_refit,
+    refit_roughly,
+    select_best_fits,
 )
-from tractexp.inference.information import free_standard_errors
-from tractexp.inference.wide_fit import wide_refit
+from tractexp.inference.information import compute_free_standard_errors
+from tractexp.inference.wide_fit import refit_widely
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
@@ -57,14 +57,14 @@ class TermFits:
 
     def term(self, fit: Refit) -> Term:
         """The term that was fitted."""
-        return term(fit.names[0])
+        return find_term(fit.names[0])
 
     def values(self, fit: Refit) -> dict[str, float]:
         """Sizes and setting of a fit's term, by their own names."""
-        return values_of(self.context.coordinates, fit.unit, self.term(fit))
+        return read_values(self.context.coordinates, fit.unit, self.term(fit))
 
 
-def shortlist(screened: Sequence[TermScore]) -> list[TermScore]:
+def shortlist_terms(screened: Sequence[TermScore]) -> list[TermScore]:
     """The most promising terms of a screen, each at its best setting, so that no kind of signal
     crowds out the others.
     """
@@ -84,19 +84,21 @@ def shortlist(screened: Sequence[TermScore]) -> list[TermScore]:
     return sorted([*answers, *rest], key=lambda f: -f.drop)
 
 
-def further(screened: Sequence[TermScore], listed: Sequence[TermScore]) -> list[TermScore]:
+def find_further_settings(
+    screened: Sequence[TermScore], listed: Sequence[TermScore]
+) -> list[TermScore]:
     """Further settings of terms, far from those listed on the grid of some parameter: peaks of
     their own.
     """
     more: dict[str, list[TermScore]] = {f.term.name: [f] for f in listed}
     for scored in screened:
         there = more.get(scored.term.name)
-        if there and len(there) < PEAKS and all(_far(scored, f) for f in there):
+        if there and len(there) < PEAKS and all(_is_far(scored, f) for f in there):
             there.append(scored)
     return [f for there in more.values() for f in there[1:] if f.drop > PROMISING * there[0].drop]
 
 
-def _far(a: TermScore, b: TermScore) -> bool:
+def _is_far(a: TermScore, b: TermScore) -> bool:
     """Whether two settings differ by two places of the grid in some parameter."""
 
     def places(s: Shape) -> int:
@@ -106,22 +108,24 @@ def _far(a: TermScore, b: TermScore) -> bool:
     return any(places(s) >= 2 for s in a.term.signal.shapes if s.name != "phase")
 
 
-def zoom_settings(ground: Ground, scored: Sequence[TermScore]) -> list[TermScore]:
+def zoom_settings(ground: ScreeningFit, scored: Sequence[TermScore]) -> list[TermScore]:
     """The same terms at better settings, each parameter moved by itself on ever finer grids."""
     best = list(scored)
     for turn in range(ZOOM_ROUNDS):
         for k in range(max((len(f.term.signal.shapes) for f in best), default=0)):
             tried = [
-                (i, setting) for i, f in enumerate(best) for setting in _finer(f, k, 4.0**-turn)
+                (i, setting)
+                for i, f in enumerate(best)
+                for setting in _refine_setting(f, k, 4.0**-turn)
             ]
-            again = scores(ground, [(best[i].term, setting) for i, setting in tried])
+            again = score_terms(ground, [(best[i].term, setting) for i, setting in tried])
             for (i, _), other in zip(tried, again, strict=True):
                 if other.drop > best[i].drop:
                     best[i] = other
     return sorted(best, key=lambda f: -f.drop)
 
 
-def _finer(scored: TermScore, which: int, scale: float) -> list[dict[str, float]]:
+def _refine_setting(scored: TermScore, which: int, scale: float) -> list[dict[str, float]]:
     """Settings between a setting and its neighbors on the grid, one parameter moved."""
     shapes = scored.term.signal.shapes
     if which >= len(shapes) or shapes[which].name == "phase":
@@ -135,27 +139,27 @@ def _finer(scored: TermScore, which: int, scale: float) -> list[dict[str, float]
     return [{**scored.setting, shape.name: value} for value in dict.fromkeys(moved) if value != now]
 
 
-def term_fits(
-    ground: Ground, screened: Sequence[TermScore], local_minima: Sequence[np.ndarray]
+def fit_terms(
+    ground: ScreeningFit, screened: Sequence[TermScore], local_minima: Sequence[np.ndarray]
 ) -> TermFits:
     """Refit the shortlist of a screen; `local_minima` (D,) are other fits of the base model, in the
     terms' coordinates.
     """
-    listed = shortlist(screened)
-    chosen = zoom_settings(ground, [*listed, *further(screened, listed[:AGAIN])])
+    listed = shortlist_terms(screened)
+    chosen = zoom_settings(ground, [*listed, *find_further_settings(screened, listed[:AGAIN])])
     likely = [f.term for f in chosen]
-    context = with_terms(ground.context, [*likely, *(s for t in likely for s in siblings(t))])
+    context = add_terms(ground.context, [*likely, *(s for t in likely for s in list_siblings(t))])
     noise = ground.noise
     bare = refit_from(context, noise, (), ground.unit)
-    fits = rough_refit(context, noise, _starts(context, chosen, [ground.unit]))
+    fits = refit_roughly(context, noise, _list_starts(context, chosen, [ground.unit]))
     best = {f.names[0] for f in fits[:AGAIN]}
-    others = [*off_bounds(context, ground.unit, MIDDLE), *local_minima]
-    again = _starts(context, [f for f in chosen if f.term.name in best], others)
-    fits = best_of([*fits, *rough_refit(context, noise, again)])
-    fits = _searched_anew(context, noise, fits, REGRIDDED)
-    moved = [start for f in fits[:MOST_MOVED_TERMS] for start in elsewhere(context, noise, f)]
-    fits = best_of([*fits, *rough_refit(context, noise, moved)])
-    fits = _searched_anew(context, noise, fits, 1, scattered=True)
+    others = [*move_off_bounds(context, ground.unit, MIDDLE), *local_minima]
+    again = _list_starts(context, [f for f in chosen if f.term.name in best], others)
+    fits = select_best_fits([*fits, *refit_roughly(context, noise, again)])
+    fits = _search_anew(context, noise, fits, REGRIDDED)
+    moved = [start for f in fits[:MOST_MOVED_TERMS] for start in start_siblings(context, noise, f)]
+    fits = select_best_fits([*fits, *refit_roughly(context, noise, moved)])
+    fits = _search_anew(context, noise, fits, 1, scattered=True)
     near = fits[0].cost + max(EXACT_FIT_SHARE * (bare.deviance - fits[0].deviance), 20.0)
     exact = {
         f.names: f
@@ -165,7 +169,7 @@ def term_fits(
     return TermFits(context, noise, bare, tuple(ranked))
 
 
-def _searched_anew(
+def _search_anew(
     context: Context, noise: Noise, fits: Sequence[Refit], most: int, *, scattered: bool = False
 ) -> list[Refit]:
     """The fits, with the shapes of the best terms searched over their grids and moved across their
@@ -174,30 +178,32 @@ def _searched_anew(
     again = ROUND_ABOUT if scattered else 0
 
     def anew(fit: Refit) -> list[Refit]:
-        return wide_refit(
+        return refit_widely(
             context,
             noise,
             [choose_grid_start(context, noise, fit), fit.start],
             again=again,
         )
 
-    shaped = [f for f in fits[:most] if term(f.names[0]).signal.shapes]
-    return best_of([*fits, *itertools.chain(*each_apart(anew, shaped, context.effort))])
+    shaped = [f for f in fits[:most] if find_term(f.names[0]).signal.shapes]
+    return select_best_fits([*fits, *itertools.chain(*map_on_cores(anew, shaped, context.effort))])
 
 
-def siblings(of: Term) -> list[Term]:
+def list_siblings(of: Term) -> list[Term]:
     """The terms with the same signal in other balances."""
-    return [t for t in terms() if (t.signal, t.clock) == (of.signal, of.clock) and t != of]
+    return [t for t in list_terms() if (t.signal, t.clock) == (of.signal, of.clock) and t != of]
 
 
-def elsewhere(context: Context, noise: Noise, fit: Refit) -> list[Start]:
+def start_siblings(context: Context, noise: Noise, fit: Refit) -> list[Start]:
     """Starts of a term's siblings at its setting, where the base model is that of its own refit.
 
     At the first fit of the base model they may have ranked far behind, or at another setting.
     """
     chosen, values, there = _fit_without_term(context, noise, fit)
     setting = {s.name: values[s.name] for s in chosen.signal.shapes}
-    return _starts(context, scores(there, [(t, setting) for t in siblings(chosen)]), [there.unit])
+    return _list_starts(
+        context, score_terms(there, [(t, setting) for t in list_siblings(chosen)]), [there.unit]
+    )
 
 
 def choose_grid_start(context: Context, noise: Noise, fit: Refit) -> Start:
@@ -208,28 +214,30 @@ def choose_grid_start(context: Context, noise: Noise, fit: Refit) -> Start:
     seemed the best.
     """
     chosen, _, there = _fit_without_term(context, noise, fit)
-    best = max(scores(there, [(chosen, s) for s in chosen.signal.settings]), key=lambda f: f.drop)
+    best = max(
+        score_terms(there, [(chosen, s) for s in chosen.signal.settings]), key=lambda f: f.drop
+    )
     (best,) = zoom_settings(there, [best])
     return fit.names, place(context.coordinates, fit.unit, chosen, best.setting, best.sizes)
 
 
 def _fit_without_term(
     context: Context, noise: Noise, fit: Refit
-) -> tuple[Term, dict[str, float], Ground]:
+) -> tuple[Term, dict[str, float], ScreeningFit]:
     """The term of a fit, its sizes and setting, and the ground of that fit without it."""
-    chosen = term(fit.names[0])
+    chosen = find_term(fit.names[0])
     at = context.coordinates
-    values = values_of(at, fit.unit, chosen)
+    values = read_values(at, fit.unit, chosen)
     return (
         chosen,
         values,
-        Ground.from_coordinates(
+        ScreeningFit.from_coordinates(
             context, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise
         ),
     )
 
 
-def _starts(
+def _list_starts(
     context: Context, chosen: Sequence[TermScore], units: Sequence[np.ndarray]
 ) -> list[Start]:
     """Each term at its one-step size on each of the base model's fits (D,)."""
@@ -241,7 +249,7 @@ def _starts(
     ]
 
 
-def standard_errors(result: TermFits, fit: Refit) -> dict[str, float]:
+def compute_term_errors(result: TermFits, fit: Refit) -> dict[str, float]:
     """Of a term's parameters, by their own names, all else free beside them; infinite where nothing
     is known.
     """
@@ -250,5 +258,7 @@ def standard_errors(result: TermFits, fit: Refit) -> dict[str, float]:
     at = context.coordinates
     own = at.parameters(fit.names)
     _, rows = context.linearize(fit.unit, result.noise, [*at.nuisances(()), *own], fit.names)
-    spread = free_standard_errors(rows[1:].T)[-len(own) :] * [at.width(at.names[k]) for k in own]
-    return dict(zip(values_of(at, fit.unit, chosen), spread.tolist(), strict=True))
+    spread = compute_free_standard_errors(rows[1:].T)[-len(own) :] * [
+        at.width(at.names[k]) for k in own
+    ]
+    return dict(zip(read_values(at, fit.unit, chosen), spread.tolist(), strict=True))

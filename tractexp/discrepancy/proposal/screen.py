@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from tractexp.discrepancy.proposal.bed import Setting, place, sizes_of
 from tractexp.discrepancy.proposal.library import Term
+from tractexp.discrepancy.proposal.term_context import Setting, list_sizes, place
 from tractexp.inference.context import Context
-from tractexp.inference.cores import each_apart
+from tractexp.inference.cores import map_on_cores
 from tractexp.noise import Noise
 from tractexp.noise.span import project_out
 
@@ -30,7 +30,7 @@ Batch = list[Members]
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class ScreeningFit:
     """A fit with all that may give way projected out. R = C N rows of the records, then those of
     the priors.
     """
@@ -43,7 +43,7 @@ class Ground:
     r: np.ndarray  # (R,) the fit's residual, projected
 
     @classmethod
-    def from_coordinates(cls, context: Context, unit: np.ndarray, noise: Noise) -> "Ground":
+    def from_coordinates(cls, context: Context, unit: np.ndarray, noise: Noise) -> "ScreeningFit":
         """At coordinates (D,). The base model's parameters give way though they rest on their
         bounds.
         """
@@ -76,10 +76,10 @@ class TermScore:
     sizes: tuple[float, ...]
 
 
-def screen(ground: Ground, terms: Sequence[Term]) -> list[TermScore]:
+def screen_terms(ground: ScreeningFit, terms: Sequence[Term]) -> list[TermScore]:
     """Every term at every setting of its grid, the most promising first."""
     every = [(t, s) for t in terms for s in t.signal.settings]
-    return sorted(_scores(ground, every), key=lambda s: -s.drop)
+    return sorted(_score_each(ground, every), key=lambda s: -s.drop)
 
 
 def compute_library_p(term: Term, drop: float, tries: int) -> float:
@@ -91,46 +91,53 @@ def compute_library_p(term: Term, drop: float, tries: int) -> float:
     return min(tries * float(chdtrc(sizes, max(drop, 0.0))), 1.0)
 
 
-def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[TermScore]:
+def score_terms(ground: ScreeningFit, wanted: Sequence[tuple[Term, Setting]]) -> list[TermScore]:
     """Score terms at settings of their own, in this order; a phase is found, not given."""
-    by_key = {(s.term.name, _key(s.setting)): s for s in _scores(ground, wanted)}
-    return [by_key[t.name, _key({k: v for k, v in s.items() if k != "phase"})] for t, s in wanted]
+    by_key = {(s.term.name, _key_setting(s.setting)): s for s in _score_each(ground, wanted)}
+    return [
+        by_key[t.name, _key_setting({k: v for k, v in s.items() if k != "phase"})]
+        for t, s in wanted
+    ]
 
 
-def _key(setting: Setting) -> tuple:
+def _key_setting(setting: Setting) -> tuple:
     """What tells two settings apart: all but the phase."""
     return tuple(sorted((k, v) for k, v in setting.items() if k != "phase"))
 
 
-def _scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> Iterator[TermScore]:
+def _score_each(
+    ground: ScreeningFit, wanted: Sequence[tuple[Term, Setting]]
+) -> Iterator[TermScore]:
     """Each term with its score. Balances of a signal share columns."""
     ground.noise.prepare(ground.context.drive, ground.context.valid)
-    scored = lambda batch: _batch(ground, batch)  # noqa: E731
-    return itertools.chain(*each_apart(scored, _batches(wanted), ground.context.effort))
+    scored = lambda batch: _score_batch(ground, batch)  # noqa: E731
+    return itertools.chain(*map_on_cores(scored, _cut_batches(wanted), ground.context.effort))
 
 
-def _batches(wanted: Sequence[tuple[Term, Setting]]) -> list[Batch]:
+def _cut_batches(wanted: Sequence[tuple[Term, Setting]]) -> list[Batch]:
     """Terms at settings in batches of one kind whose columns are held at once; those of one signal
     together.
     """
     groups: dict[tuple, Members] = {}
     for t, s in wanted:
-        groups.setdefault((t.signal.kind, t.signal.name, t.clock, _key(s)), []).append((t, s))
+        groups.setdefault((t.signal.kind, t.signal.name, t.clock, _key_setting(s)), []).append(
+            (t, s)
+        )
     batches: list[Batch] = []
-    for members in sorted(groups.values(), key=_kind):
+    for members in sorted(groups.values(), key=_find_kind):
         full = batches and sum(map(len, batches[-1])) * 2 >= COLUMNS_AT_ONCE
-        if not batches or full or _kind(batches[-1][0]) != _kind(members):
+        if not batches or full or _find_kind(batches[-1][0]) != _find_kind(members):
             batches.append([])
         batches[-1].append(members)
     return batches
 
 
-def _kind(members: Members) -> str:
+def _find_kind(members: Members) -> str:
     """The kind of signal that all members have."""
     return members[0][0].signal.kind
 
 
-def _batch(ground: Ground, batch: Batch) -> list[TermScore]:
+def _score_batch(ground: ScreeningFit, batch: Batch) -> list[TermScore]:
     """The scores of terms that are simulated together."""
     at = ground.context.coordinates
     index = {}
@@ -140,7 +147,7 @@ def _batch(ground: Ground, batch: Batch) -> list[TermScore]:
     for members in batch:
         for t, s in members:
             rows = []
-            for (size, label), k in zip(sizes_of(t), range(len(t.balance.sizes)), strict=True):
+            for (size, label), k in zip(list_sizes(t), range(len(t.balance.sizes)), strict=True):
                 for phase in (0.0, QUARTER) if "phase" in s else (None,):
                     setting = dict(s) if phase is None else {**s, "phase": phase}
                     key = (label, t.signal.name, t.clock, tuple(sorted(setting.items())))
@@ -162,13 +169,13 @@ def _batch(ground: Ground, batch: Batch) -> list[TermScore]:
     for t, s, rows in blocks:
         # what the nuisances explain taken away
         gram = columns[rows] @ columns[rows].T - along[rows] @ along[rows].T
-        inverse = _inverse(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
+        inverse = _invert(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
         sizes = -inverse @ side[rows]
         scored.append(_build_term_score(t, s, sizes, float(-sizes @ side[rows])))
     return scored
 
 
-def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
+def _invert(gram: np.ndarray, whole: float) -> np.ndarray:
     """The pseudo-inverse (k, k); directions of which the nuisances leave nothing of `whole` are
     none.
     """
@@ -182,15 +189,15 @@ def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
 def _build_term_score(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> TermScore:
     """A score; of two phases the amplitude, and the phase of the larger balance."""
     if "phase" not in setting:
-        return _within(TermScore(t, dict(setting), drop, tuple(sizes.tolist())))
+        return _limit_sizes(TermScore(t, dict(setting), drop, tuple(sizes.tolist())))
     pairs = sizes.reshape(-1, 2)
     turned = pairs[:, 0] + 1j * pairs[:, 1]
     phase = float(np.angle(turned[np.abs(turned).argmax()]))
     amplitudes = (turned * np.exp(-1j * phase)).real
-    return _within(TermScore(t, {**setting, "phase": phase}, drop, tuple(amplitudes.tolist())))
+    return _limit_sizes(TermScore(t, {**setting, "phase": phase}, drop, tuple(amplitudes.tolist())))
 
 
-def _within(score: TermScore) -> TermScore:
+def _limit_sizes(score: TermScore) -> TermScore:
     """A score with sizes that its bounds allow: a column of nearly nothing needs a size beyond all
     of them.
     """

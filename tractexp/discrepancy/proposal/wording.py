@@ -6,7 +6,7 @@ from typing import Any
 from tractexp.text.wording import format_probability, format_with_error, join_words, percent
 
 
-def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> list[str]:
+def describe_proposal(proposal: Mapping[str, Any] | None, why: str | None) -> list[str]:
     """The proposal, or why there is none; nothing where none was asked for."""
     if not proposal:
         return [f"no term is proposed: {why}"] if why else []
@@ -16,7 +16,7 @@ def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> li
         f"proposed: {term['words']}, which explains {percent(explained['train'])} of what exceeds"
         " the noise on the"
         f" fitted events and {percent(explained['validate'])} on the held-out ones;"
-        f" {_numbers(term['parameters'])}",
+        f" {_format_numbers(term['parameters'])}",
     ]
     if not term["function_of_voltage"]:
         sentences.append("it is not a function of the voltage: something happened by itself")
@@ -31,7 +31,7 @@ def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> li
     return sentences
 
 
-def chance(p: float) -> str:
+def describe_chance(p: float) -> str:
     """How often noise gives as much, as a clause."""
     return (
         "noise gives the best of the whole library as much with a probability of"
@@ -39,7 +39,7 @@ def chance(p: float) -> str:
     )
 
 
-def _numbers(parameters: Mapping[str, Mapping[str, Any]]) -> str:
+def _format_numbers(parameters: Mapping[str, Mapping[str, Any]]) -> str:
     """ "size = 0.12 ± 0.01, time = 0.03 ± 0.002"."""
     each: Sequence[str] = [
         f"{n} = "

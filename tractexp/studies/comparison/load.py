@@ -11,7 +11,7 @@ import numpy as np
 
 from tractexp.configuration.composition import list_leaves
 from tractexp.errors import TASK, UserError
-from tractexp.identification.result import by_event, parse_history
+from tractexp.identification.result import name_by_event, parse_history
 from tractexp.storage import files, yaml_files
 from tractexp.studies.comparison.runs import SearchRun
 from tractexp.tracking.sweepfile import folder_of
@@ -144,7 +144,7 @@ def code_of(result: Mapping[str, Any]) -> str:
 
 def parameters_of(ended: Mapping[str, Any]) -> dict[str, float]:
     """{name: value}, where it differs by event {"T_m[1]": value, ...} as well."""
-    return by_event(ended.get("parameters", {}), ended.get("per_event", {}))
+    return name_by_event(ended.get("parameters", {}), ended.get("per_event", {}))
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.configuration.plugin import build
 from tractexp.identification.estimate import estimate
 from tractexp.identification.fit import Fit, respond
-from tractexp.identification.result import parts
+from tractexp.identification.result import build_parts
 from tractexp.identification.search import search
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED
@@ -90,7 +90,7 @@ def fit(
     seed: int,
 ) -> Order:
     """Fit a model configuration with its motor replaced, by least squares from many starts."""
-    model = compose(*parts({**node, "motor": {"name": motor}}))
+    model = compose(*build_parts({**node, "motor": {"name": motor}}))
     bounds, fixed = (
         {n: v for n, v in node[key].items() if n in model.names} for key in ("bounds", "fixed")
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from tractexp.errors import DATA, TASK, UserError
 from tractexp.identification.fit import Fit, respond
-from tractexp.identification.generalization import by_depth, mean_residual
+from tractexp.identification.generalization import compare_depths, compute_mean_residual
 from tractexp.identification.search import Limits, SearchResult
 from tractexp.inference.problem import Problem
 from tractexp.record import Event
@@ -319,7 +319,7 @@ class Study:
 
     def select_held_out(self, kind: str) -> list[int]:
         """Which of `fitted` are the held-out events of an "interpolation" or "extrapolation"."""
-        kinds = by_depth(self.held_out, self.train)
+        kinds = compare_depths(self.held_out, self.train)
         chosen = [len(self.train) + k for k, each in enumerate(kinds) if each == kind]
         if not chosen:
             which = "no deeper" if kind == "interpolation" else "deeper"
@@ -339,7 +339,7 @@ class Study:
             each = [
                 (getattr(fits[e].event.record, channel), getattr(fits[e], channel)) for e in events
             ]
-            return float(np.mean([mean_residual(*powers) for powers in each]))
+            return float(np.mean([compute_mean_residual(*powers) for powers in each]))
 
         names = (*COMPARED, *TEN.values())
         return {

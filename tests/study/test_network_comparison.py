@@ -1,5 +1,5 @@
 """Each fit says how much more it leaves than the best linear network of few poles does; what
-`yardstick` and `poles_in_words` tell of it.
+`compare_with_network` and `describe_poles` tell of it.
 """
 
 import json
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.identification.yardstick import poles_in_words, yardstick
+from tractexp.identification.network_comparison import compare_with_network, describe_poles
 
 CRITERION = "the Bayesian information criterion"
 FAST = {
@@ -118,7 +118,7 @@ def test_a_record_that_is_too_short_is_a_sentence_beside_the_fit(fit):
         replace(f, event=replace(f.event, start=f.event.record.samples - 3))
         for f in fit.details.fits[:1]
     ]
-    beside = yardstick(fits, fit.result.model_error)
+    beside = compare_with_network(fits, fit.result.model_error)
     assert beside.keys() == {"sentence"}
     assert beside["sentence"].startswith(
         "no linear network stands beside it: dip 0.3: 3 samples from the dip on are"
@@ -150,8 +150,8 @@ def test_of_waves_the_sentence_tells_of_the_currents_too(shared_data):
 
 def test_poles_are_told_as_decay_and_frequency():
     poles = [{"decay": 17.65, "frequency": 47.53}, {"decay": 44.6, "frequency": 3.66}]
-    assert poles_in_words(poles) == "17.6/s at 47.5 Hz, 44.6/s at 3.66 Hz"
-    assert poles_in_words([]) == "none"
+    assert describe_poles(poles) == "17.6/s at 47.5 Hz, 44.6/s at 3.66 Hz"
+    assert describe_poles([]) == "none"
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,9 @@ from tractexp.discrepancy.proposal.library import (
     TIMED,
     Size,
     Term,
+    name_shape,
+    name_size,
     pick_of,
-    shape_of,
-    size_of,
 )
 from tractexp.inference.catalogue import Candidate, Catalogue
 from tractexp.inference.context import Context
@@ -39,32 +39,32 @@ class Terms(Family):
 
     def with_effects(self, names: Iterable[str]) -> Model:
         """The model with the libraries that hold these terms."""
-        return super().with_effects({kind_of(n) for n in names})
+        return super().with_effects({find_kind(n) for n in names})
 
     def key(self, names: Iterable[str], beside: str = "") -> Key:
         """The key of that model: terms of one kind share it."""
         load = {*names, beside} - {"", *self.catalogue.of_measurement}
-        return frozenset(map(kind_of, load)), frozenset()
+        return frozenset(map(find_kind, load)), frozenset()
 
 
-def kind_of(name: str) -> str:
+def find_kind(name: str) -> str:
     """The library's effect that a term belongs to; of any other effect its own name."""
     return name.partition(":")[0]
 
 
-def sizes_of(chosen: Term) -> list[tuple[Size, str]]:
+def list_sizes(chosen: Term) -> list[tuple[Size, str]]:
     """The sizes of a term, and what the library calls each."""
     return [
-        (size, size_of(chosen.signal.kind, chosen.balance, size)) for size in chosen.balance.sizes
+        (size, name_size(chosen.signal.kind, chosen.balance, size)) for size in chosen.balance.sizes
     ]
 
 
-def shapes_of(chosen: Term) -> dict[str, str]:
+def list_shapes(chosen: Term) -> dict[str, str]:
     """The parameters of a term's signal by their own names, and what the library calls each."""
-    return {s.name: shape_of(chosen.signal, s) for s in chosen.signal.shapes}
+    return {s.name: name_shape(chosen.signal, s) for s in chosen.signal.shapes}
 
 
-def context_of_terms(original: Context) -> Context:
+def build_term_context(original: Context) -> Context:
     """The same events, base model and faults of the measurement with the library."""
     faults = tuple(c for c in original.catalogue.candidates if c.measurement)
     whole = tuple(
@@ -74,24 +74,24 @@ def context_of_terms(original: Context) -> Context:
     return original.rebuild(catalogue, original.records, original.effort, Terms)
 
 
-def with_terms(context: Context, chosen: Sequence[Term]) -> Context:
+def add_terms(context: Context, chosen: Sequence[Term]) -> Context:
     """A context of the library on which these terms are candidates, each with its own parameters
     free.
     """
     there = {c.name for c in context.catalogue.candidates}
-    more = tuple(_candidate(context, t) for t in dict.fromkeys(chosen) if t.name not in there)
+    more = tuple(_build_candidate(context, t) for t in dict.fromkeys(chosen) if t.name not in there)
     catalogue = replace(context.catalogue, candidates=(*context.catalogue.candidates, *more))
     return replace(
         context, catalogue=catalogue, coordinates=replace(context.coordinates, catalogue=catalogue)
     )
 
 
-def _candidate(context: Context, chosen: Term) -> Candidate:
+def _build_candidate(context: Context, chosen: Term) -> Candidate:
     """A term as a candidate: its sizes are those of its balance, its shapes those of its signal."""
     declared = {p.name: p for p in context.problem.parameters}
-    sizes = tuple(declared[label] for _, label in sizes_of(chosen))
-    shapes = tuple(declared[label] for label in shapes_of(chosen).values())
-    relevant = {label: size.relevant for size, label in sizes_of(chosen)}
+    sizes = tuple(declared[label] for _, label in list_sizes(chosen))
+    shapes = tuple(declared[label] for label in list_shapes(chosen).values())
+    relevant = {label: size.relevant for size, label in list_sizes(chosen)}
     return Candidate(chosen.name, _Part(chosen.name, (*sizes, *shapes), relevant), sizes, ({},))
 
 
@@ -114,20 +114,20 @@ def place(
     for picked in (chosen.signal, chosen.clock) if chosen.clock else (chosen.signal,):
         label = pick_of(chosen.signal.kind, picked.name)
         moved[at.column[label]] = at.to_unit(label, 1.0)
-    for name, label in shapes_of(chosen).items():
+    for name, label in list_shapes(chosen).items():
         moved[at.column[label]] = np.clip(at.to_unit(label, setting[name]), 0.0, 1.0)
-    for (_, label), size in zip(sizes_of(chosen), sizes, strict=True):
+    for (_, label), size in zip(list_sizes(chosen), sizes, strict=True):
         moved[at.column[label]] = np.clip(at.to_unit(label, size), 0.0, 1.0)
     return moved
 
 
-def values_of(at: FreeSet, unit: np.ndarray, chosen: Term) -> dict[str, float]:
+def read_values(at: FreeSet, unit: np.ndarray, chosen: Term) -> dict[str, float]:
     """Sizes and setting of a term at coordinates (D,), by their own names."""
-    sizes = {size.name: at.value(label, unit) for size, label in sizes_of(chosen)}
-    return sizes | {name: at.value(label, unit) for name, label in shapes_of(chosen).items()}
+    sizes = {size.name: at.value(label, unit) for size, label in list_sizes(chosen)}
+    return sizes | {name: at.value(label, unit) for name, label in list_shapes(chosen).items()}
 
 
-def carried_over(other: Context, original: Context, unit: np.ndarray) -> np.ndarray:
+def carry_over(other: Context, original: Context, unit: np.ndarray) -> np.ndarray:
     """Coordinates (D',) of the context of terms with base model, faults and power before as at
     coordinates (D,).
     """

@@ -13,13 +13,13 @@ import numpy as np
 
 from tractexp.domain import domain_of
 from tractexp.errors import UserError
-from tractexp.identification.fit import TRAIN, Fit, model_errors
-from tractexp.identification.linear_network import BlackBox, black_boxes, choose_network
-from tractexp.inference.model_error import STALL, in_percent
+from tractexp.identification.fit import TRAIN, Fit, tabulate_model_errors
+from tractexp.identification.linear_network import BlackBox, choose_network, fit_black_boxes
+from tractexp.inference.model_error import STALL, format_percent
 from tractexp.text.wording import count_noun
 
 
-def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
+def compare_with_network(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
     """The error of a model beside that of the best linear network: `linear_network` of
     `result.json`.
 
@@ -42,15 +42,15 @@ def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
         box, played = play_network(fits)
     except UserError as why:
         return {"sentence": f"no linear network stands beside it: {why}"}
-    own = model_errors(played)
+    own = tabulate_model_errors(played)
     judged = slice(split, None) if split < len(fits) else slice(split)
     left, model = (e["held_out"]["value"] if e["held_out"] else e["value"] for e in (own, error))
     ratio = model / left if left > 0 and np.isfinite(model) else None
     dips = "dips" if len(fits[judged]) > 1 else "dip"
     on = f"on the {dips} it {'never saw' if own['held_out'] else 'was fitted to'}"
-    sentence = _sentence(ratio, model, len(box.poles), on)
+    sentence = _describe_ratio(ratio, model, len(box.poles), on)
     if np.isfinite(model):
-        sentence += _of_currents(fits[judged], played[judged])
+        sentence += _describe_currents(fits[judged], played[judged])
     return {
         "poles": box.poles,
         "chosen_by": box.chosen_by,
@@ -83,28 +83,28 @@ def play_network(fits: Sequence[Fit]) -> tuple[BlackBox, list[Fit]]:
     """
     events = [fit.waves or fit.event for fit in fits]
     split = sum(fit.role == TRAIN for fit in fits)
-    box = choose_network(black_boxes(domain_of(events[0]), events[:split]), events[:split])
+    box = choose_network(fit_black_boxes(domain_of(events[0]), events[:split]), events[:split])
     pairs = zip(fits, events, strict=True)
     return box, [Fit(role=fit.role, **vars(box.play(event))) for fit, event in pairs]
 
 
-def poles_in_words(poles: Sequence[dict[str, float]]) -> str:
+def describe_poles(poles: Sequence[dict[str, float]]) -> str:
     """The poles of a network as text; "none" of one without.
 
     Examples
     --------
-    >>> poles_in_words([{"decay": 17.6, "frequency": 47.5}])
+    >>> describe_poles([{"decay": 17.6, "frequency": 47.5}])
     '17.6/s at 47.5 Hz'
     """
     return ", ".join(f"{p['decay']:.3g}/s at {p['frequency']:.3g} Hz" for p in poles) or "none"
 
 
-def network_in_words(poles: int) -> str:
+def describe_network(poles: int) -> str:
     """What the best network of so many poles is called in a sentence.
 
     Examples
     --------
-    >>> network_in_words(0), network_in_words(2)
+    >>> describe_network(0), describe_network(2)
     ('the best linear network without poles', 'the best linear network of 2 poles')
     """
     return (
@@ -112,22 +112,22 @@ def network_in_words(poles: int) -> str:
     )
 
 
-def _sentence(ratio: float | None, model: float, poles: int, on: str) -> str:
+def _describe_ratio(ratio: float | None, model: float, poles: int, on: str) -> str:
     """How the model's error stands beside that of the best network, on the events that `on`
     names.
     """
-    network = network_in_words(poles)
+    network = describe_network(poles)
     if not np.isfinite(model):
         return f"{STALL} in the physical model {on}, beside {network}"
     if ratio is None:
         return (
-            f"{network} leaves no more than noise {on}, the physical model {in_percent(model)} of"
-            " the response"
+            f"{network} leaves no more than noise {on}, the physical model"
+            f" {format_percent(model)} of the response"
         )
     return f"the physical model leaves {ratio:.2g} times what {network} does {on}"
 
 
-def _of_currents(fits: Sequence[Fit], played: Sequence[Fit]) -> str:
+def _describe_currents(fits: Sequence[Fit], played: Sequence[Fit]) -> str:
     """The clause that compares the errors of the currents, which hold more than P and Q; "" of
     phasors.
     """
@@ -138,6 +138,6 @@ def _of_currents(fits: Sequence[Fit], played: Sequence[Fit]) -> str:
     if not left:
         return ""
     return (
-        f", and of the currents {model / left:.2g} times (epsilon_i {in_percent(model)} against"
-        f" {in_percent(left)})"
+        f", and of the currents {model / left:.2g} times (epsilon_i {format_percent(model)} against"
+        f" {format_percent(left)})"
     )
