@@ -643,7 +643,7 @@ def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
         def act() -> int:
             from tractexp.cache import store
 
-            store.DESCENTS.folder = store.DRAWS.folder = kept
+            store.DESCENTS.folder = kept
             return command(folder, *asked)
 
         return act

@@ -136,3 +136,24 @@ def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_act
     slow = (np.arange(n) >= 300) / np.sqrt(300)
     assert np.var((mix @ recorded)[:, 1] @ slow) > 20
     assert np.var(rows[:, 1] @ slow) < 2
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.8])
+def test_levels_are_drawn_as_far_off_as_quiet_samples_tell_them(memory):
+    """Against levels of drawn stretches themselves, one after the other from the same noise."""
+    color = Autoregression(np.array([[0.0], [memory]]), np.array([(1 - memory**2) ** -0.5, 1.0]))
+    noise = Noise(((color, color),))
+    rng = np.random.default_rng(5)
+    stretches = noise.draw(rng, 4000, [400])
+    seen = np.sqrt((stretches**2).mean(axis=(1, 2))) * (1 - memory**2) ** 0.5
+    drawn = noise.draw_levels(rng, 4000, 400)
+    assert np.mean(drawn**2) == pytest.approx(1.0, abs=0.02)
+    assert 0.9 < drawn.std() / seen.std() < 2.1  # a colored one's worth is that of its slowest part
+
+
+def test_an_average_over_ten_samples_is_told_by_more_than_ten_coefficients():
+    """Its spectrum has zeros; eight coefficients leave what passes for an oscillation."""
+    raw = np.random.default_rng(4).standard_normal((2, 6010)).cumsum(axis=1)
+    averaged = (raw[:, 10:] - raw[:, :-10]) / 10
+    found = estimate(averaged, np.ones(averaged.shape, dtype=bool), [slice(0, 6000)])
+    assert all(color.order > 10 for color in found.pair(0))

@@ -153,10 +153,9 @@ class Store:
 
 # some 10 kB each
 CODE, TEXTS, DRAWINGS = Store("code", 4000), Store("texts", 4000), Store("drawings", 4000)
-# draws of 10 MB
-SEARCHES, DESCENTS, DRAWS = Store("searches", 3000), Store("descents", 4000), Store("draws", 100)
+SEARCHES, DESCENTS = Store("searches", 3000), Store("descents", 4000)
 DATABASES = Store("databases", 4)  # of 1 MB
-KINDS = tuple(store.kind for store in (CODE, TEXTS, DRAWINGS, SEARCHES, DESCENTS, DRAWS, DATABASES))
+KINDS = tuple(store.kind for store in (CODE, TEXTS, DRAWINGS, SEARCHES, DESCENTS, DATABASES))
 MOST_LINKS = 40  # that a path leads through, as the system has it
 
 

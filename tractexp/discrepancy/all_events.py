@@ -195,5 +195,5 @@ class AllEvents:
         it leaves.
         """
         louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
-        p_left = examine_fit(self.quiet, fit, self.level, seed, plain=True).p_left
+        p_left = examine_fit(self.quiet, fit, self.level, seed).p_left
         return JointFit(replace(fit, unit=self._narrow(fit)), louder, p_left)

@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.blocks import cut_blocks
-from tractexp.inference.chance import BLURRED, Chance, draw_chance, draw_scales, is_noise_exact
+from tractexp.inference.chance import BLURRED, Chance, draw_chance, draw_scales
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.fit_effort import NOISE_ROUNDS, QUIETER
@@ -18,7 +18,6 @@ from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.score_test import Score, ScoreTest
 from tractexp.noise import Noise
 
-PLAIN = 1e-10  # a score of this p needs no exact threshold
 MISSED = 20.0  # factor by which scales that are not exact may miss p
 
 
@@ -170,13 +169,8 @@ def examine_base_fit(base: BaseFit, seed: int) -> Disagreement:
     return examine_fit(base.quiet, base.fit, base.noise, seed)
 
 
-def examine_fit(
-    quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool = False
-) -> Disagreement:
+def examine_fit(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:
     """Make all tests at one fit, under the noise of what no candidate explains there.
-
-    Taken as known the noise makes every test sharper: what even those do not doubt needs no draws
-    that estimate it anew, which cost a hundred times as much.
 
     Parameters
     ----------
@@ -188,8 +182,6 @@ def examine_fit(
         Under which it was fitted.
     seed : int
         Of the draws.
-    plain : bool
-        Whether the noise is taken as known.
 
     Returns
     -------
@@ -206,12 +198,8 @@ def examine_fit(
         if fit.deviance > QUIETER * context.samples:
             break  # else this is the noise of a worse fit
     projection = t.build_score_test(noise)
-    chance = draw_chance(t, projection, noise, quiet, seed, plain=True)
+    chance = draw_chance(t, projection, noise, seed)
     result = Disagreement(fit, noise, t, projection, chance)
-    stands_out = bool(result.scores) and result.scores[0].p < PLAIN
-    plain = plain or is_noise_exact(context, noise) or stands_out
-    if not plain and not (result.suffices and not result.faults):
-        result = replace(result, chance=draw_chance(t, projection, noise, quiet, seed, plain=False))
     if result.is_undecided:
         result = replace(
             result, chance=replace(result.chance, scales=draw_scales(t, projection, noise, seed))

@@ -46,7 +46,7 @@ def examine_least_squares(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int
         fit.unit, remove_explained(t, t.residual[None])[0], t.residual, t.explaining_columns
     )
     projection = t.build_score_test(own)
-    chance = draw_chance(t, projection, own, quiet, seed, plain=True)
+    chance = draw_chance(t, projection, own, seed)
     return Disagreement(fit, own, t, projection, chance, root)
 
 

@@ -32,9 +32,7 @@ def compare_rivals(explained: Explanations, seed: int) -> Evidence:
         tests = (
             last
             if k == 0
-            else examine_fit(
-                base.quiet, fit, last.noise, seed + RIVAL_SEED_OFFSET + place, plain=True
-            )
+            else examine_fit(base.quiet, fit, last.noise, seed + RIVAL_SEED_OFFSET + place)
         )
         rows[k] = replace(rows[k], tests=tests, p_left=tests.p_left)
     bare = SetEvidence(first.fit, (), (), p_left=first.p_left, tests=first)

@@ -126,7 +126,8 @@ def run_residual_test(
     rng = np.random.default_rng(JUDGEMENT_SEED)
     drawn = likelihood.noise.draw(rng, FIT_DRAWS, np.diff(observed.drive.first).tolist())
     drawn *= likelihood.valid
-    drawn /= _draw_level_errors(likelihood, observed, rng)[:, None, None]
+    quiet = sum(part.stop - part.start for part in observed.problem.quiet)
+    drawn /= likelihood.noise.draw_levels(rng, FIT_DRAWS, quiet)[:, None, None]
     basis = J.basis()
     split = build_event_basis(J, steady)
 
@@ -225,16 +226,6 @@ def _draw_mean_errors(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
     for e, steady in enumerate(problem.steady):
         wrong[:, e] = drawn[:, :, steady].mean(axis=2)
     return -wrong.reshape(len(drawn), -1) / plain.free_set.box.width[plain.free :]
-
-
-def _draw_level_errors(
-    likelihood: Likelihood, observed: Observed, rng: np.random.Generator
-) -> np.ndarray:
-    """By how much each draw (DRAWS,) would have estimated its own noise wrongly, from so few quiet
-    samples.
-    """
-    worth = max(likelihood.noise.worth(sum(p.stop - p.start for p in observed.problem.quiet)), 4.0)
-    return np.sqrt(rng.chisquare(2 * worth, FIT_DRAWS) / (2 * worth))
 
 
 def _linear(likelihood: Likelihood) -> np.ndarray:

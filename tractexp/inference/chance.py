@@ -1,17 +1,15 @@
 """What chance alone does to the tests: the fit's own noise drawn again and put through the same
 projection.
 
-Thresholds hold for the largest of all candidates at once, for the noise as it was estimated, and,
-where the quiet samples are few, for the error of that estimate too: each draw then estimates its
-noise anew.
+Thresholds hold for the largest of all candidates at once, and for the error of the noise's
+estimate: each draw is as much louder or quieter as the quiet samples may have told its level wrong.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from tractexp.cache import store
 from tractexp.inference import residual_statistics
 from tractexp.inference.context import Context
 from tractexp.inference.cores import map_on_cores
@@ -21,16 +19,12 @@ from tractexp.inference.goodness_of_fit import (
     Scale,
     compare_with_draws,
 )
-from tractexp.inference.linearization import Linearization, remove_explained
-from tractexp.inference.noise_in_quiet import QuietNoise
+from tractexp.inference.linearization import Linearization
 from tractexp.inference.score_test import ScoreTest
 from tractexp.noise import Noise
 from tractexp.text.wording import format_probability
 
 NULL_DRAWS = 199
-# Independent quiet samples below which every draw estimates its noise anew: the error of the
-# estimate then is a tenth of the noise, as large as what a level of 5 % allows.
-QUIET_WORTH = 150.0
 # Variance from noise of the voltage, over that of the power, from which faults of the measurement
 # are not judged: whatever smooths the calculated power would seem to be there.
 BLURRED = 0.5
@@ -93,13 +87,10 @@ class Chance:
         return compare_with_draws(projection.statistics(context.problem), self.left, self.scales)
 
 
-def draw_chance(
-    t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
-) -> Chance:
+def draw_chance(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> Chance:
     """Draw the null distribution of every statistic at a fit.
 
-    Draws that estimate their noise anew are kept on disk, for a run that goes on after it was
-    stopped; others cost less than keeping them.
+    A fault of the measurement counts where the noise of the voltage is not loud.
 
     Parameters
     ----------
@@ -109,32 +100,24 @@ def draw_chance(
         The projection of the fit under this noise.
     noise : Noise
         That of the records.
-    quiet : QuietNoise
-        What estimates the noise of a draw from its quiet stretches.
     seed : int
         The same seed gives the same draws.
-    plain : bool
-        Whether the noise is taken as known. It is, too, where quiet stretches tell it exactly
-        enough.
 
     Returns
     -------
     Chance
         Of `NULL_DRAWS` draws.
     """
-    context = t.context
-    plain = plain or is_noise_exact(context, noise)
-
-    def draw() -> tuple[np.ndarray, ...]:
-        chance = _draw_null_distribution(t, own, noise, quiet, seed, plain)
-        return chance.least_p, np.array([*chance.left]), *chance.left.values()
-
-    if plain or not context.digest:
-        return _draw_null_distribution(t, own, noise, quiet, seed, plain)
-    fit = {part.name: getattr(t, part.name) for part in fields(t) if part.name != "context"}
-    key = store.key("chance", context.digest, fit, noise, quiet.input_modes, seed, NULL_DRAWS)
-    least, names, *left = store.DRAWS.arrays(key, draw)
-    return Chance(least, dict(zip(names.tolist(), left, strict=True)))
+    rng = np.random.default_rng(seed)
+    white = _draw_white(t, noise, rng)
+    quiet = sum(part.stop - part.start for part in t.context.problem.quiet)
+    levels = noise.draw_levels(rng, NULL_DRAWS, quiet)
+    projection = own.replace_residuals(white / levels[:, None])
+    p = projection.least_p
+    if noise.loudest_input_mode <= BLURRED:
+        faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
+        p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
+    return Chance(p, projection.statistics(t.context.problem))
 
 
 def draw_scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[str, Scale]:
@@ -180,55 +163,6 @@ def draw_scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> di
     }
 
 
-def _draw_null_distribution(
-    t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
-) -> Chance:
-    """The null distribution by draws of the noise.
-
-    With `plain` the draws are white and the noise is known; else each draw estimates its own noise
-    from its quiet stretches, as the records do.
-    """
-    rng = np.random.default_rng(seed)
-    if plain:
-        return _build_chance(t, own.replace_residuals(_draw_white(t, noise, rng)), noise)
-    drawn = noise.draw(rng, NULL_DRAWS, np.diff(t.context.drive.first).tolist()) * t.context.valid
-    rest = remove_explained(t, drawn)
-
-    def anew(b: int) -> Chance:
-        seen = quiet.estimate_noise(t.unit, rest[b])
-        return _build_chance(
-            t,
-            t.build_score_test(seen).replace_residuals(t.context.whiten(seen, drawn[b : b + 1])),
-            noise,
-        )
-
-    each = map_on_cores(anew, range(NULL_DRAWS), t.context.effort)
-    left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}
-    return Chance(np.concatenate([one.least_p for one in each]), left)
-
-
 def _draw_white(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarray:
     """Whitened noise (b, C N) of the events."""
     return noise.draw_white(rng, NULL_DRAWS, t.context.drive, t.context.valid)
-
-
-def is_noise_exact(context: Context, noise: Noise) -> bool:
-    """Whether quiet stretches tell the noise exactly enough to take it as known.
-
-    That is so where they are worth `QUIET_WORTH` independent samples, and in a domain whose noise
-    follows from the model, so that its size alone is estimated.
-    """
-    samples = sum(part.stop - part.start for part in context.problem.quiet)
-    return context.domain.noise_from_model or noise.worth(samples) >= QUIET_WORTH
-
-
-def _build_chance(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
-    """The null distribution of projected draws.
-
-    A fault of the measurement counts where the noise of the voltage is not loud.
-    """
-    p = projection.least_p
-    if noise.loudest_input_mode <= BLURRED:
-        faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
-        p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
-    return Chance(p, projection.statistics(t.context.problem))

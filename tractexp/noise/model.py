@@ -18,6 +18,7 @@ from tractexp.noise.color import Autoregression, white_noise
 from tractexp.noise.random_walk import Load, RandomWalk
 
 BURN_IN = 500  # samples
+FEWEST_WORTH = 4.0  # independent quiet samples: the level's error is told as if there were so many
 # standard deviations of the fast noise: shapes that do less are left out
 LEAST_SHAPE_DEVIATION = 0.05
 
@@ -237,6 +238,15 @@ class Noise:
         gains = [1 / max(float(abs(1 - a.coefficients[-1].sum())), 1e-3) for a in channels]
         spreads = [a.deviation[0] / a.deviation[-1] for a in channels]
         return samples / max(1.0, *((g / s) ** 2 for g, s in zip(gains, spreads, strict=True)))
+
+    def draw_levels(self, rng: np.random.Generator, count: int, samples: int) -> np.ndarray:
+        """Draws (count,) of the noise's level as so many quiet samples tell it, over the true one.
+
+        Its square is chi-squared over its degrees of freedom: two channels of as many independent
+        samples as this noise lets these be worth.
+        """
+        freedom = 2 * max(self.worth(samples), FEWEST_WORTH)
+        return np.sqrt(rng.chisquare(freedom, count) / freedom)
 
     @property
     def levels(self) -> tuple[float, ...]:
