@@ -18,7 +18,7 @@ import tractexp
 from tractexp.api import station as station_call
 from tractexp.api import station_load
 from tractexp.errors import UserError
-from tractexp.identification.station import Dip, LoadSpec, fit_dips, predict_in_turn
+from tractexp.identification.station import LoadSpec, StationDip, fit_dips, predict_in_turn
 from tractexp.inference.sized_problem import SizedProblem
 from tractexp.record import OwnBase
 from tractexp.report import station
@@ -108,7 +108,7 @@ def draw_frame(k):
 
 def draw_dip(k):
     (event,) = tractexp.read(draw_frame(k))
-    return Dip(OwnBase.from_event(event).convert_event(event))
+    return StationDip(OwnBase.from_event(event).convert_event(event))
 
 
 def test_a_motor_of_another_size_has_the_same_constants():

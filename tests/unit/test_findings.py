@@ -10,7 +10,7 @@ import pytest
 from tractexp.configuration.plugin import get
 from tractexp.discrepancy.findings import Findings, is_end_of_range
 from tractexp.inference.criteria import Criteria
-from tractexp.inference.model_error import Change
+from tractexp.inference.model_error import ModelChange
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_what_only_all_events_show_closes_a_share_of_the_error_and_has_no_rival(
     )
     found = SimpleNamespace(
         context=SimpleNamespace(criteria=Criteria(ahead=ahead)),
-        graded_change=Change(before, after),
+        graded_change=ModelChange(before, after),
         verdict=SimpleNamespace(kept=("one",) * kept),
     )
     assert Findings.closes_share.fget(found) == told

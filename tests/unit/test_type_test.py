@@ -12,7 +12,7 @@ import tractexp
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.recording import Feeder
 from tractexp.recording.measure import phasors_of
-from tractexp.recording.type_test import Course, find_type_test
+from tractexp.recording.type_test import MotorCourse, find_type_test
 
 RATE = 3200.0
 THREE = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
@@ -49,7 +49,7 @@ def report(started=True, unbalance=0.0, fan=False, sigma=5e-4):
 def measure(record):
     [segment] = record.segments
     found = find_type_test(
-        Course.from_phasors(phasors_of(record, THREE, segment), 50.0), record.frequency
+        MotorCourse.from_phasors(phasors_of(record, THREE, segment), 50.0), record.frequency
     )
     return found and {each.name: each for each in found.values}
 
@@ -75,7 +75,7 @@ def test_an_unbalance_tells_the_impedance_without_a_start():
     assert found.keys() == {"X_2", "T0'", "H"}
     check(found["X_2"], X_LOCKED, 0.05)
     phasors = phasors_of(report(started=False), THREE, report().segments[0])
-    test = find_type_test(Course.from_phasors(phasors, 50.0), 50.0)
+    test = find_type_test(MotorCourse.from_phasors(phasors, 50.0), 50.0)
     assert test.power == pytest.approx(3 * KV * KA, rel=0.01)
     assert test.voltage == pytest.approx(110, rel=0.01)
 

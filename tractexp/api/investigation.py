@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from tractexp.api.given import Source
     from tractexp.discrepancy.findings import Findings as Steps
-    from tractexp.discrepancy.readings import Reading
+    from tractexp.discrepancy.readings import ShapeReading
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,7 +116,7 @@ class Investigation(Written):
         return Table(columns, rows, "what is left", entry["sentence"] if entry else "")
 
     @property
-    def readings(self) -> "list[Reading]":
+    def readings(self) -> "list[ShapeReading]":
         """Physical causes that the shapes which are left may have, each with what would decide it;
         [] where nothing is left.
         """

@@ -23,10 +23,10 @@ from tractexp.identification.composition import (
 )
 from tractexp.identification.forecast import TOLD_DEPTH, Forecast, tell_of_dip
 from tractexp.identification.station import (
-    Dip,
     LoadSpec,
     Predicted,
     SharedFit,
+    StationDip,
     find_band,
     find_later,
     fit_dips,
@@ -157,12 +157,12 @@ def _fit(job: LoadJob) -> dict[str, Any]:
     }
 
 
-def _build_dip(when: str | None, record: Record) -> Dip:
+def _build_dip(when: str | None, record: Record) -> StationDip:
     """A dip per unit of what its load drew before it."""
     event = detect(record)
     own = OwnBase.from_event(event)
     moment = datetime.fromisoformat(when) if when else None
-    return Dip(own.convert_event(event), moment)
+    return StationDip(own.convert_event(event), moment)
 
 
 def _tell_constants(load: LoadModel, constants: Constants, fit: SharedFit) -> list[dict[str, Any]]:
@@ -215,7 +215,7 @@ def _tell_terms(fit: SharedFit, composition: Composition) -> dict[str, Any]:
     return {"varies": shown, "terms": {term: composition.tabulate(term) for term in shown}}
 
 
-def _tell_power(dips: Sequence[Dip], fit: SharedFit) -> dict[str, Any]:
+def _tell_power(dips: Sequence[StationDip], fit: SharedFit) -> dict[str, Any]:
     """P before the dips [MW, or pu of the file], and by the terms that it shows."""
     kept = fit.regular
     P = np.array([_measure_power(dips[k].event) for k in kept])

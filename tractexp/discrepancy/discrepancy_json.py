@@ -20,7 +20,7 @@ from tractexp.discrepancy.proposal.library import find_term
 from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
 from tractexp.discrepancy.recommend import recommend_next
 from tractexp.domain import DOMAINS
-from tractexp.inference.model_error import Change, Misfit, ModelError, format_percent
+from tractexp.inference.model_error import ModelChange, ModelError, ModelMisfit, format_percent
 from tractexp.storage import files
 from tractexp.text import quoting
 from tractexp.text.wording import join_words
@@ -91,13 +91,13 @@ def build_gaps(investigation: Findings) -> dict[str, Any]:
     )
     ranked = {"train": investigation.train, "validate": investigation.validate}
     rows: dict[str, Any] = {
-        role: was and now and _build_gap(Change(was, now), ranked[role])
+        role: was and now and _build_gap(ModelChange(was, now), ranked[role])
         for role, was, now in zip(ranked, before, after, strict=True)
     }
     return {**rows, "fitted_to_both": investigation.fitted_to_both}
 
 
-def _build_gap(change: Change[Any], ranked: Change[Curves] | None) -> dict[str, Any]:
+def _build_gap(change: ModelChange[Any], ranked: ModelChange[Curves] | None) -> dict[str, Any]:
     """What two models leave, with the deviance of the ranked fits beside it."""
     return {
         "before": _build_misfit(change.before, ranked and ranked.before),
@@ -106,7 +106,7 @@ def _build_gap(change: Change[Any], ranked: Change[Curves] | None) -> dict[str, 
     }
 
 
-def _build_misfit(misfit: Misfit, ranked: Curves | None) -> dict[str, Any]:
+def _build_misfit(misfit: ModelMisfit, ranked: Curves | None) -> dict[str, Any]:
     """The errors of a model."""
     own = {} if misfit.epsilon_i is None else {"epsilon_i": misfit.epsilon_i}
     errors = {"epsilon_p": misfit.epsilon_p, "epsilon_q": misfit.epsilon_q}

@@ -31,7 +31,7 @@ from tractexp.discrepancy.overlay import (
 from tractexp.discrepancy.places import DisagreementInterval
 from tractexp.discrepancy.precision import list_estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult
-from tractexp.discrepancy.rest import Rest, find_shapes, share_of
+from tractexp.discrepancy.rest import RemainingShapes, find_shapes, share_of
 from tractexp.identification.conclude import list_at_bound
 from tractexp.identification.grade import GradedModel
 from tractexp.identification.unrecorded_course import find_course
@@ -42,7 +42,7 @@ from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
-from tractexp.inference.model_error import Change, Misfit
+from tractexp.inference.model_error import ModelChange, ModelMisfit
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.parameter import Parameter
 from tractexp.record import Event
@@ -266,16 +266,18 @@ class Findings:
         own = {p.name for p in others}
         return {name: value for name, value in self.undetermined_values.items() if name not in own}
 
-    def misfits(self, graded: GradedModel) -> tuple[Misfit, Misfit | None]:
+    def misfits(self, graded: GradedModel) -> tuple[ModelMisfit, ModelMisfit | None]:
         """How far off a graded model is on the events that were to be fitted, and on those held
         out.
         """
         split = len(self.grader.train)
         fitted = graded.fits[:split]
         held_out = graded.fits[split:]
-        return Misfit.from_played(fitted), Misfit.from_played(held_out) if held_out else None
+        return ModelMisfit.from_played(fitted), ModelMisfit.from_played(
+            held_out
+        ) if held_out else None
 
-    def select_misfit(self, graded: GradedModel) -> Misfit:
+    def select_misfit(self, graded: GradedModel) -> ModelMisfit:
         """How far off a graded model is on the held-out events; on the fitted ones where there
         are none.
         """
@@ -283,11 +285,13 @@ class Findings:
         return held_out or fitted
 
     @property
-    def graded_change(self) -> Change[Misfit]:
+    def graded_change(self) -> ModelChange[ModelMisfit]:
         """What the graded models leave of the held-out events; of the fitted ones where there are
         none.
         """
-        return Change(self.select_misfit(self.base_grade), self.select_misfit(self.final_grade))
+        return ModelChange(
+            self.select_misfit(self.base_grade), self.select_misfit(self.final_grade)
+        )
 
     @functools.cached_property
     def final_estimates(self) -> list[ParameterEstimate]:
@@ -336,7 +340,7 @@ class Findings:
         return min(courses, key=lambda course: course["error"], default={})
 
     @functools.cached_property
-    def rest(self) -> Rest:
+    def rest(self) -> RemainingShapes:
         """What is left where it is more than noise, in shapes."""
         noise = self.last.noise
         level = self.context.criteria.false_alarms
@@ -348,7 +352,7 @@ class Findings:
             if self.by_likelihood is not self.evidence:
                 alone.append(overlay_fit(self.context, self.by_likelihood.base.fit, noise))
         of_base = [find_shapes(overlays, noise, level) for overlays in alone]
-        return Rest(of_best, max(of_base, key=share_of, default=[]))
+        return RemainingShapes(of_best, max(of_base, key=share_of, default=[]))
 
     @property
     def headline(self) -> str:

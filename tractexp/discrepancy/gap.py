@@ -11,7 +11,7 @@ from tractexp.inference.context import Context
 from tractexp.inference.differences import step_both_ways
 from tractexp.inference.injection import PUSHES, inject_perturbations
 from tractexp.inference.linearization import find_active_bounds
-from tractexp.inference.model_error import Change, Misfit
+from tractexp.inference.model_error import ModelChange, ModelMisfit
 from tractexp.noise import Noise
 from tractexp.noise.span import compute_basis, project_out
 
@@ -23,7 +23,7 @@ LEAST_DISTINCT_PUSH = 0.03
 
 
 @dataclass(frozen=True, eq=False)
-class Curves(Misfit):
+class Curves(ModelMisfit):
     """What a model calculates of all events end to end, and what it leaves.
 
     Attributes
@@ -40,7 +40,7 @@ class Curves(Misfit):
 
 
 @dataclass(frozen=True, eq=False)
-class GapTest(Change[Curves]):
+class GapTest(ModelChange[Curves]):
     """The model's error before and after, and whether some events bear the extension out.
 
     Attributes
@@ -121,7 +121,7 @@ def compute_curves(
         context.domain.comparison(event, calculated[:, part])
         for event, part in zip(context.events, context.drive.parts, strict=True)
     ]
-    misfit = Misfit.from_played(each)
+    misfit = ModelMisfit.from_played(each)
     chi2 = deviance / max(context.samples, 1)
     return Curves(**vars(misfit), calculated=calculated, deviance=deviance, chi2_per_sample=chi2)
 

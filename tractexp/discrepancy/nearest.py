@@ -16,7 +16,7 @@ from tractexp.discrepancy.ranking import (
 )
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
-from tractexp.inference.model_error import Change
+from tractexp.inference.model_error import ModelChange
 from tractexp.noise import Noise
 from tractexp.record import Event
 
@@ -30,8 +30,8 @@ class Nearest:
     row: SetEvidence
     # the next ones, and what share of the gap they close on fitted events
     others: list[tuple[tuple[str, ...], float]]
-    fitted: Change[Curves]  # of the base model and with these, on the fitted events
-    held_out: Change[Curves] | None  # on the held-out ones, if any
+    fitted: ModelChange[Curves]  # of the base model and with these, on the fitted events
+    held_out: ModelChange[Curves] | None  # on the held-out ones, if any
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,15 +66,15 @@ def find_nearest_sets(
     )
     there = _carry_curves(context, validate, fits[:2]) if validate else None
     others = [
-        (row.fit.names, Change(before, one).closed_share)
+        (row.fit.names, ModelChange(before, one).closed_share)
         for row, one in zip(rows[1:], after[1:], strict=True)
     ]
-    return Nearest(rows[0], others, Change(before, after[0]), there)
+    return Nearest(rows[0], others, ModelChange(before, after[0]), there)
 
 
 def _carry_curves(
     context: Context, validate: Sequence[Event], fits: Sequence[Refit]
-) -> Change[Curves] | None:
+) -> ModelChange[Curves] | None:
     """What two fits leave of held-out events, the base model's first; None where one has no steady
     state there.
     """
@@ -83,7 +83,7 @@ def _carry_curves(
         compute_curves(other, units[0], noise),
         compute_curves(other, units[1], noise, fits[1].names),
     )
-    return Change(*pair) if np.isfinite([one.deviance for one in pair]).all() else None
+    return ModelChange(*pair) if np.isfinite([one.deviance for one in pair]).all() else None
 
 
 def measure_least_error(verdict: Verdict, evidence: Evidence, context: Context) -> float:

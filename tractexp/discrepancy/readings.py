@@ -140,7 +140,7 @@ IN_COMMON = (
 
 
 @dataclass(frozen=True)
-class Reading:
+class ShapeReading:
     """What is left, what it may be, who says so, what would decide it, and the command."""
 
     shape: str
@@ -155,7 +155,7 @@ class Reading:
         return f"{self.shape} may be {self.means}; to decide, look at {self.decides}"
 
 
-def read_shapes(shapes: Sequence[Remainder], event: Event) -> list[Reading]:
+def read_shapes(shapes: Sequence[Remainder], event: Event) -> list[ShapeReading]:
     """A reading of each shape, the loudest first; `event` is the first that was fitted, whose file
     is looked at.
     """
@@ -170,14 +170,14 @@ def read_shapes(shapes: Sequence[Remainder], event: Event) -> list[Reading]:
 
 def _read_shape(
     shape: Remainder, shapes: Sequence[Remainder], supply: float, commands: Mapping[str, str]
-) -> Iterator[Reading]:
+) -> Iterator[ShapeReading]:
     rule = next((rule for rule in RULES if rule.holds(shape, supply)), None)
     if rule is None:
         return
     means = rule.means
     if any(_rings_alike(shape, other) for other in shapes):
         means = f"{IN_COMMON}; else {means}"
-    yield Reading(_name(shape), means, rule.source, rule.decides, commands[rule.command])
+    yield ShapeReading(_name(shape), means, rule.source, rule.decides, commands[rule.command])
 
 
 def _rings_alike(one: Remainder, other: Remainder) -> bool:

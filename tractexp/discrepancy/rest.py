@@ -10,7 +10,7 @@ from tractexp.text.wording import join_words
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class RemainingShapes:
     """The shapes in what models leave, the loudest first.
 
     Attributes

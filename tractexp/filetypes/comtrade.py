@@ -19,7 +19,7 @@ from tractexp.filetypes.comtrade_samples import NONE, ByteRange, Samples, read
 from tractexp.filetypes.comtrade_writer import write as write
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode, lines
-from tractexp.filetypes.timeline import Stretch
+from tractexp.filetypes.timeline import SampleStretch
 from tractexp.recording.recording import Channel, Recording, StatusChannel, quantity_of
 from tractexp.storage import files
 
@@ -177,7 +177,7 @@ def _recording(
     )
 
 
-def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> Channel:
+def _channel(header: Header, k: int, samples: Samples, stretches: list[SampleStretch]) -> Channel:
     """An analog channel with its raw integers, at even times, missing ones marked."""
     analog = header.analogs[k]
     raw = samples.analogs[k]
@@ -235,7 +235,7 @@ def _find_missing_text(analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, flo
 
 def _stretches(
     data: ByteRange, header: Header, samples: Samples, remarks: Remarks
-) -> list[Stretch]:
+) -> list[SampleStretch]:
     """Segments from the rates; from the time stamps where there are none."""
     fine = all("." in date and len(date.strip().rpartition(".")[2]) > 6 for date in header.dates)
     unit = header.timemult * (1e-9 if fine else 1e-6)
@@ -253,7 +253,7 @@ def _stretches(
 
 def _stretches_by_stamps(
     data: ByteRange, header: Header, samples: Samples, unit: float, remarks: Remarks
-) -> list[Stretch]:
+) -> list[SampleStretch]:
     """Segments from the time stamps, of `unit` s each."""
     stamps = samples.stamps.astype(np.float64)
     if header.kind != "ASCII":
@@ -300,7 +300,7 @@ def _read_stamped_times(
     return t
 
 
-def _trigger(header: Header, stretches: list[Stretch], remarks: Remarks) -> float | None:
+def _trigger(header: Header, stretches: list[SampleStretch], remarks: Remarks) -> float | None:
     """The trigger's time [s] after the first sample; None, with a remark, where it lies outside the
     record.
     """
@@ -317,7 +317,7 @@ def _trigger(header: Header, stretches: list[Stretch], remarks: Remarks) -> floa
     return None
 
 
-def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[str, Any]:
+def _extra(header: Header, samples: Samples, stretches: list[SampleStretch]) -> dict[str, Any]:
     """Fields of the file that a recording has no attribute for, for a round trip."""
     extra: dict[str, Any] = {
         "format": "COMTRADE",

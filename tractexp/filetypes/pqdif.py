@@ -16,7 +16,7 @@ from tractexp.filetypes.pqdif_channels import (
     PHASOR,
     WAVEFORM,
     ChannelDefinition,
-    Observed,
+    PqdifContent,
     SeriesDefinition,
     read_observations,
     seconds,
@@ -65,7 +65,7 @@ LOG_GAP_STEPS = 1.5  # usual steps: after a longer one a log is another one
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class ObservedStretch:
     """Values (N,) by column at times (N,) [s] since the file's first observation."""
 
     t: np.ndarray
@@ -142,15 +142,15 @@ def _channel(definition: ChannelDefinition, unit: str, values: np.ndarray) -> Ch
 
 
 def _read_waves(
-    content: Observed, channels: dict[int, tuple[ChannelDefinition, str]], remarks: Remarks
-) -> list[Stretch]:
+    content: PqdifContent, channels: dict[int, tuple[ChannelDefinition, str]], remarks: Remarks
+) -> list[ObservedStretch]:
     """The waveforms of each observation by the times of their samples; `channels` learns definition
     and unit.
     """
-    stretches: dict[tuple[float, ...], Stretch] = {}
+    stretches: dict[tuple[float, ...], ObservedStretch] = {}
     for each in content.observations:
         begin = seconds(each.start, content.observations[0].start)
-        own: dict[tuple[float, ...], Stretch] = {}
+        own: dict[tuple[float, ...], ObservedStretch] = {}
         for one in each.instances:
             sampled = ((d, v) for d, v in one.series if d.value in (VALUE, INSTANT))
             definition, values = next(sampled, (None, None))
@@ -163,7 +163,7 @@ def _read_waves(
                     " damaged"
                 )
             channels[one.channel.number] = (one.channel, UNITS.get(definition.unit, ""))
-            stretch = own.setdefault(_key(begin, one.t), Stretch(begin + one.t, {}))
+            stretch = own.setdefault(_key(begin, one.t), ObservedStretch(begin + one.t, {}))
             stretch.columns[one.channel.number] = values
         for stretch in _merge_rates([*own.values()], remarks):
             stretches.setdefault(_key(0.0, stretch.t), stretch).columns.update(stretch.columns)
@@ -177,7 +177,9 @@ def _key(begin: float, t: np.ndarray) -> tuple[float, ...]:
     return round(begin + float(t[0]), 6), len(t), round(float(t[-1] - t[0]), 6)
 
 
-def _merge_rates(stretches: Sequence[Stretch], remarks: Remarks) -> Sequence[Stretch]:
+def _merge_rates(
+    stretches: Sequence[ObservedStretch], remarks: Remarks
+) -> Sequence[ObservedStretch]:
     """One stretch of channels that one observation samples at several rates: all at the times of
     the slowest.
     """
@@ -202,10 +204,12 @@ def _merge_rates(stretches: Sequence[Stretch], remarks: Remarks) -> Sequence[Str
         " lowest"
     )
     columns = {k: CubicSpline(each.t, v)(t) for each in stretches for k, v in each.columns.items()}
-    return [Stretch(t, columns)]
+    return [ObservedStretch(t, columns)]
 
 
-def _keep_fullest_set(stretches: Sequence[Stretch], remarks: Remarks) -> list[Stretch]:
+def _keep_fullest_set(
+    stretches: Sequence[ObservedStretch], remarks: Remarks
+) -> list[ObservedStretch]:
     """The stretches of the largest set of channels: what others have is no whole load."""
     if not stretches:
         return []
@@ -220,7 +224,7 @@ def _keep_fullest_set(stretches: Sequence[Stretch], remarks: Remarks) -> list[St
 
 
 def _segments(
-    where: str, stretches: Sequence[Stretch]
+    where: str, stretches: Sequence[ObservedStretch]
 ) -> tuple[list[timeline.Segment], dict[int, np.ndarray]]:
     """Segments of even sampling, and the values (N,) of each channel in them; times begin with the
     first sample.
@@ -289,11 +293,11 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     return Rows.from_columns(path, every, 1, remarks.notes())
 
 
-def _read_logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:
+def _read_logs(content: PqdifContent, names: dict[int, tuple[str, str]]) -> list[ObservedStretch]:
     """The logs of each observation by their times; `names` learns what each column is called, and
     its unit.
     """
-    stretches: dict[tuple[float, ...], Stretch] = {}
+    stretches: dict[tuple[float, ...], ObservedStretch] = {}
     circuits = {i.channel.circuit for o in content.observations for i in o.instances}
     numbers: dict[tuple[int, int], int] = {}
     for each in content.observations:
@@ -307,7 +311,9 @@ def _read_logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Str
                 number = numbers.setdefault((one.channel.number, k), len(numbers))
                 circuit = one.channel.circuit if len(circuits) > 1 else ""
                 names[number] = (" ".join(filter(None, (circuit, name))), UNITS[definition.unit])
-                stretch = stretches.setdefault(_key(begin, one.t), Stretch(begin + one.t, {}))
+                stretch = stretches.setdefault(
+                    _key(begin, one.t), ObservedStretch(begin + one.t, {})
+                )
                 stretch.columns[number] = column
     return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
 
@@ -331,12 +337,12 @@ def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value:
 
 
 def _join_longest_log(
-    stretches: Sequence[Stretch], remarks: Remarks
+    stretches: Sequence[ObservedStretch], remarks: Remarks
 ) -> tuple[np.ndarray, dict[int, np.ndarray]]:
     """The longest of the logs that follow one another without a gap: times (N,), and values (N,) by
     column.
     """
-    runs: list[list[Stretch]] = []
+    runs: list[list[ObservedStretch]] = []
     for each in stretches:
         before = runs[-1][-1].t if runs else each.t
         joined = runs and 0 < each.t[0] - before[-1] <= LOG_GAP_STEPS * float(

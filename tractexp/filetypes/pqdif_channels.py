@@ -135,14 +135,14 @@ def read_observations(
     kinds: Sequence[bytes],
     remarks: Remarks,
     most: float = math.inf,
-) -> "Observed":
+) -> "PqdifContent":
     """The channels of some kinds, as far as they have times, of the first `most` observations that
     have any.
 
     Raises `UserError` for what is no PQDIF file, and for a damaged one, with the record.
     """
     files.check_there(path)
-    reading = Observed(kinds, remarks)
+    reading = PqdifContent(kinds, remarks)
     for kind, body in records(path, encoding, remarks):
         if kind == SOURCE:
             reading.source(body)
@@ -155,7 +155,7 @@ def read_observations(
     return reading
 
 
-class Observed:
+class PqdifContent:
     """The content of a file: `observations`, the `station`, and the nominal `frequency` [Hz], 0
     where none is said.
 

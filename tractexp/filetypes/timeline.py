@@ -21,7 +21,7 @@ MOST_SEGMENTS = 1000  # segments: more are no segments but stamps without order
 
 
 @dataclass(frozen=True)
-class Stretch:
+class SampleStretch:
     """Samples first to stop of the file, at times `t` (M,) [s] where they are not
     even, else None.
     """
@@ -34,7 +34,7 @@ class Stretch:
 
 def build_from_rates(
     rates: Sequence[tuple[float, int]], t: np.ndarray | None = None
-) -> list[Stretch]:
+) -> list[SampleStretch]:
     """From (Hz, last sample counted from 1); neighbours of nearly one rate become one segment.
 
     `t` (N,) [s], are good time stamps, which say when a segment begins and whether two are joined.
@@ -48,7 +48,7 @@ def build_from_rates(
         else:
             groups.append([(rate, first, stop)])
         first = stop
-    stretches: list[Stretch] = []
+    stretches: list[SampleStretch] = []
     start = 0.0
     for group in groups:
         start += 1 / group[0][0] if stretches else 0.0
@@ -60,17 +60,17 @@ def build_from_rates(
     return stretches
 
 
-def _build_declared_stretch(group: list[tuple[float, int, int]], start: float) -> Stretch:
+def _build_declared_stretch(group: list[tuple[float, int, int]], start: float) -> SampleStretch:
     """One stretch of samples at declared rates [(rate, first, stop)], resampled where they
     differ.
     """
     first, stop = group[0][1], group[-1][2]
     if len({rate for rate, _, _ in group}) == 1:
-        return Stretch(Segment(first, stop, group[0][0], start), first, stop)
+        return SampleStretch(Segment(first, stop, group[0][0], start), first, stop)
     steps = np.concatenate([np.full(b - a, 1 / rate) for rate, a, b in group])[1:]
     t = start + np.concatenate([[0.0], np.cumsum(steps)])
     rate = (stop - first - 1) / float(t[-1] - t[0])
-    return Stretch(
+    return SampleStretch(
         Segment(first, stop, rate, start),
         first,
         stop,
@@ -78,7 +78,7 @@ def _build_declared_stretch(group: list[tuple[float, int, int]], start: float) -
     )
 
 
-def build_from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
+def build_from_stamps(t: np.ndarray, unit: float, where: str) -> list[SampleStretch]:
     """From times (N,) [s] of every sample, exact to `unit` [s]; raises `UserError` where they do
     not increase.
     """
@@ -132,7 +132,7 @@ def _is_gap(edges: list[int], k: int) -> bool:
     return max(before, after) > 1
 
 
-def _build_stamped_stretch(t: np.ndarray, unit: float, first: int, stop: int) -> Stretch:
+def _build_stamped_stretch(t: np.ndarray, unit: float, first: int, stop: int) -> SampleStretch:
     """One stretch of samples at stamped times, resampled where those are uneven."""
     own = t[first:stop]
     length = float(own[-1] - own[0])
@@ -142,7 +142,9 @@ def _build_stamped_stretch(t: np.ndarray, unit: float, first: int, stop: int) ->
         rate = float(round(rate))
     worst = _measure_unevenness(own, rate)
     uneven = worst > LARGEST_UNEVENNESS + 1.01 * unit * rate
-    return Stretch(Segment(first, stop, rate, float(own[0])), first, stop, own if uneven else None)
+    return SampleStretch(
+        Segment(first, stop, rate, float(own[0])), first, stop, own if uneven else None
+    )
 
 
 def _measure_unevenness(t: np.ndarray, rate: float) -> float:
@@ -150,7 +152,7 @@ def _measure_unevenness(t: np.ndarray, rate: float) -> float:
     return float(np.abs((t - t[0]) * rate - np.arange(len(t))).max())
 
 
-def arrange_segments(stretches: Sequence[Stretch]) -> list[Segment]:
+def arrange_segments(stretches: Sequence[SampleStretch]) -> list[Segment]:
     """The segments after `evened`: numbered from 0 without what lies between them where anything is
     interpolated.
     """
@@ -165,7 +167,7 @@ def arrange_segments(stretches: Sequence[Stretch]) -> list[Segment]:
 
 
 def resample_evenly(
-    raw: np.ndarray, stretches: Sequence[Stretch], missing: float | None
+    raw: np.ndarray, stretches: Sequence[SampleStretch], missing: float | None
 ) -> np.ndarray:
     """Values (N,) at even times, by cubic splines; those of even stretches as they are."""
     if all(s.t is None for s in stretches):
@@ -175,7 +177,7 @@ def resample_evenly(
     )
 
 
-def nearest(raw: np.ndarray, stretches: Sequence[Stretch]) -> np.ndarray:
+def nearest(raw: np.ndarray, stretches: Sequence[SampleStretch]) -> np.ndarray:
     """States (N,) at even times: those of the sample closest in time."""
     if all(s.t is None for s in stretches):
         return raw
@@ -186,7 +188,7 @@ def nearest(raw: np.ndarray, stretches: Sequence[Stretch]) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def _spread_times(s: Stretch) -> np.ndarray:
+def _spread_times(s: SampleStretch) -> np.ndarray:
     """The even times [s] of a stretch."""
     return s.segment.start + np.arange(s.stop - s.first) / s.segment.rate
 
@@ -197,7 +199,7 @@ def _find_closest(t: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.where(wanted - t[right - 1] <= t[right] - wanted, right - 1, right)
 
 
-def _interpolate_stretch(raw: np.ndarray, s: Stretch, missing: float | None) -> np.ndarray:
+def _interpolate_stretch(raw: np.ndarray, s: SampleStretch, missing: float | None) -> np.ndarray:
     """A stretch's values at even times, by cubic splines; what is missing stays so."""
     from scipy.interpolate import CubicSpline
 

@@ -50,7 +50,7 @@ class Grade(StrEnum):
 
 
 @dataclass(frozen=True)
-class Surprise:
+class ResidualTest:
     """How often noise alone leaves as much as an estimate does.
 
     Attributes
@@ -79,7 +79,7 @@ class Surprise:
 
 @dataclass(frozen=True)
 class Adequacy:
-    """The grade of an estimate, its sentence, and `p` as in `Surprise`."""
+    """The grade of an estimate, its sentence, and `p` as in `ResidualTest`."""
 
     grade: Grade
     sentence: str
@@ -96,7 +96,7 @@ def run_residual_test(
     unit: np.ndarray,
     squares: Likelihood | None = None,
     least: float = np.inf,
-) -> Surprise:
+) -> ResidualTest:
     """How often noise alone leaves as much as a fit does.
 
     Parameters
@@ -118,7 +118,7 @@ def run_residual_test(
         Not judged where too little is quiet.
     """
     if likelihood.noise.mix is None or not observed.problem.quiet:
-        return Surprise(None, "", None, "")
+        return ResidualTest(None, "", None, "")
     rows, J = likelihood.jacobian(unit)
     inside = is_off_bounds(unit)
     steady = _linear(likelihood)[inside[: likelihood.free]]
@@ -153,7 +153,7 @@ def run_residual_test(
     )
     fit = GoodnessOfFit(compare_with_draws(values, draws))
     ratio, where = find_loudest_stretch(own.reshape(observed.drive.channels, -1), observed.problem)
-    return Surprise(fit.p, fit.most_significant_test, ratio, where)
+    return ResidualTest(fit.p, fit.most_significant_test, ratio, where)
 
 
 def build_event_basis(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
@@ -268,7 +268,7 @@ def find_loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float,
 
 
 def grade_errors(
-    surprise: Surprise,
+    surprise: ResidualTest,
     fitted: ModelError,
     held_out: ModelError | None = None,
     active_bounds: Sequence[str] = (),
@@ -318,7 +318,7 @@ def _describe_misfit(fitted: ModelError, held_out: ModelError | None) -> str:
     return f"it leaves {fitted}{beside}"
 
 
-def _describe_rest(surprise: Surprise) -> str:
+def _describe_rest(surprise: ResidualTest) -> str:
     """What is said of a fit that leaves more than noise, as far as that is known."""
     if surprise.p is None:
         return (

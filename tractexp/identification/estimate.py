@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import MODEL, TASK, UserError
-from tractexp.identification.adequacy import Surprise, run_residual_test
+from tractexp.identification.adequacy import ResidualTest, run_residual_test
 from tractexp.identification.residual_noise import drop_outliers, estimate_noise_at
 from tractexp.identification.uncertainty import Uncertainty, compute_threshold, conclude
 from tractexp.inference.blocks import cut_blocks, exceeds
@@ -61,7 +61,7 @@ class EstimationResult:
     """
 
     uncertainty: Uncertainty
-    surprise: Surprise
+    surprise: ResidualTest
     starts: list[dict[str, Any]]
 
 
@@ -300,7 +300,9 @@ def _choose_estimate(ends: DescentEnds, *, robust: bool = False) -> EstimationRe
     )
 
 
-def _estimate_by_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> EstimationResult:
+def _estimate_by_squares(
+    ends: DescentEnds, noise: Likelihood, seen: ResidualTest
+) -> EstimationResult:
     """The minimum of Eq. (8) as the estimate; with priors that of Eq. (8) and what machines usually
     are.
     """

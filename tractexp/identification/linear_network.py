@@ -31,7 +31,7 @@ CRITERION = "the Bayesian information criterion"
 
 
 @dataclass(frozen=True, eq=False)
-class LinearNetwork:
+class PoleNetwork:
     """A linear network.
 
     Attributes
@@ -77,7 +77,7 @@ class BlackBox:
     """
 
     domain: Domain
-    networks: tuple[LinearNetwork, ...]
+    networks: tuple[PoleNetwork, ...]
     turns: float  # Hz, of the frame
     chosen_by: str = ""
 
@@ -150,7 +150,7 @@ def choose_network(boxes: Sequence[BlackBox], train: Sequence[Event]) -> BlackBo
     return replace(boxes[int(np.argmin(by))], chosen_by=CRITERION)
 
 
-def fit_networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
+def fit_networks(ports: Sequence[Port], most: int) -> list[PoleNetwork]:
     """The best networks of no pole, of one, and so on.
 
     They depend on the records alone, so that the store keeps them for the next model of these.
@@ -173,23 +173,23 @@ def fit_networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
     parts = store.DESCENTS.arrays(
         store.key(store.describe_environment(), "networks", ports, most), compute
     )
-    return [LinearNetwork(*pair) for pair in zip(parts[::2], parts[1::2], strict=True)]
+    return [PoleNetwork(*pair) for pair in zip(parts[::2], parts[1::2], strict=True)]
 
 
-def _fit(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
+def _fit(ports: Sequence[Port], most: int) -> list[PoleNetwork]:
     """The networks of `fit_networks`, each from the poles of the one before."""
     fit = Projection.from_ports(ports)
-    fits = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none)[0])]
+    fits = [PoleNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none)[0])]
     while len(fits) <= most and _count_samples(ports) >= SAMPLES * count_unknowns(
         len(fits), ports[0]
     ):
         poles = fit.optimum(np.append(fits[-1].poles, fit.start(fits[-1].poles)))
-        fits.append(LinearNetwork(poles, fit.linear_part(poles)[0]))
+        fits.append(PoleNetwork(poles, fit.linear_part(poles)[0]))
     return fits
 
 
 def compute_information_criterion(
-    networks: Sequence[LinearNetwork], ports: Sequence[Port]
+    networks: Sequence[PoleNetwork], ports: Sequence[Port]
 ) -> np.ndarray:
     """The Bayesian information criterion of networks.
 

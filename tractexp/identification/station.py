@@ -40,7 +40,7 @@ SMALLEST_SQUARE = 1e-30  # of what tells nothing
 
 
 @dataclass(frozen=True, eq=False)
-class Dip:
+class StationDip:
     """One dip of a load, per unit of what the load drew before it, and when it was."""
 
     event: Event
@@ -84,7 +84,7 @@ class SharedFit:
 
     problem: SizedProblem
     values: np.ndarray
-    dips: Sequence[Dip]
+    dips: Sequence[StationDip]
     torques: np.ndarray
     errors: np.ndarray
     fits: Sequence[Fit]
@@ -134,7 +134,9 @@ def spell_parameters(problem: SizedProblem, constants: np.ndarray, torque: float
     return problem.full(values)[0]
 
 
-def fit_dips(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None = None) -> SharedFit:
+def fit_dips(
+    spec: LoadSpec, dips: Sequence[StationDip], start: np.ndarray | None = None
+) -> SharedFit:
     """The fit to all dips, odd ones left out; `start` are constants (k,) to begin at.
 
     Raises `UserError` where nothing in the bounds can be simulated.
@@ -151,7 +153,7 @@ def fit_dips(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None = Non
 
 
 def _fit_regular(
-    spec: LoadSpec, dips: Sequence[Dip], odd: Collection[int], start: np.ndarray | None
+    spec: LoadSpec, dips: Sequence[StationDip], odd: Collection[int], start: np.ndarray | None
 ) -> SharedFit:
     """Constants fitted to the dips that are not odd, and the torques of all."""
     regular = [dip for k, dip in enumerate(dips) if k not in odd]
@@ -159,7 +161,9 @@ def _fit_regular(
     return _fit_torques(spec, dips, _fit_constants(spec, told, start))
 
 
-def _fit_constants(spec: LoadSpec, dips: Sequence[Dip], start: np.ndarray | None) -> np.ndarray:
+def _fit_constants(
+    spec: LoadSpec, dips: Sequence[StationDip], start: np.ndarray | None
+) -> np.ndarray:
     """The constants (k,) that dips share; without a start those are searched that tell most."""
     if start is None:
         first = sorted(dips, key=lambda dip: -dip.promise)[:MOST_BEGUN]
@@ -207,7 +211,7 @@ def _place(problem: SizedProblem, constants: np.ndarray) -> tuple[Likelihood, np
     return Likelihood.of_objective(problem, objective / problem.drive.samples), unit
 
 
-def _fit_torques(spec: LoadSpec, dips: Sequence[Dip], constants: np.ndarray) -> SharedFit:
+def _fit_torques(spec: LoadSpec, dips: Sequence[StationDip], constants: np.ndarray) -> SharedFit:
     """The torque of each of the dips with the constants (k,) held, as many at once as constants
     are fitted to.
     """
@@ -225,7 +229,9 @@ def _fit_torques(spec: LoadSpec, dips: Sequence[Dip], constants: np.ndarray) -> 
     )
 
 
-def _fit_some_torques(spec: LoadSpec, dips: Sequence[Dip], constants: np.ndarray) -> SharedFit:
+def _fit_some_torques(
+    spec: LoadSpec, dips: Sequence[StationDip], constants: np.ndarray
+) -> SharedFit:
     """The same of dips that are fitted at once."""
     problem = spec.pose([dip.event for dip in dips])
     likelihood, unit = _place(problem, constants)
@@ -329,7 +335,9 @@ class Predicted:
     fit: Fit | None
 
 
-def predict_in_turn(spec: LoadSpec, dips: Sequence[Dip], odd: Mapping[int, str]) -> list[Predicted]:
+def predict_in_turn(
+    spec: LoadSpec, dips: Sequence[StationDip], odd: Mapping[int, str]
+) -> list[Predicted]:
     """Each dip, in order of time, but for the first, by a model of dips before it.
 
     Constants are fitted again whenever there are half as many dips more: so the whole costs some
@@ -352,7 +360,7 @@ def predict_in_turn(spec: LoadSpec, dips: Sequence[Dip], odd: Mapping[int, str])
     return predicted
 
 
-def _predict(fit: SharedFit, composition: Composition, dip: Dip, position: int) -> Predicted:
+def _predict(fit: SharedFit, composition: Composition, dip: StationDip, position: int) -> Predicted:
     """A dip by the constants of a fit and the share that is expected at its time."""
     (share,), _ = composition.predict([dip.when])
     at = fit.problem.shares[0]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.cache import provenance
-from tractexp.identification.adequacy import Adequacy, Grade, Surprise, grade_errors
+from tractexp.identification.adequacy import Adequacy, Grade, ResidualTest, grade_errors
 from tractexp.identification.conclude import describe_active_bounds, list_at_bound
 from tractexp.identification.fit import Fit, tabulate_model_errors
 from tractexp.identification.result import Result
@@ -19,7 +19,7 @@ from tractexp.inference.model_error import compute_model_error, compute_relative
 from tractexp.record import OwnBase
 from tractexp.record.identity import Identity
 
-NOT_JUDGED = Surprise(None, "", None, "")  # of noise nothing is said
+NOT_JUDGED = ResidualTest(None, "", None, "")  # of noise nothing is said
 
 
 def build_result(

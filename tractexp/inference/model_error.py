@@ -81,7 +81,7 @@ class ModelError:
 
 
 @dataclass(frozen=True)
-class Misfit:
+class ModelMisfit:
     """How far a model is off some events.
 
     Attributes
@@ -100,18 +100,18 @@ class Misfit:
     epsilon_i: float | None
 
     @classmethod
-    def from_played(cls, played: Sequence[Playback]) -> "Misfit":
+    def from_played(cls, played: Sequence[Playback]) -> "ModelMisfit":
         """The misfit of some events together."""
         currents = [one.epsilon_i**2 for one in played if one.epsilon_i is not None]
         of_currents = float(np.sqrt(np.mean(currents))) if currents else None
         return cls(compute_model_error(played), *compute_relative_errors(played), of_currents)
 
 
-M = TypeVar("M", bound=Misfit)
+M = TypeVar("M", bound=ModelMisfit)
 
 
 @dataclass(frozen=True, eq=False)
-class Change(Generic[M]):
+class ModelChange(Generic[M]):
     """What two models leave of the same events."""
 
     before: M

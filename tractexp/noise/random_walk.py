@@ -190,7 +190,7 @@ class RandomWalk:
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class EventRest:
     """What a fit leaves of an event, and what could still explain it.
 
     Attributes
@@ -212,7 +212,7 @@ def find(
     before: Sequence[np.ndarray],
     step: float,
     load: Load,
-    rests: Sequence[Rest] = (),
+    rests: Sequence[EventRest] = (),
 ) -> RandomWalk | None:
     """The wandering of two channels before some events.
 
@@ -298,7 +298,7 @@ def walk_of_load(
     if left is not None and columns is not None and valid.all():
         mixed = np.einsum("ij,kjt->kit", mix, columns)
         rests = [
-            Rest(mix @ left[:, part], mixed[:, :, part], load.apparent[part]) for part in parts
+            EventRest(mix @ left[:, part], mixed[:, :, part], load.apparent[part]) for part in parts
         ]
     stretches = [mix @ b for b in before if np.isfinite(b).all()]
     return find(stretches, events[0].record.step, load, rests)
@@ -372,7 +372,7 @@ def _likelihood(stretches: Sequence[np.ndarray], fast: Autoregression, step: flo
     return total
 
 
-def _within(rest: Rest, channel: int, fast: Autoregression, step: float) -> np.ndarray:
+def _within(rest: EventRest, channel: int, fast: Autoregression, step: float) -> np.ndarray:
     """The logarithm of the likelihood of each intensity of the grid in what is left of one event,
     without what its columns explain.
     """

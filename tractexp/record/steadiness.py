@@ -121,7 +121,7 @@ def _list_last_parts(part: slice, least: int) -> Iterator[slice]:
             yield late
 
 
-def _rests(record: Record, late: slice, course: "Course") -> bool:
+def _rests(record: Record, late: slice, course: "UnsteadyCourse") -> bool:
     """Whether a load moves so much less in a late part of its course that it has come to rest
     there.
     """
@@ -129,7 +129,7 @@ def _rests(record: Record, late: slice, course: "Course") -> bool:
     return rest is not None and rest.span / rest.samples < REST * course.span / course.samples
 
 
-def _follow_course(record: Record, part: slice, at_all: bool = False) -> "Course | None":
+def _follow_course(record: Record, part: slice, at_all: bool = False) -> "UnsteadyCourse | None":
     """How the load moves in samples before a dip, without those that may show the dip early."""
     cycle = smear(record)
     part = slice(part.start, max(part.start, part.stop - round(EARLY[0] * cycle)))
@@ -137,7 +137,7 @@ def _follow_course(record: Record, part: slice, at_all: bool = False) -> "Course
 
 
 @dataclass(frozen=True)
-class Course:
+class UnsteadyCourse:
     """How a load moves that is not steady."""
 
     name: str  # P or Q, whichever moves more
@@ -159,7 +159,9 @@ class Course:
         )
 
 
-def course_of(P: np.ndarray, Q: np.ndarray, cycle: float, at_all: bool = False) -> Course | None:
+def course_of(
+    P: np.ndarray, Q: np.ndarray, cycle: float, at_all: bool = False
+) -> UnsteadyCourse | None:
     """How a load moves whose P and Q (N,), without steps, leave their mean by more than noise does;
     None at rest.
 
@@ -184,7 +186,7 @@ def course_of(P: np.ndarray, Q: np.ndarray, cycle: float, at_all: bool = False) 
         if course[-1] > course[0]
         else "falls"
     )
-    return Course(name, change, span, size, len(course))
+    return UnsteadyCourse(name, change, span, size, len(course))
 
 
 def _turns(x: np.ndarray, least: float) -> bool:

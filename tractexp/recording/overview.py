@@ -27,7 +27,7 @@ from tractexp.recording.recording import Recording, Segment
 from tractexp.recording.sight import Sight
 from tractexp.recording.snapshot import network_frequency
 from tractexp.recording.trace import Trace, join_traces, trace_waves
-from tractexp.recording.type_test import Course, TypeTest, find_type_test
+from tractexp.recording.type_test import MotorCourse, TypeTest, find_type_test
 from tractexp.recording.unit import check_doubt, is_secondary, is_unit_in_doubt
 
 TOO_SHORT = "fewer than four half cycles are measured: too few to tell what happened"
@@ -309,7 +309,7 @@ def describe_load(
 
 def _find_type_test(phasors: Sequence[Phasors], nominal: float) -> TypeTest | None:
     """The first type test that a stretch of a load shows."""
-    courses = (Course.from_phasors(each, nominal) for each in phasors if len(each.V) == 3)
+    courses = (MotorCourse.from_phasors(each, nominal) for each in phasors if len(each.V) == 3)
     found = (find_type_test(each, nominal) for each in courses)
     return next((each for each in found if each is not None), None)
 
@@ -355,7 +355,7 @@ def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
     )
     if dips is None:
         numbered = [replace(each, dip=None) for each in numbered]
-    course = Course.from_record(record)
+    course = MotorCourse.from_record(record)
     tested = course and find_type_test(course, record.base.frequency)
     return Sight(record.name, tuple(numbered), record=record, type_test=tested)
 

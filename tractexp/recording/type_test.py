@@ -126,7 +126,7 @@ class FailedStart(TypeTest):
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class MotorCourse:
     """A motor over time: t (N,) [s], voltage U and its negative sequence U2 [kV, line to line],
     currents I and I2 [kA] of one phase, power S [MVA], complex, frequency f [Hz], followed down to
     `slowest` of the nominal one; `U2` and `I2` are None where a record has not both.
@@ -142,7 +142,7 @@ class Course:
     slowest: float = SLOWEST
 
     @classmethod
-    def from_phasors(cls, phasors: Phasors, nominal: float) -> "Course":
+    def from_phasors(cls, phasors: Phasors, nominal: float) -> "MotorCourse":
         """The course of phasors of three phases.
 
         A mean over one cycle of a frequency that is tracked no further lessens the voltage of a
@@ -163,7 +163,7 @@ class Course:
         )
 
     @classmethod
-    def from_record(cls, record: Record) -> "Course | None":
+    def from_record(cls, record: Record) -> "MotorCourse | None":
         """The course of a record in kV, kA and MVA; None if the record does not say how many kV and
         MVA its per unit is, if no frequency was recorded, or if U, P or Q is missing or U is not
         positive somewhere.
@@ -184,7 +184,7 @@ class Course:
         )
 
 
-def find_type_test(course: Course, nominal: float) -> TypeTest | None:
+def find_type_test(course: MotorCourse, nominal: float) -> TypeTest | None:
     """The type test that a motor's course shows; None where it shows none, or where it is not known
     what it draws running.
     """
@@ -213,7 +213,7 @@ def find_type_test(course: Course, nominal: float) -> TypeTest | None:
 class _Report:
     """The course of one motor, where its breaker is closed, and where that changes."""
 
-    def __init__(self, course: Course, nominal: float):
+    def __init__(self, course: MotorCourse, nominal: float):
         self.course = course
         self.nominal = nominal
         step = float(course.t[1] - course.t[0])

@@ -28,7 +28,7 @@ from tractexp.identification.grade import GradedModel
 from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit, refit
-from tractexp.inference.model_error import Change
+from tractexp.inference.model_error import ModelChange
 from tractexp.noise import Noise
 from tractexp.record import Event
 
@@ -124,7 +124,7 @@ def _assess_models(
 
 def measure_changes(
     result: TermFits, fit: Refit, events: Sequence[Event], graded: GradedModel
-) -> tuple[Change[Curves], Change[Curves]]:
+) -> tuple[ModelChange[Curves], ModelChange[Curves]]:
     """What the base model, as it is graded, and that with a term leave of the fitted and of
     held-out events, the latter fitted by least squares.
 
@@ -142,7 +142,7 @@ def measure_changes(
     (best,) = refit(context, noise, [(fit.names, found), (fit.names, nested)], faults=())
     there = context.move_to_events(events)
     fitted, held_out = (
-        Change(
+        ModelChange(
             *(
                 compute_curves(seen, seen.coordinates.at_measured_power(one.unit), noise, one.names)
                 for one in (base, best)

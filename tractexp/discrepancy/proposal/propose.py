@@ -26,7 +26,7 @@ from tractexp.identification.grade import GradedModel
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
-from tractexp.inference.model_error import Change
+from tractexp.inference.model_error import ModelChange
 from tractexp.noise import Noise
 from tractexp.noise.span import project_out
 from tractexp.record import Event
@@ -44,7 +44,7 @@ class Proposal:
     estimates: tuple[ParameterEstimate, ...]
     judged: TermAssessment
     # what it leaves of the fitted and of the held-out events by least squares
-    changes: tuple[Change[Curves], Change[Curves]]
+    changes: tuple[ModelChange[Curves], ModelChange[Curves]]
     # when it acts, a row an event: between which times of the record [s] it changes the load, in
     # which channel the most, and by how much [pu]
     acting: tuple[dict[str, Any], ...]

@@ -46,7 +46,7 @@ INGREDIENTS = {  # as the optimizers without it are called: the switch, and what
 
 
 @dataclass(frozen=True)
-class Reading:
+class PrintedReading:
     """An optimizer with what the text leaves open settled; a `literal` one searches the model that
     Eq. (4) integrates as it is printed.
     """
@@ -66,33 +66,33 @@ LETTER = {"space": "raw", "step": "scalar", "acceptance": "all"}
 
 # By the names that the optimizers have in conf/optimizer. The first three are what Tables 2 to 5
 # show.
-READINGS: dict[str, Reading] = {
-    "issa": Reading("issa", "SD = 20 of 50 (4.3)"),
-    "ssa": Reading("ssa", "SD = 20 of 50 (4.3)"),
-    "pso": Reading("pso", "no velocity limit"),
-    "issa_10_perceivers": Reading("issa", "10 perceivers (4.2)", {"perceivers": 0.2}),
-    "ssa_10_perceivers": Reading("ssa", "10 perceivers (4.2)", {"perceivers": 0.2}),
-    "pso_limited": Reading("pso", "velocity limit 0.2", {"velocity_limit": 0.2}),
-    "issa_to_the_letter": Reading(
+READINGS: dict[str, PrintedReading] = {
+    "issa": PrintedReading("issa", "SD = 20 of 50 (4.3)"),
+    "ssa": PrintedReading("ssa", "SD = 20 of 50 (4.3)"),
+    "pso": PrintedReading("pso", "no velocity limit"),
+    "issa_10_perceivers": PrintedReading("issa", "10 perceivers (4.2)", {"perceivers": 0.2}),
+    "ssa_10_perceivers": PrintedReading("ssa", "10 perceivers (4.2)", {"perceivers": 0.2}),
+    "pso_limited": PrintedReading("pso", "velocity limit 0.2", {"velocity_limit": 0.2}),
+    "issa_to_the_letter": PrintedReading(
         "issa", "to the letter", LETTER | {"levy_formula": "printed"}, literal=True
     ),
-    "ssa_to_the_letter": Reading("ssa", "to the letter", LETTER, literal=True),
-    "pso_to_the_letter": Reading("pso", "to the letter", literal=True),
-    "issa_raw": Reading("issa", "raw units", {"space": "raw"}),
-    "ssa_raw": Reading("ssa", "raw units", {"space": "raw"}),
-    "issa_raw_scalar": Reading(
+    "ssa_to_the_letter": PrintedReading("ssa", "to the letter", LETTER, literal=True),
+    "pso_to_the_letter": PrintedReading("pso", "to the letter", literal=True),
+    "issa_raw": PrintedReading("issa", "raw units", {"space": "raw"}),
+    "ssa_raw": PrintedReading("ssa", "raw units", {"space": "raw"}),
+    "issa_raw_scalar": PrintedReading(
         "issa", "raw units, one scalar for A⁺L", {"space": "raw", "step": "scalar"}
     ),
-    "ssa_raw_scalar": Reading(
+    "ssa_raw_scalar": PrintedReading(
         "ssa", "raw units, one scalar for A⁺L", {"space": "raw", "step": "scalar"}
     ),
-    "issa_by_stage": Reading("issa", "perturbation by stage (3.2.3)", {"schedule": "stage"}),
-    "issa_printed_levy": Reading("issa", "Eq. (15) as printed", {"levy_formula": "printed"}),
+    "issa_by_stage": PrintedReading("issa", "perturbation by stage (3.2.3)", {"schedule": "stage"}),
+    "issa_printed_levy": PrintedReading("issa", "Eq. (15) as printed", {"levy_formula": "printed"}),
     **{
-        f"issa_no_{name}": Reading("issa", f"without {label}", {switch: False})
+        f"issa_no_{name}": PrintedReading("issa", f"without {label}", {switch: False})
         for name, (switch, label) in INGREDIENTS.items()
     },
-    "random_search": Reading("random_search", "the best of random points"),
+    "random_search": PrintedReading("random_search", "the best of random points"),
 }
 
 
