@@ -19,10 +19,10 @@ STEP, RISE = 5e-5, 0.6  # s: of DPsim, and in which the voltage rises before the
 THREE = np.eye(3)
 TURN = np.exp(-2j * np.pi / 3 * np.arange(3))  # from a space vector to its phases
 KINDS = {  # what a load has beside a machine, by the names of the catalogue
-    "resistance and inductance": (),
+    "resistance and inductance": ("inductive_static_load",),
     "saturable core": ("transformer_inrush",),
 }
-OUTSIDE = ("resistance and inductance",)  # whose current has an offset that no effect has
+OUTSIDE = ()
 NUMBERS = itertools.count()  # DPsim tells simulations of a process apart by their names
 
 

@@ -517,6 +517,34 @@ def test_recovery_is_the_lag_of_karlsson_and_hill():
     assert x.max() > 0.02
 
 
+def test_an_inductive_load_is_a_resistance_and_an_inductance_in_series():
+    """The circuit's balance in the frame of a voltage whose frequency sags in the dip."""
+    excitation, share, T = dip(sag=-2.0), 0.5, 0.004
+    X_over_R = OMEGA_N * T
+    R = 1 / (share * (P0 - T_M) * (1 + X_over_R**2))
+    t = np.arange(len(excitation.U)) * excitation.step
+    U = Akima1DInterpolator(t, excitation.U, method="makima")
+
+    def balance(now, i):
+        omega_s = np.interp(now, t, excitation.omega_s)
+        return (U(now) - R * i) / (R * T) - 1j * (OMEGA_N + omega_s) * i
+
+    settings = {"rtol": 1e-11, "atol": 1e-13, "max_step": excitation.step}
+    begun = [1 / (R * (1 + 1j * X_over_R))]
+    (i,) = solve_ivp(balance, (0, t[-1]), begun, "DOP853", t, **settings).y
+    late = excitation.U * np.conj(i) - excitation.U**2 / (R * (1 - 1j * X_over_R))
+
+    chosen = values("inductive_static_load", inductive_share=share, inductive_time=T)
+    none = values("inductive_static_load")
+    chosen[5] = none[5] = 2.0  # the exponent of P
+    (P, Q), (P_none, Q_none) = (
+        run("inductive_static_load", excitation, x, substeps=64) for x in (chosen, none)
+    )
+    assert pytest.approx(late.real, abs=1e-9) == P - P_none
+    assert pytest.approx(late.imag, abs=1e-9) == Q - Q_none
+    assert np.abs(late).max() > 0.01
+
+
 def test_oscillation_is_a_damped_mode_rung_by_the_voltage():
     excitation, f, zeta, phi = dip(), 4.0, 0.05, 0.7
     chosen = values(
