@@ -1,5 +1,5 @@
 """Loads of simulators that nobody here wrote, as judges of names: python benchmarks/strangers.py
-[--count 60] [--minutes 9] [--simulator DPsim] [--docs]
+[--count 60] [--minutes 9] [--simulator DPsim] [--again wrong] [--docs]
 
 Loads of motulator, ANDES, DPsim and HERMESS (`strangers_motulator`, `andes_loads`,
 `strangers_dpsim`, `strangers_hermess`) in turn, three dips each of which the last is held out, with
@@ -8,7 +8,8 @@ known. What is said of it is *right* where every effect named is there, a *class
 for one of the sets that are tied, *silent* where nothing is named though something is missing.
 Where nothing is missing to say nothing is *rightly silent*, and to say that something is, without a
 name, *doubted*. All else is *wrong*. Rows are appended to strangers.jsonl, so that a run
-goes on where it stopped. The seeds are of the series `SERIES`, none left out.
+goes on where it stopped; `--again` judges what another version gave an outcome, and replaces its
+row. The seeds are of the series `SERIES`, none left out.
 """
 
 import argparse
@@ -227,11 +228,23 @@ def read_rows(stored: Path = STORED) -> list[dict[str, Any]]:
     return [json.loads(line) for line in stored.read_text(encoding="utf-8").splitlines()]
 
 
+def store(row: dict[str, Any], rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """All rows, this one in the place of an earlier one of its load, and the file of them."""
+    load = (row["number"], row["simulator"])
+    places = {(one["number"], one["simulator"]): k for k, one in enumerate(rows)}
+    k = places.get(load, len(rows))
+    every = [*rows[:k], row, *rows[k + 1 :]]
+    text = "".join(json.dumps(one) + "\n" for one in every)
+    STORED.write_text(text, encoding="utf-8")
+    return every
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--minutes", type=float, default=1e9, help="begin no further set after")
     parser.add_argument("--simulator", choices=SIMULATORS, help="default: all in turn")
+    parser.add_argument("--again", choices=OUTCOMES, nargs="*", default=[])
     parser.add_argument(
         "--docs", action="store_true", help="write the stored rows into the page, and stop"
     )
@@ -240,16 +253,18 @@ def main() -> None:
     if asked.docs:
         marked.replace(PAGE, MARK, make_tables(rows))
     else:
-        done = {(row["number"], row["simulator"]) for row in rows}
+        version = find_version()
+        rejudged = [
+            row for row in rows if row.get("outcome") in asked.again and row["version"] != version
+        ]
+        done = {(row["number"], row["simulator"]) for row in rows if row not in rejudged}
         end = time.monotonic() + 60 * asked.minutes
         for number, simulator in itertools.islice(make_strangers(), asked.count):
             is_asked = asked.simulator in (None, simulator)
             if not is_asked or (number, simulator) in done or time.monotonic() > end:
                 continue
             row = judge_stranger(number, simulator)
-            rows.append(row)
-            with STORED.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+            rows = store(row, rows)
             told = row.get("refused") or f"{row['outcome']}: {row['verdict']} {row['sets']}"
             print(f"{number} {simulator}, {row.get('kind')}: {told}", flush=True)
     print(make_tables(rows))
