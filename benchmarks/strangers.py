@@ -255,7 +255,9 @@ def main() -> None:
     else:
         version = find_version()
         rejudged = [
-            row for row in rows if row.get("outcome") in asked.again and row["version"] != version
+            row
+            for row in rows
+            if row.get("outcome") in asked.again and row.get("version") != version
         ]
         done = {(row["number"], row["simulator"]) for row in rows if row not in rejudged}
         end = time.monotonic() + 60 * asked.minutes
