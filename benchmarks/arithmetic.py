@@ -59,7 +59,7 @@ class Limit:
 def limit(text: str, substeps: int, rounds: int) -> Limit:
     """Of a kernel by its IR."""
     width = Room.from_text(text).width
-    sample, step = counts(objects.assembly(text), Room.from_text(text).outputs)
+    sample, step = counts(objects.write_assembly(text), Room.from_text(text).outputs)
     mix = (
         step.multiplications * substeps + sample.multiplications,
         step.others * substeps + sample.others,

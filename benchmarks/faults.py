@@ -123,7 +123,7 @@ def command(folder: Path, *arguments: str) -> int:
         def log(self, run):
             return tracking.log(run, self.uri)
 
-    process.start_ahead, process.logger = lambda: None, Here
+    process.start_ahead, process.open_logger = lambda: None, Here
     os.chdir(folder)
     sys.argv = ["tractexp", *arguments]
     return main()
@@ -329,14 +329,14 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
     from tractexp.tracking.runfile import save
 
     def opens() -> None:
-        tracking.open_store(tracking.default_uri(empty))
+        tracking.open_store(tracking.find_default_uri(empty))
 
     empty = made(work / "empty")
     forked(opens)
 
     def logs(folder: Path, n: int | None) -> Callable[[], None]:
         def act() -> None:
-            uri = tracking.default_uri(folder)
+            uri = tracking.find_default_uri(folder)
             (folder / "result.json").write_text("{}")
             child = TrackedRun("e", "child", metrics={"x": 1.0})
             steps = list(range(1, 400))
@@ -850,10 +850,10 @@ PARTS = {
 def ready() -> None:
     """Import and compile what forked processes then have at hand."""
     import tractexp.__main__
-    from tractexp.tracking.store import import_mlflow, light_import
+    from tractexp.tracking.store import import_lightly, import_mlflow
 
     import_mlflow(sql=True)
-    with light_import():
+    with import_lightly():
         import mlflow.pyfunc  # noqa: F401
     import hydra  # noqa: F401
     import plotly.graph_objects  # noqa: F401

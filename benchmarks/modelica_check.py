@@ -18,7 +18,7 @@ from andes_check import EXPORTS, FREQUENCY, STATICS, result
 
 from tractexp.configuration.plugin import build
 from tractexp.exchange.format import Identified, Simulated
-from tractexp.exchange.playback import DEPTH, EDGE, FALL, LENGTH, RISE, STEP, dip, response
+from tractexp.exchange.playback import DEPTH, EDGE, FALL, LENGTH, RISE, STEP, dip, play_load
 
 ROWS = Path(__file__).with_suffix(".json")
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "export.md"
@@ -59,7 +59,7 @@ def compare(python: str, load: Identified) -> dict[str, float]:
         raise SystemExit(done.stderr.strip().splitlines()[-1])
     theirs = json.loads(done.stdout)
     along = Simulated("modelica", STEP, U, np.zeros_like(U), U, U)
-    ours = response(load, along, before["P0"], before["Q0"])
+    ours = play_load(load, along, before["P0"], before["Q0"])
     row = {}
     for power, own in zip("PQ", ours, strict=True):
         row |= {

@@ -37,8 +37,8 @@ from memory import peak, reset  # noqa: E402
 
 from tractexp.errors import UserError  # noqa: E402
 from tractexp.filetypes import comtrade  # noqa: E402
-from tractexp.filetypes.cev_text import checksum  # noqa: E402
-from tractexp.record import reader_of  # noqa: E402
+from tractexp.filetypes.cev_text import compute_checksum  # noqa: E402
+from tractexp.record import find_reader  # noqa: E402
 from tractexp.recording import Channel, Recording, Segment, StatusChannel  # noqa: E402
 from tractexp.storage import files  # noqa: E402
 
@@ -150,7 +150,7 @@ def event_report(made, every=1):
 
     def row(*cells):
         text = "".join(f"{cell}," for cell in cells)
-        return f'{text}"{checksum(text)}"'
+        return f'{text}"{compute_checksum(text)}"'
 
     lines = [
         row('"FID"'),
@@ -310,7 +310,7 @@ def originals(folder):
         try:
             import polars
 
-            reader_of(f"table{ending}")
+            find_reader(f"table{ending}")
             getattr(polars.DataFrame(columns), write)(folder / f"table{ending}")
             formats[f"table {ending}"] = [folder / f"table{ending}"]
         except (ImportError, UserError):

@@ -147,7 +147,10 @@ def restarted(
     spent, seconds, best = 0, 0.0, None
     while spent < budget and (best is None or best.objective > target):
         found: SearchResult = search(
-            problem, optimizer, bbob.seed_of(*seeds, spent), Limits(budget - spent, target=target)
+            problem,
+            optimizer,
+            bbob.compute_seed(*seeds, spent),
+            Limits(budget - spent, target=target),
         )
         spent, seconds = spent + found.simulations, seconds + found.seconds
         if best is None or found.objective < best.objective:

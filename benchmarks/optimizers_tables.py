@@ -9,7 +9,13 @@ from typing import Any
 import marked
 import numpy as np
 
-from tractexp.studies.comparison.statistics import Ranks, friedman, holm, vargha_delaney, wilcoxon
+from tractexp.studies.comparison.statistics import (
+    Ranks,
+    compute_vargha_delaney,
+    correct_by_holm,
+    rank_by_friedman,
+    run_wilcoxon_test,
+)
 
 DOCS = Path(__file__).resolve().parents[1] / "docs" / "optimizers.md"
 MAKER = "benchmarks/optimizers.py"
@@ -61,7 +67,7 @@ class Kind:
     def ranks(self, budget: int) -> Ranks:
         """Mean ranks over the problems."""
         names = self.at(budget)
-        return friedman(names, np.column_stack([self.medians(o, budget) for o in names]))
+        return rank_by_friedman(names, np.column_stack([self.medians(o, budget) for o in names]))
 
     def rank(self, optimizer: str, budget: int) -> float:
         ranks = self.ranks(budget)
@@ -72,13 +78,19 @@ class Kind:
         with Holm.
         """
         others = [o for o in self.at(budget) if o != REFERENCE]
-        p = holm(
-            [wilcoxon(self.medians(o, budget), self.medians(REFERENCE, budget))[0] for o in others]
+        p = correct_by_holm(
+            [
+                run_wilcoxon_test(self.medians(o, budget), self.medians(REFERENCE, budget))[0]
+                for o in others
+            ]
         )
         base = self.excess(REFERENCE, budget)
         effects = [
             np.mean(
-                [vargha_delaney(a, b) for a, b in zip(self.excess(o, budget), base, strict=True)]
+                [
+                    compute_vargha_delaney(a, b)
+                    for a, b in zip(self.excess(o, budget), base, strict=True)
+                ]
             )
             for o in others
         ]

@@ -14,7 +14,7 @@ def processor() -> str:
     machine code.
     """
     version = ".".join(map(str, llvm.llvm_version_info))
-    name, features = target.processor()
+    name, features = target.describe_processor()
     bits = next(
         (wide for feature, wide in BITS.items() if f"+{feature}" in features.split(",")), 128
     )

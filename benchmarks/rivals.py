@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from tractexp.model.drive import Excitation, slopes
+from tractexp.model.drive import Excitation, compute_slopes
 
 FAST = {"contract", "reassoc", "arcp", "nsz"}  # as the kernel
 fast = njit(cache=True, fastmath=FAST, error_model="numpy")
@@ -104,7 +104,11 @@ class Record:
 
     def __init__(self, e: Excitation):
         self.U, self.P, self.Q, self.h = e.U, e.P, e.Q, e.step
-        self.log_U, self.rise, self.t = np.log(e.U), slopes(e.U), np.arange(len(e.U)) * e.step
+        self.log_U, self.rise, self.t = (
+            np.log(e.U),
+            compute_slopes(e.U),
+            np.arange(len(e.U)) * e.step,
+        )
         self.middle = (e.U[:-1] + e.U[1:]) / 2 - np.diff(self.rise) / 8  # on the cubic
 
     def states(self, p: np.ndarray, method: str, rtol: float, **settings) -> np.ndarray:

@@ -30,7 +30,7 @@ from tractexp.tracking import store
 from tractexp.tracking.process import Logger
 lap("import_tractexp")
 folder, compute = Path(sys.argv[1]), float(sys.argv[2])
-uri = tracking.default_uri(folder)
+uri = tracking.find_default_uri(folder)
 if compute:
     logger = Logger(uri)
     end = time.process_time() + compute

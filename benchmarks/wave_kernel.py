@@ -25,7 +25,7 @@ import wave_records as waves
 from simulation import excitation
 
 from tractexp.configuration.plugin import get
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.identification.search import search
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive
@@ -60,7 +60,7 @@ def kernels(rounds: int) -> list[dict]:
         get("model/motor", "electromechanical")(), get("model/static", "exponential")()
     )
     prepared = []
-    for load, driving in ((phasors, excitation()), (model(), domain_of(event).excitation(event))):
+    for load, driving in ((phasors, excitation()), (model(), find_domain(event).excitation(event))):
         values = np.array([p.default for p in load.parameters]) * rng.uniform(
             0.97, 1.03, (CANDIDATES, len(load.names))
         )

@@ -89,7 +89,7 @@ def as_it_was(environment):
         HydraConfig.instance().cfg = None
         run_command.remember_command([])
         run_command._started.clear()
-        identity._file.cache_clear()
+        identity._read_file.cache_clear()
         signal.signal(signal.SIGTERM, handler)
         root.handlers[:], root.level = handlers, level
         gc.unfreeze()

@@ -172,7 +172,7 @@ def empty_store(tmp_path_factory) -> Path:
         if side_by_side
         else tmp_path_factory.mktemp("store")
     )
-    tracking.open_store(tracking.default_uri(folder))
+    tracking.open_store(tracking.find_default_uri(folder))
     return folder / "outputs" / "mlflow.db"
 
 
@@ -183,4 +183,4 @@ def uri(tmp_path, empty_store) -> str:
 
     (tmp_path / "outputs").mkdir()
     shutil.copy(empty_store, tmp_path / "outputs" / "mlflow.db")
-    return tracking.default_uri(tmp_path)
+    return tracking.find_default_uri(tmp_path)

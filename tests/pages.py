@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from tractexp.blocks.chart_script import script
+from tractexp.blocks.chart_script import build_script
 
 VOID = {"meta", "br", "img", "path", "use", "rect", "line"}
 
@@ -51,7 +51,7 @@ class Reader(html.parser.HTMLParser):
 def read(path) -> Reader:
     """A page read back, after checking that it is valid and self-contained."""
     # our own, the only one
-    text = path.read_text(encoding="utf-8").replace(f"<script>{script()}</script>", "")
+    text = path.read_text(encoding="utf-8").replace(f"<script>{build_script()}</script>", "")
     # what charts draw: data, no program
     text = re.sub(r'<script type="application/json">[^<]*</script>', "", text)
     reader = Reader(text)

@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if argv is None else [*argv]
     gc.set_threshold(*SELDOM)
     try:
-        with open_outlet() as out, interpreter.safe_path():
+        with open_outlet() as out, interpreter.keep_safe_path():
             code = _run_with_refusals(arguments)
         if out and out.lost:
             return _print_refusal(
@@ -164,9 +164,9 @@ def _is_file(argument: str) -> bool:
         return False
     if os.path.isfile(argument):
         return True
-    from tractexp.record.reader import endings
+    from tractexp.record.reader import list_endings
 
-    return os.path.splitext(argument)[1].lower() in endings()
+    return os.path.splitext(argument)[1].lower() in list_endings()
 
 
 def end_on_signal(*_: object) -> None:
@@ -185,7 +185,7 @@ def _run(arguments: list[str]) -> int:
         start_ahead()
     import hydra
 
-    from tractexp.compat.hydra_versions import behavior
+    from tractexp.compat.hydra_versions import choose_behavior
     from tractexp.configuration.choices import CONF
     from tractexp.configuration.overrides import quote_overrides
     from tractexp.configuration.refusal import explain_errors
@@ -199,7 +199,7 @@ def _run(arguments: list[str]) -> int:
         sys.argv[1:] = quote_overrides(arguments)  # where Hydra reads them
     ended: list[Exception] = []
 
-    @hydra.main(**behavior(), config_path=str(CONF), config_name="config")
+    @hydra.main(**choose_behavior(), config_path=str(CONF), config_name="config")
     def job(config: object) -> object:
         from hydra.core.hydra_config import HydraConfig
         from hydra.types import RunMode

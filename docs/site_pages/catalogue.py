@@ -10,7 +10,7 @@ from site_pages.markdown import folded, plain, table
 from tractexp.configuration.choices import read_default_choices, take_first_sentence
 from tractexp.configuration.plugin import Plugin, discover
 from tractexp.model import sites
-from tractexp.model.declaration import motor_alone
+from tractexp.model.declaration import declare_motor_alone
 from tractexp.model.parts import Effect, Motor, Part
 from tractexp.model.printed import list_changed_lines
 from tractexp.parameter import Parameter
@@ -139,7 +139,7 @@ def _equations(cls: type[Part]) -> str:
     base, of = pictures.pair(cls)
     if issubclass(cls, Motor):
         edits = (
-            [(None, line) for line in motor_alone(cls()).latex()]
+            [(None, line) for line in declare_motor_alone(cls()).latex()]
             if not cls.waves_only
             else list_changed_lines([], of.latex())
         )
@@ -148,7 +148,7 @@ def _equations(cls: type[Part]) -> str:
     else:
         edits = [
             (was, line)
-            for was, line in list_changed_lines(motor_alone(of.motor).latex(), of.latex())
+            for was, line in list_changed_lines(declare_motor_alone(of.motor).latex(), of.latex())
             if was is None
         ]
     if not edits:

@@ -12,7 +12,7 @@ class _COMTRADE(Writer):
     waves = True
 
     def record(self, record: Record, path: Path) -> list[Path]:
-        return self.recording(tidy.recording_of(record), path)
+        return self.recording(tidy.convert_record(record), path)
 
     def recording(self, recording: Recording, path: Path) -> list[Path]:
         return comtrade.write(recording, path)

@@ -13,7 +13,7 @@ import tractexp
 from tractexp.configuration.plugin import discover, get
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, sites
-from tractexp.model.drive import Drive, Excitation, slopes
+from tractexp.model.drive import Drive, Excitation, compute_slopes
 from tractexp.model.model import compose
 from tractexp.record import Record, detect
 
@@ -816,7 +816,7 @@ def test_skew_moves_the_voltage_and_not_the_power(edge, off):
     shape = lambda s: 0.5 - 0.5 * np.cos(np.pi * np.clip(s / max(edge, 1e-9), 0, 1))  # noqa: E731
     U = 1 - 0.45 * (shape(t - 0.1003) - shape(t - 0.3307))
     recorded = event(U, step)
-    smooth = CubicHermiteSpline(t, U, slopes(U) / step)(
+    smooth = CubicHermiteSpline(t, U, compute_slopes(U) / step)(
         np.arange((len(t) - 1) * fine + 1) * step / fine
     )
     P = base(event(smooth, step / fine))

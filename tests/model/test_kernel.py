@@ -159,7 +159,7 @@ def test_an_expression_is_what_sympy_says(expression):
     x, y = np.round(rng.normal(size=(2, 61)), 1)
     theirs = np.array([float(expression.subs({X: a, Y: b})) for a, b in zip(x, y, strict=True)])
     assert computed(expression, x, y) == pytest.approx(theirs, rel=1e-12, abs=1e-12)
-    played = arrays.values_of(sympy_phase(expression), {X: x, Y: y}, len(x))[0]
+    played = arrays.evaluate_phase(sympy_phase(expression), {X: x, Y: y}, len(x))[0]
     assert played == pytest.approx(theirs, rel=1e-12, abs=1e-12)
 
 
@@ -315,8 +315,8 @@ def test_a_kernel_is_compiled_for_other_processors(model, triple):
         machine = llvm.Target.from_triple(triple).create_target_machine(opt=2, reloc="pic")
     except RuntimeError:
         pytest.skip(f"this LLVM does not know {triple}")
-    text = emit.text(lower(model.equations), model.title, "classical")
-    assert objects.machine_code(text, machine)[:4] == b"\x7fELF"
+    text = emit.write_kernel(lower(model.equations), model.title, "classical")
+    assert objects.compile_machine_code(text, machine)[:4] == b"\x7fELF"
 
 
 @pytest.mark.parametrize("motor", ["electromechanical", "double_cage"])
@@ -330,7 +330,7 @@ def test_a_kernel_of_any_width_gives_the_same_response(drive, motor):
     for width in (2, 4, 8):
         other = copy.copy(model)
         other.__dict__["kernel"] = Kernel(
-            emit.text(lower(model.equations), model.title, "classical", width)
+            emit.write_kernel(lower(model.equations), model.title, "classical", width)
         )
         responses.append(other.simulate(drive, values, [1, 3]).outputs)
     assert np.isfinite(responses[0]).any()
@@ -354,7 +354,7 @@ def test_an_expression_is_printed_whole_up_to_so_many_nodes(more):
         memories=[],
         outputs=[],
     )
-    _, line = listing.equations(cast(Any, lowered))
+    _, line = listing.list_equations(cast(Any, lowered))
     assert (f"x{listing.MOST_PRINTED_NODES - 2}" in line, "terms and more" in line) == (
         not more,
         bool(more),
@@ -366,7 +366,7 @@ def test_a_kernel_is_printed_for_people(model):
     assert "in each stage of a step:" in told
     assert "d omega/dt = " in told
     assert "define void @run(" in told
-    lines = [*listing.equations(lower(model.equations))]
+    lines = [*listing.list_equations(lower(model.equations))]
     assert any(line.strip().startswith("P = ") for line in lines)
     assert any(line.strip().startswith("slack 1 = ") for line in lines)
 

@@ -22,7 +22,7 @@ from tractexp.model.model import ModelResponse, compose
 from tractexp.model.parts import Static
 from tractexp.model.sites import SITES
 from tractexp.model.states import State
-from tractexp.model.symbols import phasor_parts, real_symbol, start_symbol, vector_symbol
+from tractexp.model.symbols import make_real_symbol, make_vector_symbol, phasor_parts, start_symbol
 from tractexp.parameter import Parameter
 
 OMEGA_S = 2 * np.pi * 50
@@ -449,16 +449,16 @@ def test_no_name_of_a_parameter_is_taken_by_the_kernel(model, names):
 
 
 def test_symbols_say_what_they_are():
-    assert real_symbol("U").is_real
-    assert vector_symbol("v").is_complex
-    assert not vector_symbol("v").is_real
-    assert all(s.is_real for s in phasor_parts(vector_symbol("v")))
-    assert start_symbol(real_symbol("omega")) == real_symbol("omega_before")
-    assert start_symbol(vector_symbol("E")) == vector_symbol("E_before")
+    assert make_real_symbol("U").is_real
+    assert make_vector_symbol("v").is_complex
+    assert not make_vector_symbol("v").is_real
+    assert all(s.is_real for s in phasor_parts(make_vector_symbol("v")))
+    assert start_symbol(make_real_symbol("omega")) == make_real_symbol("omega_before")
+    assert start_symbol(make_vector_symbol("E")) == make_vector_symbol("E_before")
 
 
 def test_a_state_starts_from_constants_unless_told_otherwise():
-    assert not State(real_symbol("omega"), "\\omega", "speed", "motor").derived
+    assert not State(make_real_symbol("omega"), "\\omega", "speed", "motor").derived
 
 
 def test_a_pair_that_draws_nothing_is_refused():

@@ -103,7 +103,7 @@ def test_arrays_are_read_back_to_the_bit_and_never_for_another_key(folder):
         computed.append(1)
         return np.array([1 / 3]), np.array(["a"])
 
-    key = store.key(np.arange(3.0), [("a", 1)], {"b": None})
+    key = store.compute_key(np.arange(3.0), [("a", 1)], {"b": None})
     for _ in range(2):
         number, text = store.DESCENTS.arrays(key, compute)
         assert (number[0], text.tolist(), len(computed)) == (1 / 3, ["a"], 1)
@@ -113,7 +113,7 @@ def test_arrays_are_read_back_to_the_bit_and_never_for_another_key(folder):
         (np.arange(3.0).reshape(3, 1), [("a", 1)], {"b": None}),
         (np.arange(3.0), [("a", 1)], {"b": 0}),
     ]
-    assert len({key, *(store.key(*other) for other in others)}) == 5
+    assert len({key, *(store.compute_key(*other) for other in others)}) == 5
     (file,) = (folder / "descents").iterdir()
     file.write_bytes(file.read_bytes()[:50])
     assert store.find_damaged_files(folder) == [file]
@@ -191,7 +191,7 @@ def test_planted_code_is_not_run_and_the_file_heals(folder):
     """A file whose sum is not its own is none, and is compiled anew; one of another kernel in its
     place, too.
     """
-    answer, other = (objects.object_code(stored(number)) for number in (42.0, 7.0))
+    answer, other = (objects.load_object_code(stored(number)) for number in (42.0, 7.0))
     assert called(42.0) == 42.0
     path, theirs = (code_path(stored(number)) for number in (42.0, 7.0))
     sound = path.read_bytes()
@@ -204,7 +204,7 @@ def test_planted_code_is_not_run_and_the_file_heals(folder):
 
 
 def code_path(text):
-    return store.CODE.path(store.key(target.key(), text))
+    return store.CODE.path(store.compute_key(target.compute_key(), text))
 
 
 def stored(number):
@@ -228,13 +228,13 @@ def test_code_for_another_machine_or_of_another_text_is_another_file(folder, mon
     def files():
         return len([*folder.glob("code/*.entry")])
 
-    objects.object_code(stored(1.0))
-    objects.object_code(stored(1.0))
+    objects.load_object_code(stored(1.0))
+    objects.load_object_code(stored(1.0))
     assert files() == 1
-    objects.object_code(stored(2.0))
+    objects.load_object_code(stored(2.0))
     assert files() == 2
-    monkeypatch.setattr(target, "key", lambda: "another processor")
-    objects.object_code(stored(1.0))
+    monkeypatch.setattr(target, "compute_key", lambda: "another processor")
+    objects.load_object_code(stored(1.0))
     assert files() == 3
 
 

@@ -10,7 +10,7 @@ from browser import BROWSER, Worked, drawn
 from tractexp.blocks import Report, plotly
 from tractexp.blocks.block import Markup
 from tractexp.blocks.chart import Chart
-from tractexp.blocks.chart_script import script
+from tractexp.blocks.chart_script import build_script
 
 BLUE = "#0072B2"
 
@@ -69,15 +69,15 @@ def test_a_chart_is_drawn_by_the_parts_of_the_library_as_by_the_whole(tmp_path, 
     )
     bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE)
     page, drawings = Report("charts").charts([chart, bars], "two"), []
-    whole = plotly.library().read_text(encoding="utf-8")
-    for code in (plotly.code(), whole):
-        monkeypatch.setattr(plotly, "code", lambda code=code: code)
-        monkeypatch.setattr(plotly, "digest", lambda code=code: f"{len(code)} letters")
-        script.cache_clear()
+    whole = plotly.find_library().read_text(encoding="utf-8")
+    for code in (plotly.read_code(), whole):
+        monkeypatch.setattr(plotly, "read_code", lambda code=code: code)
+        monkeypatch.setattr(plotly, "compute_digest", lambda code=code: f"{len(code)} letters")
+        build_script.cache_clear()
         dom, complaints = drawn(page, tmp_path)
         assert complaints == []
         drawings.append(re.findall(r' d="([^"]+)"', re.sub(r"(?s)<script>.*?</script>", "", dom)))
-    script.cache_clear()
+    build_script.cache_clear()
     assert len(drawings[0]) > 20
     assert drawings[0] == drawings[1]
 

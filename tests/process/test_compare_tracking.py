@@ -23,7 +23,7 @@ from tractexp.errors import UserError
 from tractexp.studies.comparison import load
 from tractexp.tracking.find import find
 from tractexp.tracking.run import attach
-from tractexp.tracking.view import TAG, comparison_view
+from tractexp.tracking.view import TAG, store_comparison_view
 
 EXPERIMENT = "identify tibet_50pct"
 SCREENSHOT = Path(__file__).parents[2] / "outputs" / "mlflow_comparison.png"
@@ -69,7 +69,7 @@ def filled(tmp_path_factory, empty_store):
     folder = tmp_path_factory.mktemp("filled")
     (folder / "outputs").mkdir()
     shutil.copy(empty_store, folder / "outputs")
-    uri = tracking.default_uri(folder)
+    uri = tracking.find_default_uri(folder)
     parent = tracking.start_parent(
         tracking.TrackedRun(EXPERIMENT, "sweep", tags={"task": "identify"}), uri
     )
@@ -187,7 +187,7 @@ def test_a_run_that_failed_in_mlflow_is_a_failure(filled):
 
 def viewed(uri, mode="CHART"):
     """The view that is stored in the newest experiment."""
-    page = comparison_view(uri)
+    page = store_comparison_view(uri)
     experiment = re.fullmatch(
         rf"#/experiments/(\d+)/runs\?viewStateShareKey=tractexp&compareRunsMode={mode}"
         r"&workflowType=machine_learning",
@@ -231,7 +231,9 @@ def test_the_view_of_a_station_is_a_table_of_its_loads_that_sorts_by_model_error
         strict=True,
     ):
         log(uri, run, load=feeder)
-    assert comparison_view(uri).endswith("&compareRunsMode=TABLE&workflowType=machine_learning")
+    assert store_comparison_view(uri).endswith(
+        "&compareRunsMode=TABLE&workflowType=machine_learning"
+    )
     state = viewed(uri, "TABLE")
     assert state["groupBy"] is None
     assert state["orderByKey"] == "metrics.`model_error`"
@@ -328,18 +330,18 @@ def test_a_page_logged_elsewhere_is_told_how_to_be_seen(tmp_path, empty_store):
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert "to see it: tractexp ui --uri sqlite:///x.db" in done.stdout
-    (run,) = find(tracking.address(f"sqlite:///{tmp_path}/x.db"), "tags.task = 'compare'")
+    (run,) = find(tracking.resolve_address(f"sqlite:///{tmp_path}/x.db"), "tags.task = 'compare'")
     assert set(run.metrics) == {"median issa population:30", "median issa population:50"}
 
 
 def test_a_store_without_identifications_opens_on_what_it_has(uri):
     """Never on MLflow's plain address, which opens a page on language models."""
-    assert comparison_view(uri) == "#/experiments?workflowType=machine_learning"
+    assert store_comparison_view(uri) == "#/experiments?workflowType=machine_learning"
     tracking.log(tracking.TrackedRun("discrepancy", "r"), uri)
     assert re.fullmatch(
         r"#/experiments/\d+/runs\?viewStateShareKey=tractexp&compareRunsMode=TABLE"
         "&workflowType=machine_learning",
-        comparison_view(uri),
+        store_comparison_view(uri),
     )
 
 
@@ -350,7 +352,7 @@ def test_a_view_that_cannot_be_stored_opens_on_the_list_of_experiments(monkeypat
     def refuse(uri):
         raise UserError("the store is of another version")
 
-    monkeypatch.setattr(view, "comparison_view", refuse)
+    monkeypatch.setattr(view, "store_comparison_view", refuse)
     assert ui._find_start_page("sqlite:///x.db") == view.EXPERIMENTS
     assert (
         "because the comparison view could not be stored: the store is of another version"

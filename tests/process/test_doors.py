@@ -161,8 +161,8 @@ def its_state(folder: Path) -> object:
     from tractexp.sweep import status
     from tractexp.tracking import sweepfile
 
-    sweepfile.waits(folder)
-    return status.read(folder), status.objective(folder), sweepfile.parent_of(folder)
+    sweepfile.does_wait(folder)
+    return status.read(folder), status.read_objective(folder), sweepfile.read_parent(folder)
 
 
 def kept(folder: Path) -> Path:

@@ -237,7 +237,7 @@ def test_a_figure_that_fails_is_a_sentence_and_the_results_stand(
     def fails(*_, **__):
         raise RuntimeError("the third pen is dry")
 
-    monkeypatch.setattr(figures, "response", fails)
+    monkeypatch.setattr(figures, "draw_response", fails)
     assert [path.name for path in simulated.write(tmp_path)] == ["response.csv"]
     assert (
         "response.svg could not be made, while the results are whole (RuntimeError: the third pen"

@@ -251,7 +251,7 @@ def test_jobs_are_composed_once_a_choice_and_as_hydra_composes_each(monkeypatch)
     from hydra.core.global_hydra import GlobalHydra
     from hydra.types import RunMode
 
-    from tractexp.compat.hydra_versions import behavior
+    from tractexp.compat.hydra_versions import choose_behavior
     from tractexp.configuration.choices import CONF
     from tractexp.sweep.compose import Composer
     from tractexp.sweep.hydra_groups import register
@@ -264,7 +264,7 @@ def test_jobs_are_composed_once_a_choice_and_as_hydra_composes_each(monkeypatch)
         ("optimizer=pso", "data.train=[a.csv,b.csv]", "seed=5"),
         ("optimizer=issa", "optimizer.producers=0.3", "tracking.uri=null"),
     ]
-    with initialize_config_dir(str(CONF), **behavior()):
+    with initialize_config_dir(str(CONF), **choose_behavior()):
         loader = GlobalHydra.instance().config_loader()
         master = loader.load_configuration("config", [], run_mode=RunMode.MULTIRUN)
         compose = Composer(loader, master)

@@ -22,10 +22,10 @@ from tractexp.configuration.overrides import format_assignment, quote_override
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.recording import StatusChannel
-from tractexp.recording.quality import spectrum
-from tractexp.recording.trace import half_cycle_rms
-from tractexp.report.look_charts import envelope
-from tractexp.report.look_console import summary
+from tractexp.recording.quality import compute_spectrum
+from tractexp.recording.trace import compute_half_cycle_rms
+from tractexp.report.look_charts import compute_envelope
+from tractexp.report.look_console import build_summary
 
 # what a command races is left as it is but for how many structures take part
 QUICK_RACE = "model.candidates.phasors=[static_exponential]"
@@ -123,7 +123,7 @@ def test_a_note_of_the_reader_is_on_the_screen_and_of_many_three(tmp_path):
     (note,) = made.content["files"][0]["notes"]
     assert f"  note: {note}" in str(made)
     many = {**made.content["files"][0], "notes": [f"line {k} was mended" for k in range(9)]}
-    lines = str(summary({"files": [many]})).splitlines()
+    lines = str(build_summary({"files": [many]})).splitlines()
     assert [line for line in lines if line.startswith("  note")][2:] == [
         "  note: line 2 was mended",
         "  note: 6 more",
@@ -521,7 +521,7 @@ def test_the_rms_of_half_cycles_is_that_of_the_standard():
     """
     t = np.arange(1000) / 1600
     wave = np.sqrt(2) * np.cos(2 * np.pi * 50 * t + 0.3)[None]
-    times, rms = half_cycle_rms(wave, 1600, 50)
+    times, rms = compute_half_cycle_rms(wave, 1600, 50)
     np.testing.assert_allclose(rms, 1, atol=1e-12)
     np.testing.assert_allclose(np.diff(times), 0.01)
     assert times[0] == pytest.approx(0.01 - 0.5 / 1600)
@@ -529,7 +529,7 @@ def test_the_rms_of_half_cycles_is_that_of_the_standard():
 
 def test_a_spectrum_is_right_at_a_harmonic():
     t = np.arange(800) / 4000
-    f, rms = spectrum(
+    f, rms = compute_spectrum(
         np.sqrt(2) * (10 * np.cos(2 * np.pi * 50 * t) + 0.3 * np.sin(2 * np.pi * 250 * t)) + 5, 4000
     )
     assert rms[f == 50] == pytest.approx(10, rel=1e-6)
@@ -539,7 +539,7 @@ def test_a_spectrum_is_right_at_a_harmonic():
 def test_an_envelope_keeps_every_spike_in_its_place():
     wave = np.zeros(1003)
     wave[[500, 1002]] = 7, -3
-    made = envelope(wave, 5)
+    made = compute_envelope(wave, 5)
     assert len(made) == 202
     assert made.max() == 7
     assert made.min() == -3

@@ -85,7 +85,7 @@ def test_a_run_whose_writer_lives_or_cannot_be_seen_is_left(uri):
     client.set_tag(far, owner.TAG, "elsewhere/0123 boot pid:[1] 4711 99")
     assert owner.close_stale(client) == []
     # this number, an earlier process
-    client.set_tag(parent, owner.TAG, owner.signature().rpartition(" ")[0] + " 17")
+    client.set_tag(parent, owner.TAG, owner.sign_process().rpartition(" ")[0] + " 17")
     assert owner.close_stale(client) == [parent]
     assert {r.info.run_id: r.info.status for r in runs(uri)} == {parent: "KILLED", far: "RUNNING"}
 
@@ -103,10 +103,10 @@ def test_a_run_whose_writer_lives_or_cannot_be_seen_is_left(uri):
     ],
 )
 def test_whether_a_process_has_ended_is_told_only_where_it_is_known(told, gone):
-    for word, known in zip(("HERE", "BOOT", "NS"), owner._machine(), strict=True):
+    for word, known in zip(("HERE", "BOOT", "NS"), owner._identify_machine(), strict=True):
         told = told.replace(word, known)
     assert owner.has_ended(told) is gone
-    assert owner.has_ended(owner.signature()) is False
+    assert owner.has_ended(owner.sign_process()) is False
 
 
 # What is kept beside the results, and brought in
@@ -477,7 +477,7 @@ def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_an
     sync(tmp_path)
     database = Path(uri.removeprefix("sqlite:///"))
     stale = tracking.start_parent(TrackedRun("e", "stale"), uri)
-    open_store(uri).set_tag(stale, owner.TAG, owner.signature().rpartition(" ")[0] + " 17")
+    open_store(uri).set_tag(stale, owner.TAG, owner.sign_process().rpartition(" ")[0] + " 17")
     code, told = doctor(tmp_path, "--uri", uri, capsys=capsys)
     assert code == 0, told
     assert "healed 1 runs whose process had ended are closed as KILLED" in told

@@ -12,7 +12,7 @@ import pytest
 from command_line import run_command
 
 import tractexp
-from tractexp.text.wording import epsilon, escape_text, write_on_one_line
+from tractexp.text.wording import escape_text, format_epsilon, write_on_one_line
 
 if os.name == "nt":
     pytest.skip("pipes and locales of a Unix", allow_module_level=True)
@@ -107,7 +107,7 @@ def test_what_is_no_escape_stays():
     ],
 )
 def test_an_error_of_nothing_is_undefined(error, words):
-    assert epsilon(error) == words
+    assert format_epsilon(error) == words
 
 
 def test_a_load_without_one_power_is_identified_and_has_no_error_of_it(tmp_path):

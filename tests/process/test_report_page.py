@@ -55,7 +55,7 @@ def test_a_nasty_name_is_a_word_of_the_page_and_of_a_figure(name, tmp_path):
     t = np.arange(5.0)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph")  # which the reader's font has, if not ours
-        drawing = figures.response(tmp_path / "a.svg", t, t, (t, t), title=name, notes=(name,))
+        drawing = figures.draw_response(tmp_path / "a.svg", t, t, (t, t), title=name, notes=(name,))
     assert name in [text for node in ElementTree.parse(drawing).iter() if (text := node.text)]
     page = Report(name, name).text(name).items([name]).code(name).figure(drawing, name)
     page.table([name], [[name]], name).chart(Chart(name, [name]).line(name, t, t, "#000000"), name)

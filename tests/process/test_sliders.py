@@ -9,7 +9,7 @@ from browser import BROWSER, Worked, drawn
 
 import tractexp
 from tractexp.blocks import Report
-from tractexp.report.sheet import sheet
+from tractexp.report.sheet import build_sheet
 from tractexp.report.sliders import add_sliders
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no browser is installed")
@@ -44,7 +44,7 @@ def test_at_the_estimate_they_show_the_errors_of_the_fit(fit, tmp_path):
 
 
 def test_the_sheet_is_small_and_whole(fit, tmp_path):
-    elements, complaints = drawn(sheet(fit), tmp_path)
+    elements, complaints = drawn(build_sheet(fit), tmp_path)
     assert complaints == []
     assert (tmp_path / "page.html").stat().st_size < 1e6
     for part in ("DOUBTFUL", "The motor on its own rating", "How this sheet was made"):

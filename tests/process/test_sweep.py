@@ -736,7 +736,7 @@ def test_a_variant_is_named_after_what_was_chosen_but_the_seed(chosen, name):
 
 
 def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp_path):
-    from tractexp.sweep.parent import metrics
+    from tractexp.sweep.parent import compute_metrics
     from tractexp.sweep.status import Status
 
     class Placed:
@@ -746,7 +746,12 @@ def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp
     jobs = [Placed(tmp_path / str(k)) for k in range(4)]
     for job, status in zip(jobs, ("finished", "failed", "interrupted", "interrupted"), strict=True):
         Status(status, "", "", "", 1.0, {}, 0).end(job.folder)
-    assert metrics(jobs) == {"jobs": 4, "jobs_finished": 1, "jobs_failed": 1, "jobs_interrupted": 2}
+    assert compute_metrics(jobs) == {
+        "jobs": 4,
+        "jobs_finished": 1,
+        "jobs_failed": 1,
+        "jobs_interrupted": 2,
+    }
 
 
 def test_what_an_earlier_sweep_came_to_goes_before_its_configuration(tmp_path):
@@ -807,7 +812,7 @@ def test_who_ends_a_sweep_does_not_wait_while_what_is_left_is_sent(
     ]
     with (
         contextlib.suppress(RuntimeError, KeyboardInterrupt),
-        parent.parent_run(tmp_path, jobs, [], afresh=False),
+        parent.open_parent_run(tmp_path, jobs, [], afresh=False),
     ):
         if error:
             raise error
@@ -818,14 +823,14 @@ def test_who_ends_a_sweep_does_not_wait_while_what_is_left_is_sent(
 def test_what_the_jobs_of_a_sweep_share_is_spelled_once_for_each(monkeypatch):
     """Once for every setting of every job took half a minute before a sweep of 2,000 began."""
     from tractexp import tracking
-    from tractexp.sweep.parent import shared_settings
+    from tractexp.sweep.parent import list_shared_settings
 
     flatten, spelled = tracking.flatten, []
     monkeypatch.setattr(
         tracking, "flatten", lambda config: (spelled.append(config), flatten(config))[1]
     )
     configs = [{"seed": k, "optimizer": {"name": "pso", "population": 20}} for k in range(5)]
-    assert shared_settings(configs) == {"optimizer.name": "pso", "optimizer.population": "20"}
+    assert list_shared_settings(configs) == {"optimizer.name": "pso", "optimizer.population": "20"}
     assert len(spelled) == len(configs)
 
 

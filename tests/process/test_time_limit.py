@@ -109,6 +109,6 @@ def test_another_thread_reads_without_a_clock(tmp_path):
 
 def test_a_name_with_hundreds_of_marks_of_a_phase_is_read_at_once(monkeypatch):
     """Marks of one phase are combined: of 40 there were ten thousand readings of each name."""
-    from tractexp.recording.label import _marks
+    from tractexp.recording.label import _list_marks
 
-    assert len(_marks("u a" * 200)) < 2000
+    assert len(_list_marks("u a" * 200)) < 2000

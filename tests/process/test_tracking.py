@@ -30,7 +30,7 @@ from tractexp.tracking import TrackedRun, model, process, runfile
 from tractexp.tracking import store as tracking_store
 from tractexp.tracking.process import Logger
 from tractexp.tracking.run import CURVE_POINTS
-from tractexp.tracking.store import sentences
+from tractexp.tracking.store import raise_sentences
 from tractexp.tracking.ui import serve
 
 STEPS = np.arange(300)
@@ -189,7 +189,7 @@ def test_artifacts_lie_beside_the_database_wherever_the_process_runs(
     (elsewhere / "note.txt").write_text("hello")
     monkeypatch.chdir(elsewhere)
     run = TrackedRun("identify: tibet/50", "r", artifacts=[Path("note.txt")])
-    run_id = tracking.log(run, tracking.default_uri(home))
+    run_id = tracking.log(run, tracking.find_default_uri(home))
     kept = (
         home / "outputs" / "mlartifacts" / "identify_tibet_50" / run_id / "artifacts" / "note.txt"
     )
@@ -202,7 +202,7 @@ def test_processes_that_meet_on_a_fresh_store_all_log_their_run(tmp_path):
     script = """
 import sys; from pathlib import Path; from tractexp import tracking
 run = tracking.TrackedRun("sweep", f"job-{sys.argv[2]}", metrics={"x": 1.0})
-tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
+tracking.log(run, tracking.find_default_uri(Path(sys.argv[1])))"""
     jobs = [
         subprocess.Popen(
             [sys.executable, "-c", script, str(tmp_path), str(i)], stdout=-1, stderr=-1, text=True
@@ -213,7 +213,7 @@ tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
     assert [(job.returncode, *words) for job, words in zip(jobs, said, strict=True)] == [
         (0, "", "")
     ] * 2
-    uri = tracking.default_uri(tmp_path)
+    uri = tracking.find_default_uri(tmp_path)
     runs = client(uri).search_runs([client(uri).get_experiment_by_name("sweep").experiment_id])
     assert sorted(run.info.run_name for run in runs) == [f"job-{i}" for i in range(2)]
     assert sorted(p.name for p in (tmp_path / "outputs").iterdir()) == [
@@ -228,7 +228,7 @@ def test_the_store_of_a_second_folder_needs_no_migrations_and_is_its_own(tmp_pat
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         monkeypatch.chdir(tmp_path / name)
-        (default,) = tracking.open_store(tracking.default_uri(Path())).search_experiments()
+        (default,) = tracking.open_store(tracking.find_default_uri(Path())).search_experiments()
         places.append(default.artifact_location)
         monkeypatch.setattr(tracking_store, "_migrate", None)  # is not called again
     assert [
@@ -240,11 +240,11 @@ def test_the_store_of_a_second_folder_needs_no_migrations_and_is_its_own(tmp_pat
 def test_a_creation_that_was_killed_leaves_nothing_that_hinders_the_next(tmp_path, monkeypatch):
     if not (child := os.fork()):
         monkeypatch.setattr(os, "replace", lambda *_: os._exit(9))
-        tracking.open_store(tracking.default_uri(tmp_path))
+        tracking.open_store(tracking.find_default_uri(tmp_path))
         os._exit(1)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
     assert not (tmp_path / "outputs" / "mlflow.db").exists()
-    tracking.open_store(tracking.default_uri(tmp_path))
+    tracking.open_store(tracking.find_default_uri(tmp_path))
     assert (tmp_path / "outputs" / "mlflow.db").is_file()
 
 
@@ -273,7 +273,7 @@ def test_flatten_joins_keys_and_spells_values_as_the_configuration_does():
 
 def test_a_name_of_a_metric_is_one_that_mlflow_takes(uri):
     names = [
-        tracking.metric_name(f"median {name}")
+        tracking.name_metric(f"median {name}")
         for name in ("issa levy=false", "a*b (c)", "issa bounds.C=[0.5]")
     ]
     assert names == ["median issa levy:false", "median a_b _c_", "median issa bounds.C:_0.5_"]
@@ -346,7 +346,7 @@ def test_what_a_run_has_read_is_listed_by_its_digest(uri):
 )
 def test_a_run_that_is_not_right_is_refused_before_a_store_is_made(tmp_path, run, message):
     with pytest.raises(UserError, match=message):
-        tracking.log(run, tracking.default_uri(tmp_path))
+        tracking.log(run, tracking.find_default_uri(tmp_path))
     assert not list(tmp_path.iterdir())
 
 
@@ -355,7 +355,7 @@ def test_a_store_that_cannot_be_used_is_named_with_the_reason(tmp_path, empty_st
     with pytest.raises(
         UserError, match=r"file/outputs/mlflow\.db cannot be used: .*File exists|Not a directory"
     ):
-        tracking.open_store(tracking.default_uri(tmp_path / "file"))
+        tracking.open_store(tracking.find_default_uri(tmp_path / "file"))
     (tmp_path / "junk.db").write_bytes(b"not a database " * 100)
     with pytest.raises(UserError, match=r"junk\.db cannot be used: .*not a database"):
         tracking.open_store(f"sqlite:///{tmp_path / 'junk.db'}")
@@ -378,7 +378,7 @@ def test_what_mlflow_logs_of_an_error_is_not_shown_but_told_in_the_sentence(monk
     logger.addHandler(handler)
 
     def fails():
-        with sentences("here"):
+        with raise_sentences("here"):
             logger.error("a traceback")
             raise OSError("disk is full")
 
@@ -415,19 +415,22 @@ def test_a_relative_address_counts_from_the_folder_where_the_command_runs(tmp_pa
 
 def test_addresses_are_absolute_and_the_default_is_below_outputs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert tracking.address("sqlite:///runs/x.db") == f"sqlite:///{tmp_path.as_posix()}/runs/x.db"
-    assert tracking.address(None) == tracking.default_uri(tmp_path)
-    for given in (tracking.default_uri(tmp_path), "http://host:5000"):
-        assert tracking.address(given) == given
+    assert (
+        tracking.resolve_address("sqlite:///runs/x.db")
+        == f"sqlite:///{tmp_path.as_posix()}/runs/x.db"
+    )
+    assert tracking.resolve_address(None) == tracking.find_default_uri(tmp_path)
+    for given in (tracking.find_default_uri(tmp_path), "http://host:5000"):
+        assert tracking.resolve_address(given) == given
 
 
 def test_the_store_of_mlflows_own_variable_is_used_unless_another_is_chosen(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MLFLOW_TRACKING_URI", "sqlite:///team.db")
-    assert tracking.address(None) == f"sqlite:///{tmp_path.as_posix()}/team.db"
-    assert tracking.address("sqlite:///x.db") == f"sqlite:///{tmp_path.as_posix()}/x.db"
+    assert tracking.resolve_address(None) == f"sqlite:///{tmp_path.as_posix()}/team.db"
+    assert tracking.resolve_address("sqlite:///x.db") == f"sqlite:///{tmp_path.as_posix()}/x.db"
     monkeypatch.setenv("MLFLOW_TRACKING_URI", " ")
-    assert tracking.address(None) == tracking.default_uri(tmp_path)
+    assert tracking.resolve_address(None) == tracking.find_default_uri(tmp_path)
 
 
 def test_a_server_that_does_not_answer_is_reported_at_once():
@@ -676,7 +679,7 @@ def test_the_ui_answers_on_loopback_imports_nothing_from_here_and_leaves_nothing
 
 def test_the_ui_says_why_it_cannot_open(tmp_path, uri):
     with pytest.raises(UserError, match=r"no MLflow store .*mlflow\.db yet: the first run"):
-        serve(tracking.default_uri(tmp_path / "new"))
+        serve(tracking.find_default_uri(tmp_path / "new"))
     with pytest.raises(UserError, match=r"port 70000 on 127\.0\.0\.1 cannot be used"):
         serve(uri, port=70_000)
     with pytest.raises(UserError, match="is a running MLflow server already"):
@@ -713,7 +716,7 @@ def test_a_process_that_is_told_of_no_store_makes_none_and_is_not_waited_for(tmp
 def test_the_process_that_was_started_ahead_is_the_one_that_logs(uri):
     process.start_ahead()
     (ahead,) = process._ahead
-    with process.logger(uri) as taken, process.logger(uri) as another:
+    with process.open_logger(uri) as taken, process.open_logger(uri) as another:
         assert taken is ahead is not another
         assert client(uri).get_run(taken.log(TrackedRun("e", "r"))).info.status == "FINISHED"
 
@@ -777,7 +780,7 @@ def test_the_process_that_logs_imports_nothing_that_mlflow_does_without(uri):
 
 def test_a_package_is_absent_within_and_there_again_afterwards(monkeypatch):
     monkeypatch.delitem(sys.modules, "colorsys", raising=False)
-    with process.absent(["colorsys", "pickle"]):
+    with process.hide_packages(["colorsys", "pickle"]):
         with pytest.raises(ImportError):
             importlib.import_module("colorsys")
         assert importlib.import_module("pickle") is pickle  # it was there before
@@ -787,7 +790,7 @@ def test_a_package_is_absent_within_and_there_again_afterwards(monkeypatch):
 def test_a_second_process_passes_its_sentence_on(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with (
-        Logger(tracking.default_uri(tmp_path / "file")) as logger,
+        Logger(tracking.find_default_uri(tmp_path / "file")) as logger,
         pytest.raises(UserError, match=r"outputs/mlflow\.db cannot be used"),
     ):
         logger.log(TrackedRun("e", "r"))

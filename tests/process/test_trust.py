@@ -298,7 +298,7 @@ def test_a_name_prints_no_line_of_its_own(tmp_path):
 @pytest.mark.parametrize("kind", ["a title", "a text", "an item", "a heading", "a cell"])
 def test_a_report_prints_a_name_in_its_line(kind):
     from tractexp.blocks import Report, Table
-    from tractexp.blocks.terminal import plain
+    from tractexp.blocks.terminal import render_plain
 
     report = Report(FORGED if kind == "a title" else "Report")
     made = {
@@ -308,5 +308,7 @@ def test_a_report_prints_a_name_in_its_line(kind):
         "a cell": lambda: report.add(Table(["name"], [[FORGED]])),
     }
     made.get(kind, lambda: None)()
-    assert "next:" in plain(report)
-    assert not [line for line in plain(report).splitlines() if line.strip().startswith("next:")]
+    assert "next:" in render_plain(report)
+    assert not [
+        line for line in render_plain(report).splitlines() if line.strip().startswith("next:")
+    ]

@@ -23,9 +23,9 @@ from tractexp.studies.bbob.runs import (
     BbobPlan,
     BbobRun,
     BbobRuns,
+    compute_seed,
     perform,
     run,
-    seed_of,
 )
 
 TARGETS = tuple(10.0**k for k in range(2, -9, -1))
@@ -105,7 +105,7 @@ def test_a_search_that_ends_is_started_anew_until_the_budget_is_spent(ioh):
     assert done.searches == 25  # of 40 evaluations
     alone = Bbob(24, 2, 1, TARGETS)
     for restart in range(25):
-        search(alone, brief, seed_of(0, 24, 2, 1, restart))
+        search(alone, brief, compute_seed(0, 24, 2, 1, restart))
     assert alone.best - alone.optimum == done.distance
 
 
@@ -184,7 +184,7 @@ def test_curves_are_drawn_where_no_target_was_met_at_all(tmp_path):
     nothing = BbobRuns(
         plan, ("a",), {1: "Sphere"}, [BbobRun("a", 1, 2, 1, 100, 1, 3.0, (float("inf"),))]
     )
-    ((whole, each),) = report.charts(nothing, 2).values()
+    ((whole, each),) = report.draw_charts(nothing, 2).values()
     (curve,) = whole.plain()["data"]
     assert (np.frombuffer(base64.b64decode(curve["y"]["bdata"]), "<f4") == 0).all()
     assert each == []
@@ -310,4 +310,4 @@ def test_ours_against_the_same_with_other_settings_has_a_name_of_its_own(ioh):
 
 def test_a_function_has_the_name_that_ioh_gives_it(ioh):
     assert Bbob(8, 2, 1, TARGETS).name == "Rosenbrock"
-    assert bbob.package() is ioh
+    assert bbob.import_package() is ioh

@@ -16,15 +16,15 @@ from pages import read
 from tractexp.errors import UserError
 from tractexp.studies.comparison import claims, floor, load
 from tractexp.studies.comparison.comparison import compare
-from tractexp.studies.comparison.floor import Floor, floor_of, polish
+from tractexp.studies.comparison.floor import Floor, find_floor, polish
 from tractexp.studies.comparison.runs import PROBLEM, REST, SETTINGS, SearchRun, gather
 from tractexp.studies.comparison.runs import select_runs_on as on_data
 from tractexp.studies.comparison.summary import (
     ECDF_TARGETS,
     Band,
-    band,
-    running_time,
-    runtimes,
+    compute_band,
+    compute_running_time,
+    list_runtimes,
     summarize,
 )
 
@@ -104,7 +104,7 @@ def test_a_planted_better_optimizer_is_found():
     assert min(p.effect for p in result.pairs) > 0.85
     assert result.ranks.p < 1e-6
     assert result.ranks.groups == ()
-    assert claims.headline(result) == (
+    assert claims.write_headline(result) == (
         "good has the lowest median objective; it is significantly better than bad and worse."
     )
     assert claims.answer(result) == "Take good: it ends lower than bad and worse."
@@ -152,18 +152,18 @@ def test_runs_that_all_reach_the_floor_are_equal_whatever_is_left_of_rounding():
     assert result.floor.value == FLOOR
     assert result.floor.source == "the best of all runs compared, by a"
     assert "is not significant" in claims.quote_pair(result, pair)
-    assert claims.headline(result).startswith(
+    assert claims.write_headline(result).startswith(
         "a and b reach the lowest median objective (equal within 0.10% of the"
     )
     assert claims.answer(result) == "Take a: it ends as low as b, sooner."
 
 
 def test_the_order_of_the_runs_does_not_matter():
-    from tractexp.studies.comparison.page import content
+    from tractexp.studies.comparison.page import build_comparison_content
 
     runs = [*samples({"good": 1.0, "bad": 2.0, "other": 1.05}), a_failure("bad", 99)]
     shuffled = [runs[i] for i in np.random.default_rng(0).permutation(len(runs))]
-    texts = [json.dumps(content(compared(r), "x")) for r in (runs, shuffled)]
+    texts = [json.dumps(build_comparison_content(compared(r), "x")) for r in (runs, shuffled)]
     assert texts[0] == texts[1]
 
 
@@ -178,7 +178,7 @@ def test_a_quotable_sentence_says_what_the_test_said():
         f" against {medians[1]} "
         "pu² for ssa; the difference is significant (Wilcoxon signed-rank, Holm-corrected over 1"
         " pair, "
-        f"p = {claims.p_value(pair.p)}; Vargha-Delaney A = {pair.effect:.2f})."
+        f"p = {claims.format_p_value(pair.p)}; Vargha-Delaney A = {pair.effect:.2f})."
     )
 
 
@@ -199,7 +199,7 @@ def test_a_summary_is_that_of_the_numbers():
     """Objectives 1 to 5 times 1e-5 with the floor at 1e-5: one run of five is within 1 % of it."""
     runs = [a_run("a", s, (s + 1) * 1e-5) for s in range(5)] + [a_failure("a", 5)]
     (variant,) = gather(runs, "x").variants
-    told = summarize(variant, floor_of(variant.runs, None, None), TARGETS)
+    told = summarize(variant, find_floor(variant.runs, None, None), TARGETS)
     assert (told.runs, told.failures) == (6, 1)
     assert vars(told.objective) == pytest.approx(
         {"best": 1e-5, "lower": 2e-5, "median": 3e-5, "upper": 4e-5, "worst": 5e-5}
@@ -211,7 +211,7 @@ def test_a_summary_is_that_of_the_numbers():
 def test_at_the_floor_is_what_ends_within_a_hundredth_of_it():
     runs = [a_run("a", s, FLOOR * times) for s, times in enumerate((1.0, 1.009, 1.011, 1.5))]
     (variant,) = gather(runs, "x").variants
-    assert summarize(variant, floor_of(variant.runs, None, None), TARGETS).at_floor == 0.5
+    assert summarize(variant, find_floor(variant.runs, None, None), TARGETS).at_floor == 0.5
 
 
 def test_running_times_are_counted_by_hand():
@@ -226,21 +226,23 @@ def test_running_times_are_counted_by_hand():
         for s in range(3)
     ]
     (variant,) = gather([*runs, a_failure("a", 3)], "x").variants
-    assert running_time(variant, 2.0, "simulations") == (4 * 50 + 6 * 50 + 5050 + 5050) / 2
-    assert running_time(variant, 2.0, "seconds") == pytest.approx((0.04 + 0.06 + 1.01 + 1.01) / 2)
-    assert running_time(variant, 0.5, "simulations") == np.inf
+    assert compute_running_time(variant, 2.0, "simulations") == (4 * 50 + 6 * 50 + 5050 + 5050) / 2
+    assert compute_running_time(variant, 2.0, "seconds") == pytest.approx(
+        (0.04 + 0.06 + 1.01 + 1.01) / 2
+    )
+    assert compute_running_time(variant, 0.5, "simulations") == np.inf
     budgeted = replace(a_failure("a", 3), config=a_failure("a", 3).config | {"budget": 700})
     (variant,) = gather(
         [replace(r, config=r.config | {"budget": 700}) for r in runs] + [budgeted], "x"
     ).variants
-    assert running_time(variant, 2.0, "simulations") == (4 * 50 + 6 * 50 + 5050 + 700) / 2
+    assert compute_running_time(variant, 2.0, "simulations") == (4 * 50 + 6 * 50 + 5050 + 700) / 2
 
 
 def test_runtimes_hold_every_target_of_every_run():
     (variant,) = gather(
         [a_run("a", s, FLOOR) for s in range(3)] + [a_failure("a", 9)], "x"
     ).variants
-    costs = runtimes(variant, floor_of(variant.runs, None, None))
+    costs = list_runtimes(variant, find_floor(variant.runs, None, None))
     assert costs.shape == (4 * len(ECDF_TARGETS),)
     assert np.isinf(costs).sum() == len(ECDF_TARGETS)
     assert (np.diff(costs[np.isfinite(costs)]) >= 0).all()
@@ -250,7 +252,7 @@ def test_a_band_holds_what_a_short_run_had_reached():
     runs = [a_run("a", 0, 1e-5, iterations=10), a_run("a", 1, 3e-5, iterations=100, rate=1.0)]
     (variant,) = gather(runs, "x").variants
     for by, last in (("iterations", 100), ("simulations", 5050)):
-        told = band(variant, by)
+        told = compute_band(variant, by)
         assert told.x[-1] == last
         assert told.median[-1] == pytest.approx((runs[0].history[-1] + 3e-5) / 2)
         assert (np.diff(told.median) <= 0).all()
@@ -405,7 +407,7 @@ def test_too_few_seeds_are_said_and_nothing_is_tested():
     )
     assert "needs at least 6" in result.notes[0]
     assert "The variants were not ranked: they have 5 seeds in common" in result.notes[1]
-    assert claims.headline(result) == "No difference between variants was tested."
+    assert claims.write_headline(result) == "No difference between variants was tested."
     assert claims.answer(result).startswith(
         "Not settled: there are too few seeds to test. a has the lowest median"
     )
@@ -544,7 +546,7 @@ def test_runs_of_different_code_are_told():
         "The runs were made by different code (0.0, 0.1): a difference between variants may be"
     )
     told = {"tractexp_version": "0.4", "commit": "1c2d3e4f5a6b7c8d-dirty"}
-    assert [load.code_of(t) for t in (told, told | {"commit": ""}, {})] == [
+    assert [load.describe_code(t) for t in (told, told | {"commit": ""}, {})] == [
         "0.4 at 1c2d3e4f-dirty",
         "0.4",
         "",
@@ -599,14 +601,14 @@ def test_the_floor_is_polished_where_no_run_reached_it(polished):
     runs, found = polished
     assert min(run.objective for run in runs) > 1.05 * LOWEST
     assert found.objective == pytest.approx(LOWEST, rel=1e-4)
-    floor = floor_of(runs, None, found)
+    floor = find_floor(runs, None, found)
     assert (floor.value, floor.source) == (
         found.objective,
         f"the lowest that least squares reach from where 7 runs ended and from {found.starts}"
         " starts"
         " all over the bounds",
     )
-    assert floor_of(runs, 2e-5, found) == Floor(2e-5, "as given by task.floor")
+    assert find_floor(runs, 2e-5, found) == Floor(2e-5, "as given by task.floor")
 
 
 def test_runs_are_told_apart_by_the_valley_they_ended_in(polished):
@@ -652,10 +654,10 @@ def drawn(chart, name):
 
 
 def test_every_run_that_finished_is_drawn():
-    from tractexp.studies.comparison.charts import spread
+    from tractexp.studies.comparison.charts import draw_spread
 
     result = compared([*samples({"a": 1.0, "b": 2.0}), a_failure("b", 77)])
-    points = drawn(spread(result.variants, result.floor), "every run")
+    points = drawn(draw_spread(result.variants, result.floor), "every run")
     assert sorted(x for x, _ in points) == sorted(
         run.objective for v in result.variants for run in v.finished_runs
     )
@@ -664,10 +666,10 @@ def test_every_run_that_finished_is_drawn():
 
 
 def test_every_runs_parameters_are_drawn_as_wide_as_they_scatter(polished, problem):
-    from tractexp.studies.comparison.charts import parameters
+    from tractexp.studies.comparison.charts import draw_parameters
 
     runs, found = polished
-    chart = parameters(gather(runs, "x").variants, found)
+    chart = draw_parameters(gather(runs, "x").variants, found)
     layout = chart.plain()["layout"]
     n = len(problem.space.names)
     assert len(drawn(chart, "in the floor&#x27;s valley")) == 6 * n
@@ -685,12 +687,12 @@ def test_every_runs_parameters_are_drawn_as_wide_as_they_scatter(polished, probl
 @pytest.mark.parametrize(("count", "each"), [(3, 0), (7, 0), (20, 20)])
 def test_of_many_variants_the_first_are_in_color_and_each_has_a_chart(count, each):
     from tractexp.blocks import style
-    from tractexp.studies.comparison.charts import ecdf, fitness
+    from tractexp.studies.comparison.charts import draw_ecdf, draw_fitness
 
     result = compared(samples({f"v{k:02}": 1.5**k for k in range(count)}, seeds=range(6)))
     for whole, small in (
-        fitness(result.variants, "simulations", result.floor),
-        ecdf(result.variants, result.floor),
+        draw_fitness(result.variants, "simulations", result.floor),
+        draw_ecdf(result.variants, result.floor),
     ):
         curves = [t for t in whole.plain()["data"] if t["name"]]
         assert {t["name"] for t in curves} == {v.name for v in result.variants}
@@ -700,10 +702,10 @@ def test_of_many_variants_the_first_are_in_color_and_each_has_a_chart(count, eac
 
 
 def test_mean_ranks_differ_where_their_bars_do_not_overlap():
-    from tractexp.studies.comparison.charts import mean_ranks
+    from tractexp.studies.comparison.charts import draw_mean_ranks
 
     ranks = compared(samples({"a": 1.0, "b": 1.02, "c": 9.0, "d": 9.5})).ranks
-    (trace,) = mean_ranks(ranks).plain()["data"]
+    (trace,) = draw_mean_ranks(ranks).plain()["data"]
     reach = {
         name: (x - low, x + high)
         for name, x, low, high in zip(

@@ -15,9 +15,9 @@ from pages import charts, read, unpacked
 from tractexp.report import candidates, overlay
 from tractexp.report.candidate_rows import (
     CHOSEN,
-    chance_level,
     describe_untestable_beside,
     explain_other_than_steepest,
+    find_chance_level,
     list_candidates,
 )
 from tractexp.report.events import BAND_DEVIATIONS
@@ -144,7 +144,7 @@ def test_many_events_are_folded_and_none_is_left_out(named, tmp_path):
     from tractexp.blocks import Report
 
     many = named.steps.overlays[:2] * 3
-    path = overlay.overlaid(Report("many"), many).save(tmp_path / "many.html")
+    path = overlay.add_overlays(Report("many"), many).save(tmp_path / "many.html")
     words = words_of(path)
     assert len(re.findall(r"event[12], fitted event[12]: dip of", words)) == 6
     assert "2 more events, fitted" in words
@@ -178,7 +178,7 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
     bars = charts[-1]["data"][0]
     assert bars["y"] == [row.names[0] for row in rows if np.isfinite(row.drop)]
     assert bars["marker"]["color"][0] == candidates.COLORS[CHOSEN]
-    assert charts[-1]["layout"]["shapes"][0]["x0"] == chance_level(steps)
+    assert charts[-1]["layout"]["shapes"][0]["x0"] == find_chance_level(steps)
     assert describe_untestable_beside(steps) in words
 
 

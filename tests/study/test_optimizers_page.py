@@ -13,7 +13,7 @@ import optimizers_tables
 import pytest
 
 from tractexp.configuration.plugin import build, discover, make_schema
-from tractexp.studies.comparison.statistics import vargha_delaney
+from tractexp.studies.comparison.statistics import compute_vargha_delaney
 
 STORED = json.loads(optimizers.STORED.read_text(encoding="utf-8"))
 PAGE = Path(__file__).parents[2] / "docs" / "optimizers.md"
@@ -147,6 +147,6 @@ def test_the_tables_count_what_is_stored():
         "reference",
     ]
     assert [cell.strip() for cell in rows["`pso`"]] == ["1.000", "67", "67", "100", "1.0", "0.78"]
-    assert vargha_delaney(
+    assert compute_vargha_delaney(
         np.array([1e-4, 1e-4, 0.2]), np.array([0.5, 0.005, 0.05])
     ) == pytest.approx(7 / 9)

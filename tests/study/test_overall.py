@@ -24,8 +24,8 @@ from tractexp.errors import UserError
 from tractexp.studies.bbob.runs import BbobPlan, BbobRun, BbobRuns
 from tractexp.studies.comparison import judging, overall_claims
 from tractexp.studies.comparison.ablation import VariantFamily
-from tractexp.studies.comparison.comparison import _median
-from tractexp.studies.comparison.load import _readable
+from tractexp.studies.comparison.comparison import _find_median
+from tractexp.studies.comparison.load import _refuse_unreadable
 from tractexp.studies.comparison.overall import rank_on_functions
 from tractexp.studies.comparison.runs import part_runs
 from tractexp.sweep import sweeper
@@ -141,7 +141,7 @@ def test_a_search_that_ended_with_its_first_population_tells_no_cost_of_an_itera
 )
 def test_the_median_of_an_odd_and_an_even_number_of_runs(values, median):
     variant = SimpleNamespace(objectives=dict(enumerate(map(float, values))))
-    assert _median(variant, range(len(values))) == median
+    assert _find_median(variant, range(len(values))) == median
 
 
 def test_a_job_that_cannot_be_read_says_why_in_the_first_line_of_the_reason():
@@ -149,7 +149,7 @@ def test_a_job_that_cannot_be_read_says_why_in_the_first_line_of_the_reason():
         pytest.raises(
             UserError, match=r"a/b\.csv cannot be read: a column is missing; run this job again"
         ),
-        _readable(Path("a/b.csv")),
+        _refuse_unreadable(Path("a/b.csv")),
     ):
         raise ValueError("a column is missing\nand more")
 
@@ -208,7 +208,7 @@ def test_the_variants_run_on_bbob_once_and_without_its_package_the_records_are_t
     def absent():
         raise judging.UserError("task=benchmark needs the package 'ioh', which is not installed")
 
-    monkeypatch.setattr(bbob, "package", absent)
+    monkeypatch.setattr(bbob, "import_package", absent)
     again = several(runs, folder=folder, bbob=1)  # read back: nothing is run
     assert again.overall[-1].figures == made.overall[-1].figures
     left = several(runs, folder=folder, bbob=2)

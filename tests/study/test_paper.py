@@ -13,7 +13,7 @@ import pytest
 from command_line import run_command
 
 from tractexp.blocks import Report
-from tractexp.blocks.markdown import markdown
+from tractexp.blocks.markdown import render_markdown
 from tractexp.errors import UserError
 from tractexp.identification.generalization import compare_depths, compute_mean_residual
 from tractexp.studies import searches
@@ -85,7 +85,9 @@ def generalised(tmp_path_factory):
 
 @pytest.mark.parametrize(("name", "sine"), [("issa", 4.29), ("ssa", 6.00), ("pso", 2.97)])
 def test_no_column_of_table_3_has_a_steady_state(name, sine):
-    assert equations.steady_state_sine(printed.TABLE_3[name]) == pytest.approx(sine, abs=0.005)
+    assert equations.compute_steady_state_sine(printed.TABLE_3[name]) == pytest.approx(
+        sine, abs=0.005
+    )
 
 
 def test_the_columns_of_table_3_cannot_fit_one_record_however_they_were_rounded():
@@ -108,7 +110,7 @@ def test_the_columns_of_table_3_cannot_fit_one_record_however_they_were_rounded(
         ]
         determinant = P[0] ** 2 * Q[1] ** 2 - P[1] ** 2 * Q[0] ** 2
         assert (P[0] ** 2 * E[1] - P[1] ** 2 * E[0]) / determinant < -1
-    found = equations.consistency()
+    found = equations.check_consistency()
     assert found.pairs["issa and ssa"][1] == pytest.approx(-1.319, abs=0.001)
     assert min(found.best) >= 0
     assert max(map(abs, found.misses.values())) > 0.05
@@ -121,7 +123,7 @@ def test_a_consistent_table_is_found_consistent(monkeypatch):
         for n in printed.COMPARED
     }
     monkeypatch.setattr(printed, "OBJECTIVE", made)
-    found = equations.consistency()
+    found = equations.check_consistency()
     assert found.best == pytest.approx((0.6, 0.3))
     assert max(map(abs, found.misses.values())) < 1e-12
 
@@ -134,16 +136,20 @@ def test_eq_4_as_printed_is_of_first_order():
     wrong = 1 + h + 5 / 18 * h**2 + h**3 / 27 + h**4 / 216
     right = 1 + h + h**2 / 2 + h**3 / 6 + h**4 / 24
     assert equations.step_as_printed(lambda y: y, one, h)[0] == pytest.approx(wrong, rel=1e-14)
-    assert equations.classical(lambda y: y, one, h)[0] == pytest.approx(right, rel=1e-14)
+    assert equations.step_classically(lambda y: y, one, h)[0] == pytest.approx(right, rel=1e-14)
     assert equations.order(equations.step_as_printed) == pytest.approx(1, abs=0.05)
-    assert equations.order(equations.classical) == pytest.approx(4, abs=0.05)
+    assert equations.order(equations.step_classically) == pytest.approx(4, abs=0.05)
 
 
 def test_what_is_printed_is_put_into_the_printed_equations(monkeypatch):
     """The columns of Table 3 fail; a table made of a machine and of one record's mean squares
     passes.
     """
-    failed = {(c.where, c.printed.partition(" ")[0]) for c in equations.checks() if not c.holds}
+    failed = {
+        (c.where, c.printed.partition(" ")[0])
+        for c in equations.check_printed_numbers()
+        if not c.holds
+    }
     assert {
         ("Table 3, ISSA", "C"),
         ("Table 3, SSA", "T'"),
@@ -159,13 +165,17 @@ def test_what_is_printed_is_put_into_the_printed_equations(monkeypatch):
         for n in printed.COMPARED
     }
     monkeypatch.setattr(printed, "OBJECTIVE", made)
-    assert not [c for c in equations.checks() if not c.holds and c.where.startswith("Table 3, ")]
+    assert not [
+        c
+        for c in equations.check_printed_numbers()
+        if not c.holds and c.where.startswith("Table 3, ")
+    ]
 
 
 def test_the_state_of_eq_3_is_at_rest_and_another_is_not(monkeypatch):
-    assert equations.rest_residual(equations.FAIR) < 1e-12
+    assert equations.compute_rest_residual(equations.FAIR) < 1e-12
     monkeypatch.setattr(np, "arcsin", lambda x: 1.1 * x)
-    assert equations.rest_residual(equations.FAIR) > 1e-3
+    assert equations.compute_rest_residual(equations.FAIR) > 1e-3
 
 
 def test_what_the_motor_draws_before_the_dip_is_that_of_the_equivalent_circuit():
@@ -175,11 +185,11 @@ def test_what_the_motor_draws_before_the_dip_is_that_of_the_equivalent_circuit()
     S = U**2 / np.conj(1j * X_s + 1j * X_m * rotor / (1j * X_m + rotor))
     X, X_prime = X_s + X_m, X_s + X_m * X_r / (X_m + X_r)
     value = {"T_m": S.real, "X_prime": X_prime, "C": (X - X_prime) / X}
-    assert equations.motor_reactive(value, U) == pytest.approx(S.imag, rel=1e-12)
+    assert equations.compute_motor_reactive(value, U) == pytest.approx(S.imag, rel=1e-12)
 
 
 def test_sparrow_search_as_printed_is_drawn_to_zero_and_particle_swarm_is_not():
-    found = equations.bias(budget=2000, seeds=3)
+    found = equations.measure_bias(budget=2000, seeds=3)
     for name in ("ssa", "issa"):
         near, far = found[name]
         assert far > 1e3 * near
@@ -198,13 +208,13 @@ def test_a_tent_orbit_follows_eq_14():
     for expected in (0.5, 5 / 7, (2 / 7) / 0.7):
         z = z / 0.3 if z < 0.3 else (1 - z) / 0.7
         assert z == pytest.approx(expected)
-    orbit = maps.tent_orbit(0.3, 100, 2, np.random.default_rng(1))
+    orbit = maps.compute_tent_orbit(0.3, 100, 2, np.random.default_rng(1))
     before, after = orbit[:-1], orbit[1:]
     assert after == pytest.approx(np.where(before < 0.3, before / 0.3, (1 - before) / 0.7))
 
 
 def test_a_logistic_orbit_follows_its_map():
-    orbit = maps.logistic_orbit(50, 3, np.random.default_rng(1))
+    orbit = maps.compute_logistic_orbit(50, 3, np.random.default_rng(1))
     assert orbit.shape == (50, 3)
     assert orbit[1:] == pytest.approx(4 * orbit[:-1] * (1 - orbit[:-1]))
 
@@ -213,7 +223,9 @@ def test_discrepancy_ranks_what_is_known_to_be_even():
     """Sobol points are more even than random ones, and these than the logistic map, which crowds at
     the walls.
     """
-    found = {k: np.median(v) for k, v in maps.discrepancies(64, 2, (0.3, 0.9), draws=40).items()}
+    found = {
+        k: np.median(v) for k, v in maps.measure_discrepancies(64, 2, (0.3, 0.9), draws=40).items()
+    }
     assert found["Sobol"] < 0.5 * found["uniform"] < found["uniform"] < 0.5 * found["logistic"]
     assert found["tent, alpha = 0.3"] < found["tent, alpha = 0.9"]
 
@@ -221,15 +233,19 @@ def test_discrepancy_ranks_what_is_known_to_be_even():
 def test_the_tail_exponent_of_known_tails_is_found():
     u = np.random.default_rng(0).random(200_000)
     for a in (0.7, 1.5, 3.0):
-        assert maps.tail_exponent(u ** (-1 / a)) == pytest.approx(a, rel=0.05)
+        assert maps.estimate_tail_exponent(u ** (-1 / a)) == pytest.approx(a, rel=0.05)
 
 
 def test_mantegnas_steps_have_exponent_three_halves_and_the_printed_ones_two_thirds():
     """|nu|^-(1/beta) for a normal nu exceeds x with probability ~ x^-beta, |nu|^-beta with
     x^-(1/beta).
     """
-    assert maps.tail_exponent(maps.flights("mantegna", 200_000, 1)) == pytest.approx(1.5, abs=0.15)
-    assert maps.tail_exponent(maps.flights("printed", 200_000, 1)) == pytest.approx(2 / 3, abs=0.07)
+    assert maps.estimate_tail_exponent(maps.draw_flights("mantegna", 200_000, 1)) == pytest.approx(
+        1.5, abs=0.15
+    )
+    assert maps.estimate_tail_exponent(maps.draw_flights("printed", 200_000, 1)) == pytest.approx(
+        2 / 3, abs=0.07
+    )
 
 
 # Eq. (21)
@@ -433,7 +449,7 @@ def test_a_figure_of_one_run_makes_one_search(memory, tmp_path, monkeypatch):
             tell=told.append,
         )
         study.prepare(["figure8"])
-        page.report(study, ["figure8"], claims.claims(study, ["figure8"]))
+        page.report(study, ["figure8"], claims.list_claims(study, ["figure8"]))
     assert made == [(["issa"], 1)] * 2
     again = "  1 of them were made before by the same code on the same records, and are read back"
     searched_, wrote = "searches of issa: seed 0, 300 iterations of 50", "writing Figure 8"
@@ -713,7 +729,7 @@ def test_the_second_valley_is_at_the_bound_of_C_and_attracts_whatever_the_bound(
 
     def static(values):
         known, event = dict(zip(problem.space.names, values, strict=True)), problem.events[0]
-        return event.Q0 - equations.motor_reactive(known, event.U0)
+        return event.Q0 - equations.compute_motor_reactive(known, event.U0)
 
     assert static(right) > 0.2
     assert static(left) < -1.5
@@ -841,15 +857,17 @@ def test_the_equations_alone_take_no_search(tmp_path, monkeypatch):
 
     monkeypatch.setattr(searches, "run", None)
     study = Study(_recipe, {}, _recipe().events, (), 30)
-    judged = claims.claims(study, ["equations"])
+    judged = claims.list_claims(study, ["equations"])
     assert [claim.verdict for claim in judged] == [verdict.REFUTED] * 2
-    text = markdown(page.report(study, ["equations"], judged))
-    assert text.count("| does not agree |") == sum(not check.holds for check in equations.checks())
+    text = render_markdown(page.report(study, ["equations"], judged))
+    assert text.count("| does not agree |") == sum(
+        not check.holds for check in equations.check_printed_numbers()
+    )
 
 
 def test_markdown_escapes_what_would_be_markup():
     report = Report("t").table(["a", "b"], [["x|y", "_z_"]])
-    assert markdown(report).endswith("\n\n| a | b |\n| --- | ---: |\n| x\\|y | \\_z\\_ |\n")
+    assert render_markdown(report).endswith("\n\n| a | b |\n| --- | ---: |\n| x\\|y | \\_z\\_ |\n")
 
 
 # Refusals

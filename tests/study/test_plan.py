@@ -29,7 +29,7 @@ from tractexp.identification.plan import (
 )
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
-from tractexp.report.plan import marks
+from tractexp.report.plan import list_marks
 
 SHAPE = DipShape(depth=0.4, duration=0.2, rate=500.0, noise_P=0.004, noise_Q=0.004, P0=1.0, Q0=1.0)
 
@@ -143,8 +143,21 @@ def test_shapes_that_cannot_be_recorded_are_refused():
 
 
 def test_marks_of_a_logarithmic_axis_are_few_and_round():
-    assert marks(0.3, 250.0) == [0.1, 1.0, 10.0, 100.0, 1000.0]
-    assert marks(0.9, 12.0) == [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
+    assert list_marks(0.3, 250.0) == [0.1, 1.0, 10.0, 100.0, 1000.0]
+    assert list_marks(0.9, 12.0) == [
+        0.1,
+        0.2,
+        0.5,
+        1.0,
+        2.0,
+        5.0,
+        10.0,
+        20.0,
+        50.0,
+        100.0,
+        200.0,
+        500.0,
+    ]
 
 
 def plan_command(*arguments, cwd):

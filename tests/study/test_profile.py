@@ -14,7 +14,7 @@ from printed_events import minimum, problem, records
 from tractexp.identification.profile import check_by_profiles, profile_parameters
 from tractexp.identification.profile_lanes import End
 from tractexp.identification.uncertainty import compute_threshold, conclude
-from tractexp.report.profile import meaning, report
+from tractexp.report.profile import describe_profile, report
 
 
 @pytest.fixture(scope="module")
@@ -181,4 +181,6 @@ def test_the_page_says_where_curvature_misleads(quiet):
         ({"ends": points}, "Not followed to its end downwards: raise points"),
         ({"minima": (0.02,)}, r"0\.02 fits about as well as the estimate"),
     ):
-        assert re.fullmatch(sentence + r"\.", meaning(found, replace(profile, **changes))), sentence
+        assert re.fullmatch(
+            sentence + r"\.", describe_profile(found, replace(profile, **changes))
+        ), sentence

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 import tractexp
 from tractexp.configuration.plugin import build_chosen
 from tractexp.discrepancy.window_search import _choose_window
-from tractexp.domain.excitation import phasors
+from tractexp.domain.excitation import excite_phasors
 from tractexp.errors import UserError
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.recorder_window import RecorderWindow, list_recorder_windows
@@ -204,15 +204,15 @@ def test_a_model_set_to_a_window_is_looked_at_as_an_investigation_looks(window):
     recorder = RecorderWindow(shape.length if shape else window, shape)
     assert recorder.setting == window
     behind = Drive.from_events(
-        [phasors(recorder.sharpen_event(event), load.place_behind_recorder(recorder))]
+        [excite_phasors(recorder.sharpen_event(event), load.place_behind_recorder(recorder))]
     )
     through = tractexp.compose(window=window).model
-    drive = Drive.from_events([phasors(event, through)])
+    drive = Drive.from_events([excite_phasors(event, through)])
     values = np.array([[p.default for p in load.parameters]])
     assert drive.inputs == pytest.approx(behind.inputs, nan_ok=True)
     expected = load.place_behind_recorder(recorder).simulate(behind, values).outputs
     assert through.simulate(drive, values).outputs == pytest.approx(expected, abs=1e-12)
-    plain = load.simulate(Drive.from_events([phasors(event, load)]), values).outputs
+    plain = load.simulate(Drive.from_events([excite_phasors(event, load)]), values).outputs
     assert np.abs(expected - plain).max() > 1e-3
 
 
@@ -222,9 +222,10 @@ def test_a_window_that_the_records_say_is_theirs():
     said = replace(event, record=replace(event.record, window=shape))
     model = tractexp.compose(window="recorded").model
     assert np.array_equal(
-        phasors(said, model).window, phasors(event, tractexp.compose(window="p_class").model).window
+        excite_phasors(said, model).window,
+        excite_phasors(event, tractexp.compose(window="p_class").model).window,
     )
-    assert phasors(event, model).window is None
+    assert excite_phasors(event, model).window is None
     assert RecorderWindow(shape.length, shape, said=True).setting == "recorded"
 
 

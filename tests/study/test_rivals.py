@@ -44,7 +44,7 @@ def test_the_operations_of_a_kernel_are_counted():
 
     from tractexp.kernel import target
 
-    if "+avx512f" not in target.processor()[1].split(","):
+    if "+avx512f" not in target.describe_processor()[1].split(","):
         pytest.skip("operations are counted where a vector of a kernel is one of the processor's")
     least = arithmetic.limit(simulation.base().source, 1, 3)
     # four slopes of three states, at least four operations each; two exponentials of at least ten

@@ -10,10 +10,10 @@ import pytest
 from conftest import no_term_is_searched
 
 import tractexp
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.model.drive import Drive
 from tractexp.model.model import LARGEST_OUTPUT
-from tractexp.report.discrepancy import gap
+from tractexp.report.discrepancy import build_gap_table
 
 HEAVY = {
     "T_prime": 0.1,
@@ -88,7 +88,7 @@ def test_a_table_of_waveforms_keeps_its_columns_where_currents_have_no_number():
         role: {"before": misfit, "after": misfit, "closed": None}
         for role, misfit in (("train", fitted), ("validate", held_out))
     }
-    table = gap({"effects": [], "gap": gaps})
+    table = build_gap_table({"effects": [], "gap": gaps})
     assert [len(row) for row in table.rows] == [len(table.columns)] * 2
     assert table.rows[1][2] == "the motor stalls"
 
@@ -127,7 +127,7 @@ def test_an_identification_tells_it_too(dips, tmp_path):
 def test_what_diverges_is_no_number(dips):
     """A flux that turns backwards faster than steps can follow."""
     model, event = tractexp.compose().model, dips[2]
-    domain = domain_of(model)
+    domain = find_domain(model)
     drive = Drive.from_events([domain.excitation(event, model)])
     values = np.array([{**HEAVY, **WEAK, "M": 2e-5}[name] for name in model.names])
     outputs = model.simulate(drive, values, 1).outputs[:, 0]
@@ -140,7 +140,7 @@ def test_what_diverges_is_no_number(dips):
 def test_a_load_that_has_stopped_itself_does_not_stall_in_a_model_that_does_as_it_did(dips):
     """Where the record shows the current of standstill, a model that draws it is right."""
     event = dips[2]
-    domain, record = domain_of(event), event.record
+    domain, record = find_domain(event), event.record
     stopped = 4.0 * np.ones(record.samples)
     stopped[: event.start] = 1.0
     assert domain.comparison(event, np.stack([stopped, 0 * stopped])).stalls

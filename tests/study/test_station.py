@@ -316,7 +316,7 @@ def test_a_load_that_no_dip_predicts_is_told(fitted):
         event |= {"predicted": None, "expected": None, "error": None}
     row = station.tell_load(load)
     assert (row["share"], row["spread"]) == (None, None)
-    for text in (station.report(content).html, str(station.screen(content))):
+    for text in (station.report(content).html, str(station.build_screen(content))):
         assert "the motor stalls" in text
         assert "unusable" in text
         assert "not told" in text

@@ -9,7 +9,7 @@ import tractexp
 from tractexp.configuration.plugin import get
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
-from tractexp.record.window import average, mean_weights
+from tractexp.record.window import average, build_mean_weights
 
 TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55}
 STEP = 5e-3
@@ -259,7 +259,7 @@ def record_through_a_window(depth, rng):
     fine, every = 5e-4, slice(0, None, 20)
     t = np.arange(4000) * fine
     U = 1 - depth * (np.clip((t - 0.5) / 0.0015, 0, 1) - np.clip((t - 0.65) / 0.0015, 0, 1))
-    still, weights = np.ones(len(t)), mean_weights(0.02 / fine)
+    still, weights = np.ones(len(t)), build_mean_weights(0.02 / fine)
     event = Excitation(fine, U, still, still, 1.0, 1.0, 0.6, omega_s=0 * t, window=weights)
     load = compose(get("model/motor", "stator_flux")(), get("model/static", "constant_impedance")())
     values = np.array([[FAST[name] for name in load.names]])

@@ -104,7 +104,7 @@ def test_the_page_and_the_extended_model(planted, tmp_path):
 
 def test_the_page_shows_the_currents_of_the_phases_before_and_after(planted):
     first = planted.steps.overlays[0]
-    chart = overlay.currents(first.event, first).plain()
+    chart = overlay.draw_currents(first.event, first).plain()
     curves = {trace["name"] for trace in chart["data"]}
     assert {"phase a", "measured", "base model", "extended model", "± 2 σ of the noise"} <= curves
     shown = chart["layout"]["xaxis"]["range"]

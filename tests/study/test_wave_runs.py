@@ -13,7 +13,7 @@ import pytest
 
 import tractexp
 from tractexp.configuration.plugin import get
-from tractexp.domain import WAVES, domain_of
+from tractexp.domain import WAVES, find_domain
 from tractexp.domain.playback import measure_as_phasors, measure_unsteadiness
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Grade
@@ -21,7 +21,7 @@ from tractexp.identification.advice import advise, advise_domain
 from tractexp.identification.plan import DipShape, forecast_intervals
 from tractexp.inference.problem import Problem
 from tractexp.record import convert_to_waves
-from tractexp.report.waves import Drawn, spectra, wave_chart
+from tractexp.report.waves import Drawn, compute_spectra, draw_waves
 
 LOAD = {"motor": "stator_flux", "static": "exponential", "domain": "waves"}
 BEFORE = {"U0": 1.0, "P0": 0.8, "Q0": 0.5, "frequency": 50.0}
@@ -101,7 +101,7 @@ def test_the_page_shows_currents_spectra_and_the_power_of_the_same_estimator(fit
 
 def test_currents_are_drawn_whole_and_the_dip_is_in_view(fit):
     (one,) = fit.details.fits
-    drawn = wave_chart(one.waves, [Drawn("estimate", one.currents, "#000000")]).plain()
+    drawn = draw_waves(one.waves, [Drawn("estimate", one.currents, "#000000")]).plain()
     low, high = drawn["layout"]["xaxis"]["range"]
     assert low < one.waves.t_start < one.waves.t_end < high
     assert high - low < 0.5
@@ -127,7 +127,7 @@ def test_a_spectrum_tells_frequency_and_size_of_what_is_left(dip):
     t = event.record.t
     planted = np.nan_to_num(event.currents).copy()
     planted[0] += 0.03 * size * np.cos(2 * np.pi * 5 * event.f0 * t)  # alpha is phase a
-    for spectrum in spectra(event, planted):
+    for spectrum in compute_spectra(event, planted):
         row = spectrum.amplitudes[0]
         assert spectrum.frequencies[row.argmax()] == pytest.approx(250, abs=1)
         assert row.max() == pytest.approx(0.03, rel=0.01)
@@ -178,7 +178,7 @@ def test_a_slow_voltage_draws_in_waveforms_what_it_draws_in_phasors():
     for domain in ("waves", "phasors"):
         model = tractexp.compose(**LOAD | {"domain": domain}).model
         values = np.array([p.default for p in model.parameters])
-        made.append(np.stack(domain_of(model).play(model, values, t, U, BEFORE)))
+        made.append(np.stack(find_domain(model).play(model, values, t, U, BEFORE)))
     np.testing.assert_allclose(made[0], made[1], atol=4e-3)
     assert np.ptp(made[1][0]) > 0.04
 

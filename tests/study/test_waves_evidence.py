@@ -1,5 +1,5 @@
 """Waveforms of known truth through the product: a short run of benchmarks/waves.py and
-benchmarks/waves_hidden.py, and their noise by `of_waves`.
+benchmarks/waves_hidden.py, and their noise by `estimate_wave_noise`.
 
 The generator's equations, frame and solver are its own; it is judged first.
 """
@@ -32,7 +32,7 @@ from independent.circuit import (
 from independent.fault import Fault, vector
 from independent.sampler import CurrentTransformer, Sampler
 from independent.source import OMEGA
-from tractexp.noise.waves import covariances, of_waves, solve_levinson
+from tractexp.noise.waves import compute_covariances, estimate_wave_noise, solve_levinson
 from tractexp.record import convert_to_waves
 
 MACHINE = Machine(Rs=0.03, Xs=0.10, Xm=3.2, Rr=0.018, Xr=0.18, H=0.7)
@@ -181,7 +181,7 @@ def test_noise_that_turns_one_way_is_whitened_and_its_parts_are_told_apart():
     residuals = np.stack([slow.real + own[0], slow.imag + own[1], np.zeros(len(slow))])
     known = np.ones(residuals.shape, dtype=bool)
     known[2] = False
-    noise = of_waves(residuals, known, [slice(0, 5000)], (answer, np.zeros(400)), 3)
+    noise = estimate_wave_noise(residuals, known, [slice(0, 5000)], (answer, np.zeros(400)), 3)
     white = noise.pairs[0][0].whiten(
         residuals[0] + 1j * residuals[1], np.ones(len(slow), dtype=bool)
     )
@@ -191,7 +191,7 @@ def test_noise_that_turns_one_way_is_whitened_and_its_parts_are_told_apart():
     ]
     assert max(lagged) < 5 / np.sqrt(len(white))
     least = solve_levinson(
-        np.r_[covariances(answer, 48)[0] + 0.25, covariances(answer, 48)[1:]]
+        np.r_[compute_covariances(answer, 48)[0] + 0.25, compute_covariances(answer, 48)[1:]]
     ).deviation[-1]
     assert noise.pairs[0][0].deviation[-1] == pytest.approx(least, rel=0.03)
 

@@ -12,7 +12,7 @@ from field_waves import KA, KV, dip, load, noise, phases, recording, wave
 from tractexp.errors import UserError
 from tractexp.recording import Feeder
 from tractexp.recording.arrangement import arrange_feeder, tune_frequency
-from tractexp.recording.measure import phasors_of
+from tractexp.recording.measure import measure_phasors
 
 T = np.arange(4800) / 3200
 GIVEN = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
@@ -33,7 +33,7 @@ def fault(share=0.3):
 
 
 def power(record, feeder):
-    seen = phasors_of(record, feeder, record.segments[0])
+    seen = measure_phasors(record, feeder, record.segments[0])
     return complex(np.median(seen.S))
 
 

@@ -11,8 +11,8 @@ import tractexp
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
 from tractexp.filetypes import cev
-from tractexp.filetypes.cev_text import checksum
-from tractexp.record.reader import reader_of
+from tractexp.filetypes.cev_text import compute_checksum
+from tractexp.record.reader import find_reader
 
 KILOVOLT, AMPERE, LAG, F, PER_CYCLE = 63.5, 200.0, np.deg2rad(30), 49.98, 32
 COLUMNS = ["IA", "IB", "IC", "IG", "VA(kV)", "VB(kV)", "VC(kV)", "*", "VDC", "FREQ"]
@@ -23,7 +23,7 @@ BITS = "50P1 * 51P TRIP 52A RB1 RB2 RB3 RB4"
 def row(*cells):
     """Cells of a line with its checksum, as in the appendix Compressed ASCII."""
     text = "".join(f"{cell}," for cell in cells)
-    return f'{text}"{checksum(text)}"'
+    return f'{text}"{compute_checksum(text)}"'
 
 
 def names(*cells):
@@ -93,8 +93,8 @@ def test_a_row_that_is_lost_or_double_is_noted(write, change):
 
 
 def test_the_checksum_is_that_of_the_manual():
-    assert checksum('"FID",') == "0143"  # printed in the manual of the SEL-311L
-    assert checksum('"MONTH","DAY","YEAR","HOUR","MIN","SEC","MSEC",') == "0ACA"
+    assert compute_checksum('"FID",') == "0143"  # printed in the manual of the SEL-311L
+    assert compute_checksum('"MONTH","DAY","YEAR","HOUR","MIN","SEC","MSEC",') == "0ACA"
 
 
 def test_a_report_is_read_in_primary_instantaneous_values(write):
@@ -223,7 +223,7 @@ def filtered(f, per_cycle=4, U=None, told=()):
 def test_two_samples_of_a_filtered_report_are_the_phasor(write, per_cycle, nominal):
     f = np.full(round(1.5 * nominal * per_cycle), nominal - 0.4)
     path = write(filtered(f, per_cycle)[1])
-    assert reader_of(str(path)).name == "csv"
+    assert find_reader(str(path)).name == "csv"
     [event] = tractexp.read(str(path))
     assert event.record.base.voltage == pytest.approx(KILOVOLT * np.sqrt(3), rel=1e-5)
     assert event.record.base.power == pytest.approx(3 * KILOVOLT * AMPERE / 1e3, rel=1e-5)
@@ -261,7 +261,7 @@ def test_a_raw_report_of_a_relay_that_tracks_is_evened(write):
     first = next(k for k, line in enumerate(lines) if "TRIG" in line) + 1
     for k in range(1920):
         text = lines[first + k].rpartition(',"')[0].replace("49.98", f"{f[k]:.2f}") + ","
-        lines[first + k] = f'{text}"{checksum(text)}"'
+        lines[first + k] = f'{text}"{compute_checksum(text)}"'
     recording = cev.load(write(lines))
     [segment] = recording.segments
     assert segment.t[-1] == pytest.approx(t[-1], rel=1e-9)

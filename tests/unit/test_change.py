@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tractexp.record.change import load_changes, voltage_changes
+from tractexp.record.change import find_voltage_changes, load_changes
 
 N = 20  # samples in a cycle
 AT = 50 * N
@@ -62,5 +62,5 @@ def test_what_follows_the_voltage_is_an_answer():
     U = stepped(1.0, 0.98)
     for exponent, steps in ((1.5, 0), (10.0, 2)):
         assert len(load_changes(U, U**exponent, np.zeros(len(U)), N)) == steps
-    assert len(voltage_changes(U, N)) == 2
-    assert voltage_changes(stepped(1.0, 0.995), N) == []
+    assert len(find_voltage_changes(U, N)) == 2
+    assert find_voltage_changes(stepped(1.0, 0.995), N) == []

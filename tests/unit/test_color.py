@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
 
-from tractexp.noise.color import Autoregression, fit_autoregression, stretches
+from tractexp.noise.color import Autoregression, cut_stretches, fit_autoregression
 
 
 def test_burg_finds_the_coefficients_and_aicc_the_order():
@@ -41,4 +41,4 @@ def test_a_gap_ends_the_memory_and_counts_for_nothing():
     assert (white[~known] == 0).all()
     assert white[20] == pytest.approx(x[20] * np.sqrt(1 - a * a))
     assert white[21] == pytest.approx(x[21] - a * x[20])
-    assert [len(s) for s in stretches(x, known)] == [17, 20]
+    assert [len(s) for s in cut_stretches(x, known)] == [17, 20]

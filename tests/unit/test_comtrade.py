@@ -565,11 +565,11 @@ def test_what_cannot_be_written_is_refused(pair, tmp_path):
 
 
 def test_foreign_files_are_named():
-    assert foreign.sentence("a/b.PL4").startswith("a/b.PL4 is ATP's plot file")
-    assert "have it write .out files" in foreign.sentence("run.psout")
-    assert foreign.sentence("a/b.pqd") == ""
-    assert "give the .cfg beside it" in foreign.sentence("x.hdr")
-    assert foreign.sentence("x.cfg") == ""
+    assert foreign.describe_foreign_file("a/b.PL4").startswith("a/b.PL4 is ATP's plot file")
+    assert "have it write .out files" in foreign.describe_foreign_file("run.psout")
+    assert foreign.describe_foreign_file("a/b.pqd") == ""
+    assert "give the .cfg beside it" in foreign.describe_foreign_file("x.hdr")
+    assert foreign.describe_foreign_file("x.cfg") == ""
     records = [
         name
         for name in ("a.PL4", "b.psout", "c.rec", "d.hdr", "e.zip", "f.pdf", "g.cfg")

@@ -7,7 +7,7 @@ import tractexp
 from tractexp.filetypes import comtrade_table
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.record import detect
-from tractexp.record.reader import reader_of
+from tractexp.record.reader import find_reader
 from tractexp.recording.recording import Channel, Recording, Segment
 
 UNITS = {"kV": "voltage", "kA": "current"}
@@ -50,7 +50,7 @@ NAMES = [
 def test_powers_at_a_value_a_cycle_are_a_table(saved, names, rate, kind):
     _, *columns = values(rate)
     path = saved([*zip(names, ("kV", "MW", "Mvar", "Hz"), columns, strict=True)], rate, kind=kind)
-    assert reader_of(path).name == "csv"
+    assert find_reader(path).name == "csv"
     (event,) = tractexp.read(path)
     assert event.t_start == pytest.approx(8.0, abs=1 / rate)
     assert event.depth == pytest.approx(0.3, abs=0.01)
@@ -105,7 +105,7 @@ def test_powers_without_currents_are_a_table_however_fast(saved):
     path = saved(
         [*zip(("U", "P", "Q", "f"), ("kV", "MW", "Mvar", "Hz"), columns, strict=True)], 1000.0
     )
-    assert reader_of(path).name == "csv"
+    assert find_reader(path).name == "csv"
     assert tractexp.read(path)[0].depth == pytest.approx(0.3, abs=0.01)
 
 
@@ -120,7 +120,7 @@ def test_waveforms_stay_waveforms_with_powers_beside_them(saved):
     ]
     path = saved(columns, 1600.0)
     assert comtrade_table.holds_waveforms(path)
-    assert reader_of(path).name == "comtrade"
+    assert find_reader(path).name == "comtrade"
 
 
 def test_several_feeders_are_asked_about_once_and_the_answer_helps(saved):

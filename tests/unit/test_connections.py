@@ -10,9 +10,9 @@ import pytest
 from tractexp.api.read import record_from_dict, record_to_dict
 from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import UserError
-from tractexp.record.phasor import TURN, sequences
+from tractexp.record.phasor import TURN, compute_sequences
 from tractexp.recording import Channel, Feeder, Recording, Segment
-from tractexp.recording.measure import phasors_of
+from tractexp.recording.measure import measure_phasors
 from tractexp.recording.reader import WaveformReader
 
 BALANCED = np.array([1.0, TURN**2, TURN])
@@ -88,7 +88,7 @@ def test_what_equal_arms_do_to_the_balance(name):
     both = arms(name, 4.0)
     U = np.array([(arm.voltage() @ BALANCED)[0] for arm in both])
     I = primary(both, U * (0.8 - 0.6j))
-    positive, negative = np.abs(sequences(I[:, None]))[:, 0]
+    positive, negative = np.abs(compute_sequences(I[:, None]))[:, 0]
     assert negative / positive == pytest.approx(0.5 if name == "v_v" else 0.0, abs=1e-12)
     apart = abs(np.angle(U[0] / U[1], deg=True))
     assert apart == pytest.approx(120 if name == "v_v" else 90)
@@ -99,7 +99,9 @@ def test_one_arm_alone_is_a_load_between_phases(both):
     """A single-phase load: its negative sequence is as great as the positive, whatever the
     transformer.
     """
-    positive, negative = np.abs(sequences(primary(both, np.array([1.0, 0.0]))[:, None]))[:, 0]
+    positive, negative = np.abs(compute_sequences(primary(both, np.array([1.0, 0.0]))[:, None]))[
+        :, 0
+    ]
     assert negative == pytest.approx(positive)
 
 
@@ -278,16 +280,18 @@ def test_skew_is_corrected_by_channel_and_refused_where_a_phase_is_made_of_sever
     )
     made = recording(names, skew={name: 3e-4 for name in ("Ia", "Ib", "Ic")})
     feeder = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
-    S = phasors_of(made, feeder, made.segments[0], skew=True).S
+    S = measure_phasors(made, feeder, made.segments[0], skew=True).S
     assert np.abs(S.imag).max() < 1e-6
     odd = recording(names, skew={"Ia": 3e-4})
     aron = Feeder((0, 1, 2), (3, 5), "aron")
     with pytest.raises(UserError, match="Ia, Ic are sampled at different times"):
-        phasors_of(odd, aron, odd.segments[0], skew=True)
+        measure_phasors(odd, aron, odd.segments[0], skew=True)
 
 
 @pytest.mark.parametrize("harmonics", [[1], [40]])
 def test_harmonics_that_cannot_be_seen_are_refused(harmonics):
     made = recording({"U": np.ones(4000), "I": np.ones(4000)})
     with pytest.raises(UserError, match=r"data\.harmonics=.* at 4000 Hz they can be 2 to 36"):
-        phasors_of(made, Feeder((0,), (1,), "single_phase"), made.segments[0], harmonics=harmonics)
+        measure_phasors(
+            made, Feeder((0,), (1,), "single_phase"), made.segments[0], harmonics=harmonics
+        )

@@ -16,9 +16,9 @@ from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.filetypes.sidecar import read_sidecar
 from tractexp.filetypes.tidy import (
-    recording_of,
+    convert_record,
+    make_unique,
     restore_recording,
-    unique,
     write_record,
     write_recording,
 )
@@ -215,7 +215,14 @@ def test_a_sidecar_of_another_table_is_refused(tmp_path):
 
 
 def test_names_are_made_different():
-    assert unique(["t", "a", "a", "", "a", "t"]) == ["t", "a", "a (2)", "unnamed", "a (3)", "t (2)"]
+    assert make_unique(["t", "a", "a", "", "a", "t"]) == [
+        "t",
+        "a",
+        "a (2)",
+        "unnamed",
+        "a (3)",
+        "t (2)",
+    ]
 
 
 class TestCOMTRADE:
@@ -293,7 +300,7 @@ class TestCOMTRADE:
             "f": "Hz",
             "U2": "kV",
         }
-        for channel in recording_of(record).channels:
+        for channel in convert_record(record).channels:
             np.testing.assert_array_equal(made[channel.name].raw, channel.raw)
 
     def test_what_cannot_be_is_refused(self, station, tmp_path):

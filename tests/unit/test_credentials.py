@@ -4,7 +4,7 @@ import pytest
 
 from tractexp.errors import UserError
 from tractexp.storage import credentials
-from tractexp.tracking import address
+from tractexp.tracking import resolve_address
 from tractexp.tracking.store import open_store
 
 SECRET = "hunter2"
@@ -56,7 +56,7 @@ FREE = [
 @pytest.mark.parametrize("text", HELD)
 def test_an_address_with_a_password_is_refused_without_repeating_it(text):
     for enter in (
-        address,
+        resolve_address,
         open_store,
         lambda t: credentials.check("", {"tracking": {"uri": t}, "seed": 1}),
     ):

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from tractexp.errors import UserError
 from tractexp.record import Record, describe, detect, dips, find_dips
-from tractexp.record.event import noise
-from tractexp.record.fall import falls, sample_noise
+from tractexp.record.event import estimate_noise
+from tractexp.record.fall import find_falls, sample_noise
 from tractexp.record.own_base import OwnBase
 
 
@@ -58,7 +58,7 @@ def test_noise_ignores_a_linear_trend_and_gaps():
     values[100:110] = np.nan
     x = np.column_stack([np.ones(990), t[np.isfinite(values)]])
     rest = np.linalg.lstsq(x, values[np.isfinite(values)], rcond=None)[1][0]
-    assert noise(t, values) == pytest.approx(np.sqrt(rest / 988), rel=1e-9)
+    assert estimate_noise(t, values) == pytest.approx(np.sqrt(rest / 988), rel=1e-9)
 
 
 def test_noise_from_sample_to_sample_is_the_standard_deviation_whatever_is_slow():
@@ -413,11 +413,11 @@ def test_dips_and_swells_are_the_same_in_any_unit_of_voltage(size):
         (7000, 7200, -0.3),
     ):
         U[first:stop] += change
-    lower, higher = falls(t, U)
+    lower, higher = find_falls(t, U)
     assert [start for start, _ in lower] == [1500, 2500, 7000]
     assert [end for _, end in higher] == [700]
     assert 601 <= higher[0][0] <= 603  # where it leaves a tenth of the margin
-    assert falls(t, size * U) == (lower, higher)
+    assert find_falls(t, size * U) == (lower, higher)
 
 
 def test_the_end_of_a_dip_that_never_ends_is_that_of_the_record():

@@ -9,8 +9,8 @@ from field_waves import KA, dip, load, noise, phases, recording, wave
 import tractexp
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.recording.label import groups, order
-from tractexp.recording.measure import phasors_of
+from tractexp.recording.label import find_label_groups, order
+from tractexp.recording.measure import measure_phasors
 from tractexp.recording.proposal import propose
 from tractexp.recording.recording import Channel
 
@@ -73,7 +73,9 @@ def test_channels_in_any_order_are_put_in_that_of_their_phases():
 
 def test_phases_belong_together_though_one_lacks_a_number():
     names = ["12-Ia", "13-Ib", "Ic"]
-    (found,) = groups({k: Channel(name, np.zeros(1), "A") for k, name in enumerate(names)})
+    (found,) = find_label_groups(
+        {k: Channel(name, np.zeros(1), "A") for k, name in enumerate(names)}
+    )
     assert found.numbers == (0, 1, 2)
     assert found.name == ""
 
@@ -235,13 +237,13 @@ def test_line_voltages_and_two_of_them_and_two_transformers():
     assert (aron.connection, aron.currents) == ("aron", (3, 4))
     [both] = propose(recording([*lines[:2], I[0], I[2]], names=["Uab", "Ubc", "Ia", "Ic"]))
     assert both.connection == {"name": "two_line_voltages", "phases": "ac"}
-    whole = phasors_of(made := recording([*V, *I]), propose(made)[0], made.segments[0])
+    whole = measure_phasors(made := recording([*V, *I]), propose(made)[0], made.segments[0])
     for feeder, waves in (
         (three, [*lines, *I]),
         (two, [*lines[:2], *I]),
         (both, [*lines[:2], I[0], I[2]]),
     ):
-        seen = phasors_of(recording(waves, names=NAMES[len(waves)]), feeder, made.segments[0])
+        seen = measure_phasors(recording(waves, names=NAMES[len(waves)]), feeder, made.segments[0])
         np.testing.assert_allclose(seen.S, whole.S, rtol=1e-6)
 
 

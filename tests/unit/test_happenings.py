@@ -11,8 +11,8 @@ from field_waves import KA, KV, load, noise, phases, recording, wave
 from tractexp.filetypes import comtrade
 from tractexp.record import Base, Record
 from tractexp.recording import Feeder
-from tractexp.recording.happening import happenings_in, happenings_of
-from tractexp.recording.measure import FeederWaves, phasors_of
+from tractexp.recording.happening import find_happenings, find_happenings_of_record
+from tractexp.recording.measure import FeederWaves, measure_phasors
 from tractexp.recording.trace import trace_waves
 
 SEEDS = range(4)
@@ -30,8 +30,8 @@ def seen(t, volts, amps, f=50.0, sigma=0.002, seed=0, rate=3200.0, extra=0.0, no
 def of(record, feeder):
     [segment] = record.segments
     waves = FeederWaves.from_recording(record, feeder, segment)[:, :]
-    phasors = phasors_of(record, feeder, segment)
-    return happenings_in(trace_waves(waves, segment.rate, 0.0, record.frequency, phasors))
+    phasors = measure_phasors(record, feeder, segment)
+    return find_happenings(trace_waves(waves, segment.rate, 0.0, record.frequency, phasors))
 
 
 def grid(seconds, rate=3200.0):
@@ -305,7 +305,7 @@ class TestOfRecords:
     def test_a_dip(self):
         U = np.ones(3000) + noise(3000, 0.001)
         U[1000:1150] -= 0.4
-        [event] = happenings_of(self.record(U))
+        [event] = find_happenings_of_record(self.record(U))
         assert (event.kind, event.worth) == ("dip", True)
         assert (event.start, event.end) == (
             pytest.approx(1.0, abs=0.02),
@@ -316,14 +316,14 @@ class TestOfRecords:
     def test_an_open_pole_by_its_negative_sequence(self):
         U, U2 = np.ones(8000), np.zeros(8000)
         U[1000:6000], U2[1000:6000] = 0.63, 0.365
-        [event] = happenings_of(self.record(U, U2))
+        [event] = find_happenings_of_record(self.record(U, U2))
         assert event.kind == "open pole"
 
     def test_a_jump_of_the_angle_is_the_area_under_the_frequency(self):
         U, f = np.ones(3000), np.full(3000, 50.0)
         U[1000:1200] = 0.7
         f[1000:1010] += 5.0  # 5 Hz for 10 ms: 18 degrees
-        [event] = happenings_of(self.record(U, f=f))
+        [event] = find_happenings_of_record(self.record(U, f=f))
         assert event.jump == pytest.approx(18.0, abs=1.0)
 
     @pytest.mark.parametrize("step", [1e-3, 5e-3, 20e-3])
@@ -334,7 +334,8 @@ class TestOfRecords:
         tap = np.where(t > 2, 0.95, 1.0)
         for U, kind in ((swell, "swell"), (tap, "step")):
             assert [
-                event.kind for event in happenings_of(self.record(U + noise(n, 5e-4), step=step))
+                event.kind
+                for event in find_happenings_of_record(self.record(U + noise(n, 5e-4), step=step))
             ] == [kind]
 
 
@@ -343,9 +344,9 @@ def test_the_two_dips_of_the_220_kv_station(shared_data):
     feeder = Feeder((4, 5, 6), (8, 9, 10), "three_phase")
     events = []
     for segment in record.waveforms():
-        phasors = phasors_of(record, feeder, segment)
+        phasors = measure_phasors(record, feeder, segment)
         waves = FeederWaves.from_recording(record, feeder, segment)[:, :]
-        events += happenings_in(trace_waves(waves, segment.rate, segment.start, 50.0, phasors))
+        events += find_happenings(trace_waves(waves, segment.rate, segment.start, 50.0, phasors))
     assert [(event.kind, event.worth) for event in events] == [("dip", True)] * 2
     assert [event.depth for event in events] == pytest.approx([0.131, 0.127], abs=0.003)
 

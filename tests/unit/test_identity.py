@@ -7,7 +7,14 @@ import numpy as np
 import tractexp
 from tractexp.api.setup import describe_records
 from tractexp.record import Base, Record, detect
-from tractexp.record.identity import UNKNOWN, Identity, describe_identities, distinct, label, title
+from tractexp.record.identity import (
+    UNKNOWN,
+    Identity,
+    compose_title,
+    describe_identities,
+    label,
+    list_distinct,
+)
 from tractexp.record.record import LOAD
 
 SOURCE = {
@@ -73,9 +80,12 @@ def test_what_is_unknown_of_several_records_is_said_once_with_those_it_concerns(
 def test_dips_of_one_recording_are_one_load():
     identities = [Identity.from_record(record(k)) for k in (1, 2)]
     assert [one.dip for one in identities] == ["dip 1", "dip 2"]
-    assert len(distinct(identities)) == 1
-    assert (label(identities), title(identities, ["a", "b"])) == ("North, T2", "North, T2: a, b")
-    assert title([], ["a"]) == "a"
+    assert len(list_distinct(identities)) == 1
+    assert (label(identities), compose_title(identities, ["a", "b"])) == (
+        "North, T2",
+        "North, T2: a, b",
+    )
+    assert compose_title([], ["a"]) == "a"
 
 
 def test_the_console_says_of_each_recording_once_what_it_is_of():

@@ -14,7 +14,7 @@ from tractexp.errors import UserError
 from tractexp.identification.linear_network import CRITERION, choose_network, fit_black_boxes
 from tractexp.identification.projection import Projection, compute_pole_response, compute_port_basis
 from tractexp.record import Record, detect
-from tractexp.record.synthetic import synthetic_event
+from tractexp.record.synthetic import build_synthetic_event
 
 RATE, F0 = 3200.0, 50.0
 # a rotor's and a stator's, in the frame
@@ -51,7 +51,7 @@ def planted(v, poles, shares, step=1 / RATE):
 def in_waves(v, i, start=640):
     """An event in waveforms of vectors (N,) in the frame."""
     t = np.arange(len(v)) / RATE
-    made = synthetic_event("made", t, v, (1.0, P0, Q0), F0, start, start + 190)
+    made = build_synthetic_event("made", t, v, (1.0, P0, Q0), F0, start, start + 190)
     i = i * made.turn
     return replace(made, currents=np.stack([i.real, i.imag, np.full(len(t), np.nan)]))
 
@@ -197,7 +197,7 @@ def test_a_single_phase_has_a_network_of_its_own():
     u = v.real + 1j * np.concatenate([v.imag[:quarter], v.real[:-quarter]])
     i = (0.6 * u + 100 * compute_pole_response(u, -30.0, 1 / RATE)).real
     I = 2 * np.mean((i * np.exp(-2j * np.pi * F0 * t))[before:start])
-    made = synthetic_event(
+    made = build_synthetic_event(
         "made", t, u * np.exp(-2j * np.pi * F0 * t), (1.0, I.real, -I.imag), F0, start, start + 190
     )
     i[:before] = np.nan

@@ -13,9 +13,9 @@ from tractexp.configuration.plugin import build
 from tractexp.filetypes import comtrade, comtrade_samples
 from tractexp.recording import Feeder
 from tractexp.recording.excursion import SLIDING, _count_samples_inside
-from tractexp.recording.measure import FeederWaves, phasors_of
+from tractexp.recording.measure import FeederWaves, measure_phasors
 from tractexp.recording.overview import describe_loads
-from tractexp.recording.quality import _variances, quality
+from tractexp.recording.quality import _compute_variances, assess_quality
 
 RATE, SECONDS = 10_000.0, 60
 FEEDER = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
@@ -89,14 +89,14 @@ def test_loads_are_measured_a_block_at_a_time(long):
 
 def test_quality_takes_little_more_than_the_channel(long):
     [segment] = long.segments
-    assert peak(lambda: quality(long, 0, segment)) < 4 * long.channels[0].raw.nbytes
+    assert peak(lambda: assess_quality(long, 0, segment)) < 4 * long.channels[0].raw.nbytes
 
 
 def test_loads_of_one_bus_share_what_was_tracked(long):
     [segment], tracked = long.segments, {}
-    first = phasors_of(long, FEEDER, segment, tracked=tracked)
+    first = measure_phasors(long, FEEDER, segment, tracked=tracked)
     assert sorted(tracked)[0] == 0
-    again = phasors_of(long, FEEDER, segment, tracked=tracked)
+    again = measure_phasors(long, FEEDER, segment, tracked=tracked)
     for name in ("V", "I", "f"):
         np.testing.assert_array_equal(getattr(again, name), getattr(first, name))
 
@@ -129,6 +129,6 @@ def test_the_reference_slides_as_the_standard_says():
 @pytest.mark.parametrize("count", [0, 1, 2, 1023, 1024, 1025, 2500])
 def test_variances_of_cycles(count):
     cycles = np.random.default_rng(1).standard_normal((count, 7))
-    own, changed = _variances(cycles)
+    own, changed = _compute_variances(cycles)
     np.testing.assert_array_equal(own, cycles.var(axis=1))
     np.testing.assert_array_equal(changed, np.diff(cycles, axis=0).var(axis=1))

@@ -11,7 +11,7 @@ import pytest
 import tractexp
 from tractexp.filetypes import comtrade
 from tractexp.filetypes.column_unit import split_unit
-from tractexp.filetypes.columns import order_of, role
+from tractexp.filetypes.columns import find_role, order_of
 from tractexp.recording import Channel, Recording, Segment
 
 ORDERS = ["ABC", "RST", "RYB", "RWB", "UVW", ("L1", "L2", "L3"), "АВС"]
@@ -74,7 +74,7 @@ def test_the_table_of_the_docs_is_true_in_each_order():
                 marks = re.findall(r"[A-Z]\d?", letters)
                 spelled = _spell(name, marks)
                 units = ["kV"] * len(spelled)
-                roles = [role(one, "kV", order_of(spelled, units)) for one in spelled]
+                roles = [find_role(one, "kV", order_of(spelled, units)) for one in spelled]
                 assert all(one is not None and one.line is line for one in roles), spelled
 
 
@@ -106,13 +106,13 @@ def test_names_of_columns_say_their_phases_and_whether_they_are_between_two(orde
     for forms, line in ((lines, True), (ground + plain, False)):
         for names in forms:
             spelled = order_of(names, ["kV"] * 3)
-            roles = [role(name, "kV", spelled) for name in names]
+            roles = [find_role(name, "kV", spelled) for name in names]
             marks = ("ab", "bc", "ca") if line else "abc"
             assert [one.key for one in roles] == [f"U{mark}" for mark in marks], names
             assert {bool(one.line) for one in roles} == {line}, names
     for forms, line in ((lines, True), (ground, False)):
         for first, *_ in forms:
-            alone = role(first, "kV", order_of([first], ["kV"]))
+            alone = find_role(first, "kV", order_of([first], ["kV"]))
             assert (alone.quantity, alone.line) == ("U", line), first
 
 
@@ -219,7 +219,7 @@ def test_where_no_name_tells_the_power_or_the_nominal_voltage_does(tmp_path):
     ],
 )
 def test_names_of_programs_and_languages_say_line_or_ground(name, line):
-    meant = role(name, "kV", "rst" if "R" in name else "abc")
+    meant = find_role(name, "kV", "rst" if "R" in name else "abc")
     assert (meant.quantity, meant.line) == ("U", line)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tractexp.errors import UserError
-from tractexp.record.phasor import sequences
-from tractexp.record.phasor_measurement import fundamental, measure, one_cycle, track
+from tractexp.record.phasor import compute_sequences
+from tractexp.record.phasor_measurement import measure, measure_fundamental, one_cycle, track
 from tractexp.recording.estimator import estimator_of
 
 PHASES = np.array([100, 80 * np.exp(-2.2j), 95 * np.exp(2.0j)])  # unbalanced on purpose
@@ -34,7 +34,7 @@ def seconds(rate, length=0.5):
 @pytest.mark.parametrize("rate", RATES)
 def test_phasor_at_known_frequency_is_exact(rate, f):
     x = waves(PHASES, f, seconds(rate))
-    X = fundamental(x, rate, f, inside(rate, x.shape[1]))
+    X = measure_fundamental(x, rate, f, inside(rate, x.shape[1]))
     np.testing.assert_allclose(X, PHASES[:, None] * np.ones(X.shape[1]), rtol=1e-11)
 
 
@@ -62,7 +62,7 @@ def test_harmonics_and_offset_vanish_at_nominal_frequency():
     distorted = (
         waves(PHASES, 50.0, t) + 2 + 5 * np.cos(5 * (2 * np.pi * 50 * t - 2 * np.pi / 3 * k))
     )
-    X = fundamental(distorted, 3200.0, 50.0, inside(3200.0, len(t)))
+    X = measure_fundamental(distorted, 3200.0, 50.0, inside(3200.0, len(t)))
     np.testing.assert_allclose(X, PHASES[:, None] * np.ones(X.shape[1]), rtol=1e-11)
 
 
@@ -73,7 +73,7 @@ def test_five_percent_fifth_harmonic_off_nominal_leaks_less_than_a_thousandth(f)
     distorted = waves(PHASES, f, t) + 5 * np.sqrt(2) * np.cos(
         5 * (2 * np.pi * f * t - 2 * np.pi / 3 * k)
     )
-    X = fundamental(distorted, 3200.0, f, inside(3200.0, len(t)))
+    X = measure_fundamental(distorted, 3200.0, f, inside(3200.0, len(t)))
     assert np.abs(X - PHASES[:, None]).max() < 1e-3 * 100
 
 
@@ -93,7 +93,7 @@ def test_plain_window_of_nominal_length_would_leak_far_more():
 def test_sequences_are_separated():
     a = np.exp(2j * np.pi / 3)
     V1, V2 = 3.0 - 1.0j, 0.4 + 0.2j
-    positive, negative = sequences(
+    positive, negative = compute_sequences(
         np.array([[V1 + V2], [a**2 * V1 + a * V2], [a * V1 + a**2 * V2]])
     )
     np.testing.assert_allclose([positive[0], negative[0]], [V1, V2], rtol=1e-14)

@@ -9,12 +9,12 @@ import pytest
 
 from tractexp.blocks import Report, plotly
 from tractexp.blocks.chart import Chart
-from tractexp.blocks.chart_script import script
+from tractexp.blocks.chart_script import build_script
 
 
 @pytest.fixture(scope="module")
 def whole():
-    return plotly.library().read_text(encoding="utf-8")
+    return plotly.find_library().read_text(encoding="utf-8")
 
 
 def test_a_page_with_charts_is_small_and_one_without_carries_no_library(tmp_path):
@@ -27,7 +27,7 @@ def test_a_page_with_charts_is_small_and_one_without_carries_no_library(tmp_path
 
 def test_the_part_keeps_its_license_its_lines_and_bars_and_no_map(whole):
     part = gzip.decompress(
-        base64.b64decode(re.search(r'run\("([\w+/=]+)"\)', script())[1])
+        base64.b64decode(re.search(r'run\("([\w+/=]+)"\)', build_script())[1])
     ).decode()
     assert part.startswith(plotly.select_needed_modules(whole))
     assert part[:200] == whole[:200]

@@ -11,7 +11,7 @@ import pytest
 import tractexp
 from tractexp.errors import UserError
 from tractexp.filetypes import pqdif, pqdif_channels, pqdif_records
-from tractexp.record.reader import reader_of
+from tractexp.record.reader import find_reader
 
 START = datetime(2024, 5, 17, 8, 30, 12, 250000)
 RATE, COUNT, F = 6400.0, 6400, 50.0
@@ -82,7 +82,7 @@ def test_waveforms_are_read_in_volts_and_amperes_at_their_times(write, compresse
 
 def test_the_load_and_its_dip_are_found_by_themselves(write):
     path = write(waveform_file())
-    assert reader_of(str(path)).name == "pqdif"
+    assert find_reader(str(path)).name == "pqdif"
     [event] = tractexp.read(str(path))
     assert event.record.base.voltage == pytest.approx(np.sqrt(3) * KILOVOLT, rel=1e-3)
     assert event.record.base.power == pytest.approx(3e-3 * KILOVOLT * AMPERE, rel=1e-3)
@@ -208,7 +208,7 @@ def log_file(units=("V", "V", "V", "W", "var", "Hz"), times=None, more=()):
 
 def test_logs_of_rms_values_and_powers_are_a_table(write):
     path = write(log_file())
-    assert reader_of(str(path)).name == "csv"
+    assert find_reader(str(path)).name == "csv"
     [event] = tractexp.read(str(path))
     assert event.record.base.voltage == pytest.approx(np.sqrt(3) * 15, rel=1e-6)
     assert event.record.base.power == pytest.approx(np.hypot(12, 4), rel=1e-6)

@@ -5,7 +5,7 @@ import pytest
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.record.reader import reader_of
+from tractexp.record.reader import find_reader
 
 STEP, F = 1 / 4000, 50.0
 T = np.arange(4800) * STEP
@@ -43,7 +43,7 @@ def powers():
 
 def test_powers_are_read_by_their_names_and_units(tmp_path):
     [path] = write(tmp_path, "load case", *powers())
-    assert reader_of(str(path)).name == "csv"
+    assert find_reader(str(path)).name == "csv"
     [event] = tractexp.read(str(path))
     assert (event.record.base.voltage, event.record.base.power) == pytest.approx(
         (27.5, np.hypot(12, 4))
@@ -66,7 +66,7 @@ def test_waveforms_of_vectors_in_several_files_are_one_recording(tmp_path, each)
     paths = write(tmp_path, "emt", names, [*volts, *amperes], each)
     assert len(paths) == (2 if each == 4 else 1)
     for path in paths:
-        assert reader_of(str(path)).name == "waveforms"
+        assert find_reader(str(path)).name == "waveforms"
         [event] = tractexp.read(str(path))
         assert event.record.base.voltage == pytest.approx(15 * np.sqrt(3), rel=1e-4)
         assert pytest.approx((np.cos(0.4), np.sin(0.4)), abs=1e-3) == (event.P0, event.Q0)

@@ -6,7 +6,7 @@ from field_waves import KV, noise, phases, recording, wave
 
 from tractexp.filetypes import comtrade
 from tractexp.recording import Channel, Recording, Segment
-from tractexp.recording.quality import quality
+from tractexp.recording.quality import assess_quality
 
 RATE = 3200.0
 T = np.arange(6400) / RATE
@@ -16,7 +16,7 @@ CLEAN = wave(T, phases(np.full(len(T), KV)))[0]
 def of(x, rate=RATE, **changed):
     channel = Channel("Ua", x, "kV", "voltage", **changed)
     segment = Segment(0, len(x), rate, 0.0)
-    return quality(Recording("made.cfg", [channel], [segment]), 0, segment)
+    return assess_quality(Recording("made.cfg", [channel], [segment]), 0, segment)
 
 
 @pytest.mark.parametrize("share", [1e-4, 1e-3, 1e-2])
@@ -122,11 +122,11 @@ def test_gaps():
 def test_jitter_and_holes_of_the_time_stamps():
     stamps = T + np.random.default_rng(0).uniform(-0.05, 0.05, len(T)) / RATE
     made = recording(CLEAN[None], names=["Ua"], extra={"stamps": stamps})
-    found = quality(made, 0, made.segments[0])
+    found = assess_quality(made, 0, made.segments[0])
     assert found.jitter == pytest.approx(0.05, rel=0.1)
     assert found.gaps == 0
     stamps[3000:] += 0.01
-    assert quality(made, 0, made.segments[0]).gaps == 1
+    assert assess_quality(made, 0, made.segments[0]).gaps == 1
     assert np.isnan(of(CLEAN).jitter)
 
 
@@ -153,10 +153,10 @@ def test_an_empty_channel_is_fit_for_nothing():
 
 def test_channels_of_the_220_kv_station(shared_data):
     made = comtrade.load(shared_data / "dfr220kv-shandong" / "xtz.cfg")
-    voltage, current = (quality(made, k, made.segments[0]) for k in (4, 8))
+    voltage, current = (assess_quality(made, k, made.segments[0]) for k in (4, 8))
     assert voltage.thd < 0.005
     assert current.bits < 9  # a current transformer of 800 A that carries 75 A
-    assert "no waveform" in quality(made, 4, made.segments[1]).fit
+    assert "no waveform" in assess_quality(made, 4, made.segments[1]).fit
 
 
 class TestCalm:
@@ -185,7 +185,7 @@ class TestCalm:
         fault = np.where(after, factor * (1 + 0.5 * np.exp(-(T - start) / 0.08)), 1.0)
         values = 0.35 / KV * CLEAN * fault + np.where(after, 10 * np.exp(-(T - start) / 0.06), 0.0)
         channel = Channel("Ia", values + 3e-4 * noise(len(T), 1.0, 1), "kA", "current")
-        made = quality(
+        made = assess_quality(
             Recording("made.cfg", [channel], [Segment(0, len(T), RATE, 0.0)]),
             0,
             Segment(0, len(T), RATE, 0),

@@ -25,13 +25,13 @@ from tractexp.sweep.status import (
     FINISHED,
     RUNNING,
     Status,
-    objective,
     read,
+    read_objective,
     select_returned_metrics,
 )
 from tractexp.text.progress import FIRST_LINE
 from tractexp.tracking import TrackedRun, runfile
-from tractexp.tracking.sweepfile import folder_of
+from tractexp.tracking.sweepfile import find_sweep_folder
 
 
 def job(folder: Path, *overrides: str, seed: int = 0) -> SweepJob:
@@ -110,7 +110,7 @@ def test_the_time_left_is_that_of_the_pace_since_the_first_end(jobs, monkeypatch
 def test_a_log_file_gets_a_line_now_and_then(jobs, monkeypatch, capsys):
     clock = [0.0]
     monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
-    with progress.progress(jobs) as note:
+    with progress.show_progress(jobs) as note:
         for one, at in zip(jobs, (FIRST_LINE, FIRST_LINE + 0.1, 1e3, 2e3), strict=True):
             clock[0] = at
             note(one, ended(one, value=1.0))
@@ -125,7 +125,7 @@ def test_a_terminal_shows_each_variant_under_a_bar(jobs, monkeypatch):
 
     shown = Console(file=StringIO(), force_terminal=True, width=100)
     monkeypatch.setattr(progress, "build_console", lambda: shown)
-    with progress.progress(jobs) as note:
+    with progress.show_progress(jobs) as note:
         for one, status in zip(jobs[:3], (FINISHED, FAILED, FINISHED), strict=True):
             note(one, ended(one, status, 2.0 - one.config["seed"]))
     text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.file.getvalue())
@@ -187,7 +187,7 @@ def test_a_job_returns_where_its_search_ended_or_what_is_named():
 def test_what_a_job_measured_comes_back_and_of_one_that_failed_nothing_counts(jobs):
     ended(jobs[0], value=3.0)
     ended(jobs[1], FAILED, 2.0)
-    assert [objective(one.folder) for one in jobs[:3]] == [3.0, None, None]
+    assert [read_objective(one.folder) for one in jobs[:3]] == [3.0, None, None]
 
 
 def test_what_comes_back_from_afar_takes_the_place_of_the_earlier_unless_it_failed(jobs):
@@ -217,7 +217,7 @@ def test_jobs_have_the_folders_that_are_named_and_keep_them(tmp_path):
     assert {one.sweep for one in placed} == {tmp_path}
     ended(placed[1])
     (tmp_path / "sweep.json").write_text('{"run": "7"}')
-    assert folder_of(placed[1].folder) == tmp_path
+    assert find_sweep_folder(placed[1].folder) == tmp_path
     again = place([replace(jobs[1], subdir="elsewhere"), *jobs[:1]], tmp_path)  # it was done there
     assert [one.name for one in again] == ["pso/1", "pso/0"]
 

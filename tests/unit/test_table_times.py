@@ -10,8 +10,8 @@ import pytest
 import tractexp
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.filetypes.cells import BadCell, find_group_mark, numbers
-from tractexp.filetypes.clock import times
+from tractexp.filetypes.cells import BadCell, find_group_mark, parse_numbers
+from tractexp.filetypes.clock import parse_times
 from tractexp.record import detect
 
 START = dt.datetime(2024, 3, 1, 10, 15, 30)
@@ -154,7 +154,7 @@ def test_what_may_be_a_decimal_mark_is_no_group():
     assert find_group_mark([["0,125", "110,250"]], ",") == ""
     assert find_group_mark([["0.125", "110,250"]], ".") == ","
     assert find_group_mark([["0.125", "110,25"]], ".") == ""
-    assert numbers(["1,234,567.5", "999.5", "-12,000"], group=",").tolist() == [
+    assert parse_numbers(["1,234,567.5", "999.5", "-12,000"], group=",").tolist() == [
         1234567.5,
         999.5,
         -12000,
@@ -219,7 +219,7 @@ def test_a_minute_of_61_seconds(read, form):
     ],
 )
 def test_the_order_of_day_and_month_is_that_of_the_column(cells, start):
-    read = times(cells)
+    read = parse_times(cells)
     assert read.start == start
     assert (np.diff(read.values) > 0).all()
 
@@ -227,14 +227,14 @@ def test_the_order_of_day_and_month_is_that_of_the_column(cells, start):
 def test_a_date_that_may_be_two_is_said_and_one_that_may_not_is_not():
     assert (
         "read as 03 January 2024, day before month"
-        in times(["03/01/2024 10:15:30", "03/01/2024 10:15:31"]).remarks[0][1]
+        in parse_times(["03/01/2024 10:15:30", "03/01/2024 10:15:31"]).remarks[0][1]
     )
     assert (
         "01 March 2024, month before day, as with AM"
-        in times(["03/01/2024 10:15:30 AM"]).remarks[0][1]
+        in parse_times(["03/01/2024 10:15:30 AM"]).remarks[0][1]
     )
-    assert times(["2024-03-01 10:15:30", "2024-03-01 10:15:31"]).remarks == ()
-    assert times(["13/03/2024 10:15:30"]).remarks == ()
+    assert parse_times(["2024-03-01 10:15:30", "2024-03-01 10:15:31"]).remarks == ()
+    assert parse_times(["13/03/2024 10:15:30"]).remarks == ()
 
 
 def test_events_late_in_a_log_are_told_by_the_clock(tmp_path, monkeypatch):
@@ -320,7 +320,7 @@ def test_a_zone_is_told_where_times_are_turned_into_utc(read, zone, hours):
     ],
 )
 def test_times_in_the_basic_form_and_of_asctime(cell, second):
-    found = times([cell])
+    found = parse_times([cell])
     assert found.start == START + dt.timedelta(seconds=second - 30)
     assert found.begin == pytest.approx(10 * 3600 + 15 * 60 + second)
 
@@ -328,12 +328,12 @@ def test_times_in_the_basic_form_and_of_asctime(cell, second):
 @pytest.mark.parametrize("cell", ["20241301T101530", "20240301T1015", "Fri Foo 1 10:15:30 2024"])
 def test_what_only_looks_like_them_is_refused(cell):
     with pytest.raises(BadCell):
-        times([cell])
+        parse_times([cell])
 
 
 @pytest.mark.parametrize("cell", ["061:10:15:30.250", "10h15m30.25s", "10时15分30.25秒"])
 def test_hours_with_units_and_those_of_irig_are_times_of_day(cell):
-    assert times([cell]).begin == pytest.approx(10 * 3600 + 15 * 60 + 30.25)
+    assert parse_times([cell]).begin == pytest.approx(10 * 3600 + 15 * 60 + 30.25)
 
 
 def test_a_time_with_something_behind_it_is_refused_with_how_times_are_written(read):

@@ -11,7 +11,7 @@ from test_cev import BITS, names, row
 import tractexp
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.recording import Feeder
-from tractexp.recording.measure import phasors_of
+from tractexp.recording.measure import measure_phasors
 from tractexp.recording.type_test import MotorCourse, find_type_test
 
 RATE = 3200.0
@@ -49,7 +49,7 @@ def report(started=True, unbalance=0.0, fan=False, sigma=5e-4):
 def measure(record):
     [segment] = record.segments
     found = find_type_test(
-        MotorCourse.from_phasors(phasors_of(record, THREE, segment), 50.0), record.frequency
+        MotorCourse.from_phasors(measure_phasors(record, THREE, segment), 50.0), record.frequency
     )
     return found and {each.name: each for each in found.values}
 
@@ -74,7 +74,7 @@ def test_an_unbalance_tells_the_impedance_without_a_start():
     found = measure(report(started=False, unbalance=0.02))
     assert found.keys() == {"X_2", "T0'", "H"}
     check(found["X_2"], X_LOCKED, 0.05)
-    phasors = phasors_of(report(started=False), THREE, report().segments[0])
+    phasors = measure_phasors(report(started=False), THREE, report().segments[0])
     test = find_type_test(MotorCourse.from_phasors(phasors, 50.0), 50.0)
     assert test.power == pytest.approx(3 * KV * KA, rel=0.01)
     assert test.voltage == pytest.approx(110, rel=0.01)

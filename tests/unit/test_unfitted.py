@@ -19,7 +19,7 @@ def files(*events, loaded=True):
 @pytest.mark.parametrize("depth", [0.02, -0.03])
 def test_a_step_tells_the_exponents_that_the_load_has(depth):
     ratio = 1 - depth
-    told = unfitted.sentences(
+    told = unfitted.list_sentences(
         files(event(depth=depth, P=(30, 30 * ratio**1.4), Q=(5, 5 * ratio**3.1)))
     )
     assert "the step of" in told[0]
@@ -30,7 +30,7 @@ def test_a_step_tells_the_exponents_that_the_load_has(depth):
 
 
 def test_where_q_changes_its_sign_the_exponent_of_p_is_told_alone():
-    (told, *_) = unfitted.sentences(files(event(Q=(0.5, -0.5))))
+    (told, *_) = unfitted.list_sentences(files(event(Q=(0.5, -0.5))))
     assert "p_v" in told
     assert "q_v" not in told
 
@@ -40,7 +40,7 @@ def test_where_q_changes_its_sign_the_exponent_of_p_is_told_alone():
     [files(event("dip", worth=True)), files(event(), loaded=False), [{"feeders": []}]],
 )
 def test_nothing_is_told_where_something_is_worth_fitting_or_no_load_is_there(silent):
-    assert unfitted.sentences(silent) == []
+    assert unfitted.list_sentences(silent) == []
 
 
 @pytest.mark.parametrize(
@@ -54,4 +54,4 @@ def test_nothing_is_told_where_something_is_worth_fitting_or_no_load_is_there(si
     ],
 )
 def test_an_event_that_tells_no_exponent_leaves_the_advice(odd):
-    assert unfitted.sentences(files(odd)) == [unfitted.DIPS, unfitted.AMBIENT]
+    assert unfitted.list_sentences(files(odd)) == [unfitted.DIPS, unfitted.AMBIENT]

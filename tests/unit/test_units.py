@@ -10,8 +10,8 @@ import tractexp
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.recording import Channel
-from tractexp.recording.recording import quantity_of, unit_of
-from tractexp.recording.unit import amount, convert_to_units
+from tractexp.recording.recording import find_quantity, find_unit
+from tractexp.recording.unit import convert_to_units, parse_amount
 
 KV, MW, MVAR = 110.0, 40.0, 15.0  # of `constant`
 
@@ -74,17 +74,22 @@ RIGHT = pytest.approx((KV, MW, MVAR), rel=2e-3)
     ],
 )
 def test_units_as_files_write_them(text, unit):
-    assert unit_of(text) == unit
+    assert find_unit(text) == unit
 
 
 def test_two_units_in_one_say_the_quantity_and_not_the_size():
-    assert (quantity_of("В/кВ"), quantity_of("kA / A"), quantity_of("V/A"), quantity_of("m/s")) == (
+    assert (
+        find_quantity("В/кВ"),
+        find_quantity("kA / A"),
+        find_quantity("V/A"),
+        find_quantity("m/s"),
+    ) == (
         "voltage",
         "current",
         "",
         "",
     )
-    assert amount("89.8 kV") == (89.8, "kV")
+    assert parse_amount("89.8 kV") == (89.8, "kV")
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from tractexp.inference.blocks import cut_blocks
 from tractexp.inference.interval import compute_interval_factor
 from tractexp.record.periodic import Periodic
 from tractexp.record.record import Base
-from tractexp.record.synthetic import synthetic_event
+from tractexp.record.synthetic import build_synthetic_event
 from tractexp.record.wave_event import _scale
 from tractexp.record.waves import Waves
 
@@ -68,7 +68,7 @@ def test_one_per_unit_is_the_peak_of_a_phase(phases, volts, amperes):
 def test_a_voltage_that_nobody_recorded_is_an_event_of_its_load():
     t = 0.1 + np.arange(800) / RATE
     v = np.where((t > 0.3) & (t < 0.5), 0.6, 1.0) + 0.0j
-    event = synthetic_event("planned", t, v, (1.0, 0.8, 0.6), FREQUENCY, 201, 400)
+    event = build_synthetic_event("planned", t, v, (1.0, 0.8, 0.6), FREQUENCY, 201, 400)
     assert (event.depth, event.U0, event.P0, event.Q0, event.dips) == (
         pytest.approx(0.4),
         1.0,

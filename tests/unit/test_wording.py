@@ -4,11 +4,11 @@ import pytest
 
 from tractexp.text.wording import (
     format_probability,
+    format_share,
     format_with_error,
     join_alternatives,
     join_words,
     list_figures,
-    percent,
 )
 
 
@@ -56,7 +56,7 @@ def test_names_are_listed_as_in_a_sentence():
 
 
 def test_a_share_is_never_more_than_all_or_less_than_nothing():
-    assert [percent(share) for share in (-0.3, 0.234, 2.08)] == ["0%", "23%", "100%"]
+    assert [format_share(share) for share in (-0.3, 0.234, 2.08)] == ["0%", "23%", "100%"]
 
 
 def test_alternatives_that_share_a_name_are_told_by_it():
@@ -72,5 +72,5 @@ def test_alternatives_that_share_a_name_are_told_by_it():
 
 
 def test_many_figures_are_told_by_their_ends():
-    assert list_figures([0.2, 0.1, 0.4, 0.3], percent) == "10% to 40%"
-    assert list_figures([0.2, 0.1], percent) == "20% and 10%"
+    assert list_figures([0.2, 0.1, 0.4, 0.3], format_share) == "10% to 40%"
+    assert list_figures([0.2, 0.1], format_share) == "20% and 10%"

@@ -310,14 +310,14 @@ def compose(
 
 def find_shown_effects(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
     """{effect: how one of the events shows it}, of those that the model takes and does not have."""
-    from tractexp.domain import domain_of
+    from tractexp.domain import find_domain
     from tractexp.model.parts import Effect
 
     names = discover()["effect"].keys() - {effect.name for effect in model.effects}
     classes = [get("effect", name) for name in sorted(names)]
     showing = [cls() for cls in classes if cls.describe_sign is not Effect.describe_sign]
     taken = [effect for effect in showing if model.acceptance(effect).refusal is None]
-    seen = domain_of(model).events(events) if taken else ()
+    seen = find_domain(model).events(events) if taken else ()
     signs = {effect.name: [*filter(None, map(effect.describe_sign, seen))] for effect in taken}
     return {name: several[0] for name, several in signs.items() if several}
 

@@ -14,7 +14,7 @@ from tractexp.identification.conclude import refuse_failed
 from tractexp.identification.result import Result
 from tractexp.identification.search import SearchResult
 from tractexp.storage import files
-from tractexp.text.progress import Progress, counter
+from tractexp.text.progress import Progress, make_counter
 from tractexp.text.wording import join_words
 
 if TYPE_CHECKING:
@@ -76,9 +76,9 @@ def _complete_uncertainty(
     from tractexp.identification.unrecorded import add_unrecorded
 
     if setup.check_intervals:
-        points = counter("points at most on the profiles", progress)
+        points = make_counter("points at most on the profiles", progress)
         uncertainty = check_by_profiles(uncertainty, points)
-        structures = counter("structures fitted beside", progress)
+        structures = make_counter("structures fitted beside", progress)
         uncertainty = add_rivals(uncertainty, structures)
     uncertainty = add_unrecorded(uncertainty, setup.unrecorded_inputs)
     uncertainty = add_unfinished(add_load_drift(uncertainty))

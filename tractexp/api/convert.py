@@ -13,7 +13,7 @@ from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
 from tractexp.configuration.plugin import build, discover, plugin
 from tractexp.errors import TASK, UserError, check_choice
-from tractexp.filetypes.tidy import unique
+from tractexp.filetypes.tidy import make_unique
 from tractexp.outcome import Tabulated
 from tractexp.record import Event, Reader, Record
 from tractexp.recording import Recording, Writer
@@ -139,7 +139,9 @@ def write_parts(parts: Sequence[Part], writer: Writer, folder: Path) -> Converte
     """Write everything into a folder; raises `UserError` before anything is written over what was
     read.
     """
-    names = unique(["".join("_" if c in '/\\:*?"<>|' else c for c in name) for name, _ in parts])
+    names = make_unique(
+        ["".join("_" if c in '/\\:*?"<>|' else c for c in name) for name, _ in parts]
+    )
     paths = [folder / f"{name}{writer.endings[0]}" for name in names]
     for path, (_, part) in zip(paths, parts, strict=True):
         _check_source(path, part.source, writer)

@@ -310,9 +310,9 @@ class Identification(Written):
 
     def table(self) -> Table:
         """Estimates with intervals and verdicts, the search's end only where it lies outside."""
-        from tractexp.report.fit_tables import parameters
+        from tractexp.report.fit_tables import tabulate_parameters
 
-        return parameters(self)
+        return tabulate_parameters(self)
 
     def to_frame(self) -> "pandas.DataFrame":
         """The estimates as a pandas frame of numbers: `Estimates.to_frame`."""
@@ -320,15 +320,15 @@ class Identification(Written):
 
     def summary(self) -> Report:
         """Estimate, intervals and grade."""
-        from tractexp.report.fit_summary import summary
+        from tractexp.report.fit_summary import build_summary
 
-        return summary(self)
+        return build_summary(self)
 
     def screen(self) -> Report:
         """The answer on one screen of a terminal."""
         from tractexp.report import screen
 
-        return screen.screen(self)
+        return screen.build_screen(self)
 
     def _repr_html_(self) -> str:
         """The HTML for a notebook: the answer, and the first event beside it; the answer alone of
@@ -350,7 +350,7 @@ class Identification(Written):
         """The sheet to be handed in, for print: see `tractexp.report.sheet`."""
         from tractexp.report import sheet
 
-        return sheet.sheet(self)
+        return sheet.build_sheet(self)
 
     def drawings(self) -> Mapping[str, Drawing]:
         return {**super().drawings(), SHEET: lambda path: self.sheet().save(path)}

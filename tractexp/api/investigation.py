@@ -240,18 +240,18 @@ class Investigation(Written):
         """How far off the models are, on the fitted and on the held-out events."""
         from tractexp.report import discrepancy
 
-        return discrepancy.gap(self.content)
+        return discrepancy.build_gap_table(self.content)
 
     def summary(self) -> Report:
         """The verdict with its reason, the gap and the parameters."""
         from tractexp.report import discrepancy
 
-        return discrepancy.summary(self)
+        return discrepancy.build_summary(self)
 
     def screen(self) -> Report:
         from tractexp.report import discrepancy_screen
 
-        return discrepancy_screen.screen(self)
+        return discrepancy_screen.build_screen(self)
 
     def report(self) -> Report:
         """The page: events before and after, where they disagree, candidates, what changed."""

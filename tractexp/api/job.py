@@ -221,14 +221,14 @@ class Job:
         """The address of the MLflow store."""
         from tractexp import tracking
 
-        return tracking.address(self.config["tracking"]["uri"])
+        return tracking.resolve_address(self.config["tracking"]["uri"])
 
     @functools.cached_property
     def _logger(self) -> Any:
         """The process that logs, where there is one."""
-        from tractexp.tracking.process import logger
+        from tractexp.tracking.process import open_logger
 
-        return logger(self.store)
+        return open_logger(self.store)
 
     def prepare_log(self) -> None:
         """Get MLflow ready beside the computation, in a process of its own; call it once the input
@@ -297,7 +297,7 @@ class Job:
         try:
             entry = save(self.folder, replace(run, key=self.key), self.store)
             if not self.logs or (
-                self.in_sweep and sweepfile.waits(sweepfile.folder_of(self.folder))
+                self.in_sweep and sweepfile.does_wait(sweepfile.find_sweep_folder(self.folder))
             ):
                 return
             run_id = (

@@ -10,7 +10,7 @@ from typing import Any
 from tractexp.api.load_command import RACE
 from tractexp.configuration.overrides import build_typed_command
 from tractexp.configuration.plugin import discover
-from tractexp.recording.archive import event_name
+from tractexp.recording.archive import name_event
 from tractexp.recording.overview import View
 from tractexp.recording.sight import LoadEvent, Sight
 from tractexp.storage import files
@@ -89,7 +89,7 @@ def _list_dips(view: View) -> Iterator[tuple[Hashable, NamedDip]]:
     for number, shown in enumerate(view.sights, 1):
         worth = next((event for event in shown.events if event.worth), None)
         if worth is not None:
-            name = event_name(Path(view.source).name, number, worth)
+            name = name_event(Path(view.source).name, number, worth)
             yield (number, *_identify_load(view, shown)), NamedDip(name, worth)
 
 

@@ -86,15 +86,15 @@ class NetworkFit(Written):
 
     def table(self) -> Table:
         """The poles."""
-        from tractexp.report.linear_network import poles
+        from tractexp.report.linear_network import tabulate_poles
 
-        return poles(self)
+        return tabulate_poles(self)
 
     def summary(self) -> Report:
         """The poles, and what the network leaves."""
         from tractexp.report import linear_network
 
-        return linear_network.summary(self)
+        return linear_network.build_summary(self)
 
     @property
     def next_step(self) -> str:

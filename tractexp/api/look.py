@@ -20,7 +20,7 @@ from tractexp.errors import UserError
 from tractexp.outcome import Written
 from tractexp.record import Event, Record
 from tractexp.recording.event_views import join_event, propose_joining
-from tractexp.recording.overview import View, sight_of, view_of
+from tractexp.recording.overview import View, overview_record, view_of
 from tractexp.recording.sight import Sight
 from tractexp.storage import files, time_limit
 from tractexp.text.progress import Progress, tell_stages
@@ -138,7 +138,7 @@ class Look(Written):
 
     def table(self) -> Table:
         """Every event of every load."""
-        from tractexp.report.look import event_row
+        from tractexp.report.look import list_event_cells
 
         columns = [
             "load",
@@ -155,7 +155,7 @@ class Look(Written):
         ]
         several = len(self.content["files"]) > 1
         rows = [
-            [f"{file} {load['name']}" if several else load["name"], *event_row(event)]
+            [f"{file} {load['name']}" if several else load["name"], *list_event_cells(event)]
             for file, load in self._loads
             for event in load["events"]
         ]
@@ -169,13 +169,13 @@ class Look(Written):
         """Which load and dip to fit by which command, then a line for each file, bus and load."""
         from tractexp.report import look_console
 
-        return look_console.summary(self.content)
+        return look_console.build_summary(self.content)
 
     def screen(self) -> Report:
         """The summary with as many loads as one screen has room for."""
         from tractexp.report import look_console
 
-        return look_console.screen(self.content)
+        return look_console.build_screen(self.content)
 
     def build_full_report(self) -> Report:
         """Notes, channels, why the loads are such, all events and all commands."""
@@ -295,7 +295,7 @@ def _join_given(
 def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
     """The view of a source; of a file the reader is chosen by its content."""
     if isinstance(source, Record):
-        return View(source.name, {}, [sight_of(source)])
+        return View(source.name, {}, [overview_record(source)])
     if settings.get("join"):
         return view_of(source, choose_reader_node(source, settings))
     try:

@@ -10,8 +10,8 @@ import numpy as np
 from tractexp.api.load_command import build_load_command
 from tractexp.recording.overview import View
 from tractexp.recording.quality import describe_clipped
-from tractexp.recording.railway import DIRECT, describe_direct_beside, direct_voltage
-from tractexp.recording.recording import unit_of
+from tractexp.recording.railway import DIRECT, describe_direct_beside, describe_direct_voltage
+from tractexp.recording.recording import find_unit
 from tractexp.recording.sight import LoadEvent, Sight
 from tractexp.recording.unrecognized import can_be_named, explain_unrecognized
 
@@ -96,7 +96,7 @@ def build_content(view: View) -> dict[str, Any]:
                 _build_channel_row(view, number) for number in range(len(recording.channels))
             ],
         }
-        direct = bool(lacks and direct_voltage(recording))
+        direct = bool(lacks and describe_direct_voltage(recording))
         content |= {"lacks": lacks, "can_be_named": named, "direct": direct}
     content["measured_frequency"] = view.frequency
     return content | {"feeders": [_build_feeder_row(view, shown) for shown in view.sights]}
@@ -126,7 +126,7 @@ def _build_channel_row(view: View, number: int) -> dict[str, Any]:
         "quantity": channel.quantity,
         "magnitude": fitness.level,
         "primary_unit": {"voltage": "kV", "current": "kA"}.get(
-            unit_of(channel.unit)[0], channel.unit
+            find_unit(channel.unit)[0], channel.unit
         ),
         "noise_share": share,
         **asdict(fitness),

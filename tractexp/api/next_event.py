@@ -10,7 +10,7 @@ from tractexp.api.setup import Setup
 from tractexp.blocks import Report, Table
 from tractexp.errors import MODEL, TASK, UserError, name_setting
 from tractexp.outcome import Written
-from tractexp.record.identity import title_of
+from tractexp.record.identity import compose_title_of_records
 from tractexp.storage import files
 from tractexp.text.progress import Progress, tell_stages
 
@@ -59,7 +59,9 @@ class Recommended(Written):
         """The page: the events tried, and how the rivals differ there."""
         from tractexp.report import next_event
 
-        return next_event.report(self.event, title_of(e.record for e in self.setup.train))
+        return next_event.report(
+            self.event, compose_title_of_records(e.record for e in self.setup.train)
+        )
 
 
 def recommend_event(setup: Setup, rivals: Any, progress: Progress = None) -> Recommended:

@@ -81,11 +81,11 @@ class Forecasts(Written):
 
     def summary(self) -> Report:
         """How deep a dip is needed, and the intervals."""
-        return shown.summary(self.content)
+        return shown.build_summary(self.content)
 
     def screen(self) -> Report:
         """The answer on one screen of a terminal."""
-        return shown.screen(self.content)
+        return shown.build_screen(self.content)
 
     @property
     def next_step(self) -> str:

@@ -19,7 +19,7 @@ from tractexp.configuration.plugin import plugin
 from tractexp.errors import UserError, check_range
 from tractexp.outcome import Written
 from tractexp.storage import files
-from tractexp.text.progress import Progress, counter
+from tractexp.text.progress import Progress, make_counter
 
 if TYPE_CHECKING:
     import arviz  # pyright: ignore[reportMissingImports]
@@ -170,7 +170,7 @@ def posterior(
     settings = {"walkers": walkers, "steps": steps, "seed": fit.spec.seed if seed is None else seed}
     uncertainty = fit.details.uncertainty
     started = time.perf_counter()
-    count = counter("steps of the walkers", progress)
+    count = make_counter("steps of the walkers", progress)
     drawn = sample(uncertainty, settings["walkers"], settings["steps"], settings["seed"], count)
     content = {
         "intervals": dict(zip(drawn.names, drawn.intervals.tolist(), strict=True)),

@@ -19,7 +19,7 @@ from tractexp.identification.result import Result
 from tractexp.identification.verdict import IDENTIFIED, shorten_verdict
 from tractexp.outcome import Written
 from tractexp.storage import files
-from tractexp.text.progress import Progress, counter
+from tractexp.text.progress import Progress, make_counter
 
 if TYPE_CHECKING:
     from tractexp.identification.profile import Profiles
@@ -154,7 +154,7 @@ def profile(
     uncertainty = fit.details.uncertainty
     started = time.perf_counter()
     scan = profile_parameters(
-        uncertainty, points, parts=counter("points at most on the profiles", progress)
+        uncertainty, points, parts=make_counter("points at most on the profiles", progress)
     )
     content = _build_content(scan, time.perf_counter() - started)
     verdicts = {name: str(verdict) for name, verdict in scan.verdicts.items()}

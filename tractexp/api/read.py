@@ -25,7 +25,7 @@ from tractexp.record import (
 )
 from tractexp.record.angle import unwrap_angle
 from tractexp.record.dips import view_dip
-from tractexp.recording.event_views import settings_of
+from tractexp.recording.event_views import find_settings
 from tractexp.storage import files, time_limit
 from tractexp.text.wording import count_noun
 
@@ -295,13 +295,13 @@ def choose_reader_node(path: str, settings: Mapping[str, Any]) -> dict[str, Any]
                 f" record{list_allowed(path, shipped)}"
             )
     if not settings.get("join"):
-        return {**settings_of(path), **settings}
+        return {**find_settings(path), **settings}
     join = settings["join"]
     paths = [join] if isinstance(join, str | Path) else join
     if not isinstance(paths, Sequence):
         raise UserError(f"join={join!r:.60} must be a list of files of the same event as {path}")
     named = [*map(str, paths)]
-    return {**settings_of(path, *named), **settings, "join": named}
+    return {**find_settings(path, *named), **settings, "join": named}
 
 
 def record_to_dict(record: Record) -> dict[str, Any]:

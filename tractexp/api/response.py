@@ -11,7 +11,7 @@ import numpy as np
 
 from tractexp.record import Event, OwnBase
 from tractexp.storage import files
-from tractexp.text.wording import epsilon
+from tractexp.text.wording import format_epsilon
 
 if TYPE_CHECKING:
     import pandas
@@ -53,19 +53,19 @@ class Response:
     @property
     def row(self) -> list[str]:
         """Title, lowest U, lowest and highest P and Q, and both errors, as a table shows them."""
-        errors = [*map(epsilon, self.epsilon)] if self.epsilon else ["", ""]
-        errors += [] if self.epsilon_i is None else [epsilon(self.epsilon_i)]
+        errors = [*map(format_epsilon, self.epsilon)] if self.epsilon else ["", ""]
+        errors += [] if self.epsilon_i is None else [format_epsilon(self.epsilon_i)]
         ends = self.U.min(), self.P.min(), self.P.max(), self.Q.min(), self.Q.max()
         return [self.title, *(f"{v:.4f}" for v in ends), *errors]
 
     def __repr__(self) -> str:
         """The event's name, and its errors where it was measured."""
         errors = (
-            ", epsilon_p {}, epsilon_q {}".format(*map(epsilon, self.epsilon))
+            ", epsilon_p {}, epsilon_q {}".format(*map(format_epsilon, self.epsilon))
             if self.epsilon
             else ""
         )
-        errors += "" if self.epsilon_i is None else f", epsilon_i {epsilon(self.epsilon_i)}"
+        errors += "" if self.epsilon_i is None else f", epsilon_i {format_epsilon(self.epsilon_i)}"
         band = (
             ""
             if self.band is None
@@ -110,7 +110,7 @@ class Response:
                 epsilon=self.epsilon,
                 notes=self.notes,
             )
-        return figures.response(
+        return figures.draw_response(
             path, self.t, self.U, columns, title=self.title, notes=self.notes, band=self.band
         )
 

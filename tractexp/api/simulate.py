@@ -16,7 +16,7 @@ from tractexp.api.response import Response, respond_to
 from tractexp.api.task import LOAD, Task
 from tractexp.blocks import Report, Table
 from tractexp.configuration.plugin import plugin
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.errors import TASK, UserError, check_range, list_allowed, name_setting
 from tractexp.identification.result import load
 from tractexp.outcome import Drawing, Written
@@ -246,7 +246,7 @@ def _play_dip(
     """
     t, shape = dip.voltage()
     U = before["U0"] * shape
-    P, Q = domain_of(load.model).play(load.model, values, t, U, before)
+    P, Q = find_domain(load.model).play(load.model, values, t, U, before)
     return Response(f"dip of {dip.depth:.0%} for {dip.duration:g} s", t, U, ratio * P, ratio * Q)
 
 

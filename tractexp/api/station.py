@@ -19,7 +19,7 @@ from tractexp.api.survey import survey
 from tractexp.api.surveying import FEWEST_DIPS, complete_entries, compute_keys, name_load
 from tractexp.api.task import Task, call
 from tractexp.blocks import Report, Table
-from tractexp.cache.store import Store, describe_environment, key
+from tractexp.cache.store import Store, compute_key, describe_environment
 from tractexp.configuration.overrides import format_assignment, survey_of
 from tractexp.configuration.plugin import get, plugin
 from tractexp.configuration.run_command import find_folder
@@ -33,7 +33,7 @@ from tractexp.record import Record
 from tractexp.report import station as shown
 from tractexp.storage import files
 from tractexp.text import quoting
-from tractexp.text.progress import Progress, counter, tell
+from tractexp.text.progress import Progress, make_counter, tell
 from tractexp.text.wording import count_noun
 
 if TYPE_CHECKING:
@@ -116,11 +116,11 @@ class Station(Written):
 
     def summary(self) -> Report:
         """The table of loads, and by how much their dips differ."""
-        return shown.summary(self.content)
+        return shown.build_summary(self.content)
 
     def screen(self) -> Report:
         """The answer on one screen of a terminal."""
-        return shown.screen(self.content)
+        return shown.build_screen(self.content)
 
     @property
     def next_step(self) -> str:
@@ -308,14 +308,16 @@ def _fit_loads(
     """The entry of each load; of one that was fitted to the same dips before, the stored one."""
     store = Store(LOADS, folder=keep or Path())
     names = [
-        key(describe_environment(), job.load, job.station, job.keys, job.model) if keep else ""
+        compute_key(describe_environment(), job.load, job.station, job.keys, job.model)
+        if keep
+        else ""
         for job in jobs
     ]
     entries = enumerate(map(store.read_json, names))
     found = {k: entry for k, entry in entries if entry is not None}
     fresh = [k for k in range(len(jobs)) if k not in found]
     position = {id(jobs[k]): k for k in fresh}
-    with counter("loads", progress)(len(fresh)) as count:
+    with make_counter("loads", progress)(len(fresh)) as count:
         for job, told in workers.results(fit_load, [jobs[k] for k in fresh]):
             k = position[id(job)]
             killed = "the program was killed at this load, as where the memory is too small for it"

@@ -116,11 +116,11 @@ class Surveyed(Written):
 
     def table(self) -> Table:
         """How many events there are of each kind."""
-        return shown.kinds(self.content)
+        return shown.tabulate_kinds(self.content)
 
     def summary(self) -> Report:
         """The counts of events by kind, and those that are worth fitting."""
-        return shown.summary(self.content)
+        return shown.build_summary(self.content)
 
     def report(self) -> Report:
         """The page: a row for each event."""

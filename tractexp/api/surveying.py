@@ -12,7 +12,7 @@ import numpy as np
 from tractexp.api.load_command import build_load_command
 from tractexp.api.look import build_series
 from tractexp.api.look_content import build_event_row, hide_secondary
-from tractexp.cache.store import Store, key
+from tractexp.cache.store import Store, compute_key
 from tractexp.errors import UserError
 from tractexp.process.workers import Workers
 from tractexp.recording import archive
@@ -22,7 +22,7 @@ from tractexp.recording.sight import LoadEvent, Sight
 from tractexp.report.look import describe_dead_phases
 from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
 from tractexp.storage import files, time_limit
-from tractexp.text.progress import Progress, counter
+from tractexp.text.progress import Progress, make_counter
 
 Rows = list[dict[str, Any]]
 
@@ -160,7 +160,7 @@ def _build_event_row(
     return {
         **_list_common(view),
         **{key: value for key, value in fields.items() if key in COLUMNS},
-        "event": archive.event_name(file, number, seen),
+        "event": archive.name_event(file, number, seen),
         "load": shown.name,
         "unit": "secondary" if shown.secondary else "pu" if shown.per_unit else "MW",
         "noise": event and event.noise_share,
@@ -255,7 +255,7 @@ def complete_entries(
         if (entry := store.read_json(name)) is not None:
             found[file] = hold(entry)
     fresh = [file for file in own if file not in found]
-    with counter(what, progress)(len(fresh)) as count:
+    with make_counter(what, progress)(len(fresh)) as count:
         for file, computed in compute(fresh):
             entry = files.make_plain(computed)
             store.write_json(names[file], entry)
@@ -277,7 +277,9 @@ def compute_keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
             beside[place / path.stem].append(path)
     names = {path: path.relative_to(folder).as_posix() for path in paths}
     return {
-        names[path]: key(__version__, names[path], _read_states(beside[path.parent / path.stem]))
+        names[path]: compute_key(
+            __version__, names[path], _read_states(beside[path.parent / path.stem])
+        )
         for path in paths
     }
 

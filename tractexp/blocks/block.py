@@ -90,7 +90,7 @@ class Table:
     @property
     def cells(self) -> list[list[str]]:
         """The rows as they are read."""
-        return [[cell_text(cell) for cell in row] for row in self.rows]
+        return [[format_cell(cell) for cell in row] for row in self.rows]
 
     @property
     def brief(self) -> "Table":
@@ -117,12 +117,12 @@ class Table:
         return pandas.DataFrame([list(row) for row in self.rows], columns=list(self.columns))
 
 
-def cell_text(cell: Any) -> str:
+def format_cell(cell: Any) -> str:
     """A cell as it is read: "" for None, five digits of a number.
 
     Examples
     --------
-    >>> cell_text(None), cell_text(0.1234567), cell_text(3)
+    >>> format_cell(None), format_cell(0.1234567), format_cell(3)
     ('', '0.12346', '3')
     """
     if cell is None:
@@ -272,23 +272,23 @@ class Report:
     @property
     def html(self) -> str:
         """A page in one file."""
-        from tractexp.blocks.html import page
+        from tractexp.blocks.html import render_page
 
-        return page(self)
+        return render_page(self)
 
     @property
     def fragment(self) -> str:
         """The blocks without detail as a part of another page, as a notebook shows it."""
-        from tractexp.blocks.html import fragment
+        from tractexp.blocks.html import render_fragment
 
-        return fragment(self)
+        return render_fragment(self)
 
     @property
     def markdown(self) -> str:
         """The blocks as Markdown."""
-        from tractexp.blocks.markdown import markdown
+        from tractexp.blocks.markdown import render_markdown
 
-        return markdown(self)
+        return render_markdown(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Title, lead and blocks as plain data, each block with its kind; of charts and figures the
@@ -312,9 +312,9 @@ class Report:
 
     def __str__(self) -> str:
         """The report as a terminal shows it."""
-        from tractexp.blocks.terminal import plain
+        from tractexp.blocks.terminal import render_plain
 
-        return plain(self)
+        return render_plain(self)
 
     def __repr__(self) -> str:
         """How many blocks there are, and what shows them."""
@@ -325,9 +325,9 @@ class Report:
 
     def _repr_html_(self) -> str:
         """The page in a frame, for a notebook."""
-        from tractexp.blocks.html import frame
+        from tractexp.blocks.html import render_frame
 
-        return frame(self)
+        return render_frame(self)
 
 
 def _describe_block(block: Block) -> dict[str, Any]:

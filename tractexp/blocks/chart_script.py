@@ -24,14 +24,15 @@ MOST_DRAWN_POINTS = 2000
 
 
 @functools.cache
-def script() -> str:
+def build_script() -> str:
     """The JavaScript that a page with charts holds once: a license line, and Plotly.js and our
     `chart.js`, compressed, with what unpacks and runs them.
     """
     drawing = files.read_packaged_text("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
     drawing = drawing.replace("PAPER", str(PAPER)).replace("SHOWN", str(MOST_DRAWN_POINTS))
     program = store.TEXTS.get(
-        store.key("charts", plotly.digest(), drawing), lambda: pack_program(plotly.code() + drawing)
+        store.compute_key("charts", plotly.compute_digest(), drawing),
+        lambda: pack_program(plotly.read_code() + drawing),
     )
     return "\n".join(
         [files.read_packaged_text("blocks/unpack.js"), LICENSE, f'run("{program.decode()}");']

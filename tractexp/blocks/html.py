@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 
 from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
-from tractexp.blocks.chart_script import script
+from tractexp.blocks.chart_script import build_script
 from tractexp.blocks.drawing import draw_equation
 from tractexp.cache import store
 from tractexp.storage import files
@@ -23,7 +23,7 @@ OUTLINE = re.compile(r'<path id="f\d+-(Cm\w+-[0-9a-f]+)"( d="[^"]*"[^>]*/>)')
 DRAWN = re.compile(r'href="#f\d+-(Cm\w+-[0-9a-f]+)"')
 
 
-def page(report: Report) -> str:
+def render_page(report: Report) -> str:
     """A whole page that needs nothing else."""
     figures = itertools.count(1)
     title = quoting.html(report.title)
@@ -36,7 +36,7 @@ def page(report: Report) -> str:
         head += f'<meta http-equiv="refresh" content="{report.reload}">'
     style = files.read_packaged_text("blocks/page.css")
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
-    draws = f"<script>{script()}</script>" if any(map(_holds_chart, report.blocks)) else ""
+    draws = f"<script>{build_script()}</script>" if any(map(_holds_chart, report.blocks)) else ""
     elements = "\n".join(_write_element(block, figures) for block in report.blocks)
     body = "\n".join([top, _share_outlines(elements), draws])
     return (
@@ -61,15 +61,15 @@ def _share_outlines(elements: str) -> str:
     return DRAWN.sub(r'href="#\1"', OUTLINE.sub(keep_first, elements))
 
 
-def frame(report: Report) -> str:
+def render_frame(report: Report) -> str:
     """The page within another one."""
     return (
-        f'<iframe srcdoc="{quoting.html(page(report))}"'
+        f'<iframe srcdoc="{quoting.html(render_page(report))}"'
         ' style="width:100%;height:40rem;border:0"></iframe>'
     )
 
 
-def fragment(report: Report) -> str:
+def render_fragment(report: Report) -> str:
     """The blocks that a terminal shows, and equations, as elements of a notebook's page.
 
     The notebook typesets what stands between dollars: equations only, whatever a name holds.
@@ -205,5 +205,5 @@ def _inline_drawing(drawing: str, prefix: str, label: str) -> str:
 @functools.cache
 def _typeset(latex: str) -> str:
     """SVG of an equation, from the store or drawn; "" for LaTeX beyond mathtext."""
-    key = store.key(store.read_version("matplotlib"), latex)
+    key = store.compute_key(store.read_version("matplotlib"), latex)
     return store.DRAWINGS.get(key, lambda: draw_equation(latex)).decode()

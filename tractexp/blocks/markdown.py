@@ -7,7 +7,7 @@ from tractexp.blocks import block as blocks
 from tractexp.text import quoting
 
 
-def markdown(report: Report) -> str:
+def render_markdown(report: Report) -> str:
     """A report as Markdown."""
     parts = [f"# {quoting.markdown(report.title)}"]
     if report.lead:

@@ -24,7 +24,7 @@ REGISTERED = re.compile(r"\.register\(\[((?:[\w$]+\(\),?)+)\]\)")
 CALLED = re.compile(r"([\w$]+)\(\)")
 
 
-def library() -> Path:
+def find_library() -> Path:
     """Plotly.js, where the package plotly is installed. Raises `UserError` where it is not."""
     spec = importlib.util.find_spec("plotly")
     for folder in (spec and spec.submodule_search_locations) or ():
@@ -36,14 +36,14 @@ def library() -> Path:
     )
 
 
-def code() -> str:
+def read_code() -> str:
     """The library as pages carry it."""
-    return select_needed_modules(library().read_text(encoding="utf-8"))
+    return select_needed_modules(find_library().read_text(encoding="utf-8"))
 
 
-def digest() -> str:
+def compute_digest() -> str:
     """SHA-256 of all that `code` hangs on."""
-    return hashlib.sha256(library().read_bytes() + Path(__file__).read_bytes()).hexdigest()
+    return hashlib.sha256(find_library().read_bytes() + Path(__file__).read_bytes()).hexdigest()
 
 
 def select_needed_modules(whole: str) -> str:

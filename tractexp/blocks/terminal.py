@@ -71,7 +71,7 @@ def _write_lines(block: Any) -> Sequence[str]:
     return ()
 
 
-def plain(report: Report) -> str:
+def render_plain(report: Report) -> str:
     """The report as text."""
     from rich.console import Console
 

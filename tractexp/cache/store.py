@@ -203,7 +203,7 @@ def read_secret() -> bytes:
 # Keys
 
 
-def key(*things: Any) -> str:
+def compute_key(*things: Any) -> str:
     """SHA-256 of numbers, texts, arrays, and of collections and dataclasses of them: equal for what
     is equal.
     """
@@ -227,9 +227,9 @@ def _encode_content(thing: Any) -> bytes:
         }
         return f"{type(thing).__qualname__} ".encode() + _encode_content(fields)
     if isinstance(thing, Mapping):
-        return b"{%s}" % key(*(item for pair in thing.items() for item in pair)).encode()
+        return b"{%s}" % compute_key(*(item for pair in thing.items() for item in pair)).encode()
     if isinstance(thing, list | tuple):
-        return b"[%s]" % key(*thing).encode()
+        return b"[%s]" % compute_key(*thing).encode()
     return f"{type(thing).__name__} {thing!r} ".encode()
 
 
@@ -298,7 +298,7 @@ def _explain_unfit(folder: Path, private: bool = False) -> str:
     try:
         _create(folder)
         if hasattr(os, "geteuid"):  # Windows keeps a user's folders by other means
-            if reason := _writable_by_others(folder.resolve()) or _reachable_by_others(folder):
+            if reason := _explain_writable(folder.resolve()) or _explain_reachable(folder):
                 return reason
             if private and stat.S_IMODE(folder.stat().st_mode) != stat.S_IRWXU:
                 folder.resolve().chmod(stat.S_IRWXU)
@@ -319,7 +319,7 @@ def _find_stranger(folder: Path, name: str, state: os.stat_result, entry: os.sta
     return ""
 
 
-def _reachable_by_others(folder: Path) -> str:
+def _explain_reachable(folder: Path) -> str:
     """Why others could put another folder in this one's place, "" where nobody can: of all that its
     path leads through.
 
@@ -345,7 +345,7 @@ def _reachable_by_others(folder: Path) -> str:
     return ""
 
 
-def _writable_by_others(folder: Path) -> str:
+def _explain_writable(folder: Path) -> str:
     """Why others could write into the store itself, or to one of its kinds; "" where nobody can."""
     if folder.stat().st_uid != os.geteuid():
         return "it belongs to another user"

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import fields
 from pathlib import Path
 
-from tractexp.cli.chosen import reads
+from tractexp.cli.chosen import does_read
 from tractexp.configuration.plugin import get
 from tractexp.configuration.repeatable import explain_refusal
 from tractexp.configuration.run_command import get_group
@@ -72,7 +72,7 @@ def merge_settings(arguments: Iterable[str], settings: Iterable[str], folder: Pa
         _check_taken_over(text, folder)
     tasks = [text.partition("=")[2] for text in (*stay, *settings) if _get_key(text) == "task"]
     task = get("task", ["identify", *tasks][-1])
-    stay = [text for text in stay if reads(task, _get_key(text).replace("/", "."))]
+    stay = [text for text in stay if does_read(task, _get_key(text).replace("/", "."))]
     own = {field.name for field in fields(task)}
     if "parameters" in own and "task.parameters" not in keys:
         settings.append(f"task.parameters={folder / RESULT}")

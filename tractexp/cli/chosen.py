@@ -28,23 +28,25 @@ def refuse_unread(task: Any, chosen: Mapping[str, str], needless: Collection[str
     does not read.
     """
     for key, value in chosen.items():
-        if key not in task.leaves_alone and not reads(task, key, needless):
+        if key not in task.leaves_alone and not does_read(task, key, needless):
             instead = (
-                task.instead[part] for part in task.instead if _overlap(OF.get(key, key), part)
+                task.instead[part] for part in task.instead if _do_overlap(OF.get(key, key), part)
             )
             raise UserError(
                 f"{key}={value} is not read by task={task.name}; {next(instead, 'leave it out')}"
             )
 
 
-def reads(task: Any, key: str, needless: Collection[str] = ()) -> bool:
+def does_read(task: Any, key: str, needless: Collection[str] = ()) -> bool:
     """Whether a task (class or instance) reads a setting, or any task does."""
     return any(
-        _overlap(OF.get(key, key), part) for part in (*ALWAYS, *task.reads) if part not in needless
+        _do_overlap(OF.get(key, key), part)
+        for part in (*ALWAYS, *task.reads)
+        if part not in needless
     )
 
 
-def _overlap(a: str, b: str) -> bool:
+def _do_overlap(a: str, b: str) -> bool:
     """Whether one key is the other or a part of it: choosing `model` chooses `model.motor` too, but
     no domain.
     """

@@ -20,7 +20,7 @@ from tractexp.storage.run_folder import WHOLE, settle
 from tractexp.text import quoting
 from tractexp.text.progress import say
 from tractexp.tracking import owner
-from tractexp.tracking.store import database_of, open_store, sentences
+from tractexp.tracking.store import find_database, open_store, raise_sentences
 
 DOES = (
     "Check versions, cores, caches, disk, the MLflow store and its runs; heal what can be, say what"
@@ -43,7 +43,7 @@ def doctor(arguments: list[str]) -> int:
         "--uri", help="the MLflow store; default: MLFLOW_TRACKING_URI, else outputs/mlflow.db here"
     )
     chosen = parser.parse_args(arguments)
-    uri = tracking.address(chosen.uri)
+    uri = tracking.resolve_address(chosen.uri)
     wrong = sum(
         map(
             print_findings,
@@ -177,11 +177,11 @@ def store(uri: str) -> Iterator[Finding]:
     """Whether the store can be used; a damaged one is set aside, for the runs are kept beside their
     results.
     """
-    database = database_of(uri)
+    database = find_database(uri)
     if database is not None and not database.exists():
         yield SOUND, f"there is no MLflow store {database} yet: it is made when something is logged"
         return
-    if database is not None and (problem := _unsound(database)):
+    if database is not None and (problem := _describe_fault(database)):
         if problem == "locked":
             yield (
                 WRONG,
@@ -218,7 +218,7 @@ def _is_ours(database: Path) -> bool:
     return not content.strip(b"\0") or b"alembic_version" in content or b"mlflow." in content
 
 
-def _unsound(database: Path) -> str:
+def _describe_fault(database: Path) -> str:
     """The fault of an SQLite file, in a few words; "locked" for one that is in use, "" for a sound
     one.
     """
@@ -246,11 +246,11 @@ def _unsound(database: Path) -> str:
 
 def check_runs(uri: str) -> Iterator[Finding]:
     """Whether runs that say they are running are; those whose process has ended are closed."""
-    database = database_of(uri)
+    database = find_database(uri)
     if database is not None and not database.exists():
         return
     client: Any = open_store(uri)
-    with sentences(uri):
+    with raise_sentences(uri):
         closed = [*owner.closed, *owner.close_stale(client)]
         running = owner.list_running(client)
     if closed:

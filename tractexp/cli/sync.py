@@ -39,7 +39,10 @@ def send_folder(folder: Path, uri: str | None) -> Counter[str]:
     from tractexp.tracking.sync import sync
 
     counts = sync(
-        folder.absolute(), uri, own=tracking.address(uri), tell=lambda line: say(f"  {line}")
+        folder.absolute(),
+        uri,
+        own=tracking.resolve_address(uri),
+        tell=lambda line: say(f"  {line}"),
     )
     numbers = (
         ", ".join(f"{count} {what}" for what, count in counts.items()) or "none are kept there"

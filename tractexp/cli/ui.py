@@ -24,7 +24,7 @@ def ui(arguments: list[str]) -> int:
     from tractexp.tracking.ui import serve
 
     return serve(
-        tracking.address(chosen.uri),
+        tracking.resolve_address(chosen.uri),
         port=chosen.port,
         page=_find_start_page,
         open_browser=chosen.open,
@@ -37,10 +37,10 @@ def _find_start_page(uri: str) -> str:
 
     The server's root is no start: MLflow shows a page on language models there.
     """
-    from tractexp.tracking.view import EXPERIMENTS, comparison_view
+    from tractexp.tracking.view import EXPERIMENTS, store_comparison_view
 
     try:
-        return comparison_view(uri)
+        return store_comparison_view(uri)
     except UserError as error:
         print(
             "tractexp ui: opens on the list of experiments, because the comparison view could not"

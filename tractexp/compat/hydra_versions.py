@@ -37,7 +37,7 @@ def store_schema(group: str | None, name: str, schema: type) -> None:
     store(name=name, node=schema, group=group, **({"replace": True} if known else {}))
 
 
-def behavior() -> dict[str, str]:
+def choose_behavior() -> dict[str, str]:
     """The keywords of `hydra.main` that ask for the behavior of Hydra 1.3."""
     installed = tuple(map(int, hydra.__version__.split(".")[:2]))
     return {} if installed >= NEW else {"version_base": "1.3"}

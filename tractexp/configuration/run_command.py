@@ -55,7 +55,7 @@ def build_again_command(*settings: str, of: Collection[str] = OF_LOAD) -> str:
     several of each, so that its jobs repeat none.
     """
     whole = _repeat_settings(settings, of)
-    possible = of == OF_LOAD and not any(map(_blocks_repetition, _started[1:]))
+    possible = of == OF_LOAD and not any(map(_does_block_repetition, _started[1:]))
     by_folder = [
         quoting.shell("tractexp", "again", str(folder), *settings) for folder in _placed if possible
     ]
@@ -94,7 +94,7 @@ def find_folder() -> Path | None:
     return next(iter(_placed), None)
 
 
-def _blocks_repetition(argument: str) -> bool:
+def _does_block_repetition(argument: str) -> bool:
     """Whether an argument keeps `tractexp again` from repeating this run by its folder."""
     # which is none of the settings that a folder keeps
     if get_group(argument) == "hydra" or "=" not in argument:

@@ -29,7 +29,7 @@ from tractexp.discrepancy.proposal.propose import ProposalResult, propose
 from tractexp.discrepancy.replication import replicate
 from tractexp.discrepancy.rival_sets import compare_rivals
 from tractexp.discrepancy.window_search import search_recorder_window
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.inference.base_fit import BaseFit, fit_base_model
 from tractexp.inference.catalogue import build_catalogue
 from tractexp.inference.context import Context
@@ -96,7 +96,7 @@ def investigate(
         For wrong events or names.
     """
     criteria = criteria or Criteria()
-    train, validate = (domain_of(model).events(events) for events in (train, validate))
+    train, validate = (find_domain(model).events(events) for events in (train, validate))
     check_events(train, validate)
 
     def findings_of(train: Sequence[Event], validate: Sequence[Event]) -> Findings:

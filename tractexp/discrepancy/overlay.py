@@ -10,7 +10,7 @@ from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.nearest import Nearest
 from tractexp.discrepancy.places import DisagreementInterval
 from tractexp.discrepancy.remainder import Remainder, find_remainders
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.identification.grade import GradedModel
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
@@ -54,7 +54,7 @@ class Overlay:
     @property
     def measurements(self) -> np.ndarray:
         """What the models are compared with (C, n) [pu], nan in gaps."""
-        return domain_of(self.event).excitation(self.event).measurements
+        return find_domain(self.event).excitation(self.event).measurements
 
 
 def overlay_fitted(

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.inference.recursion import sum_with_decay
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
@@ -149,8 +149,8 @@ class _Stretch:
 
         Of waveforms it stays what it is, for what is left cannot color that.
         """
-        drive = Drive.from_events([domain_of(event).excitation(event)])
-        domain = domain_of(event)
+        drive = Drive.from_events([find_domain(event).excitation(event)])
+        domain = find_domain(event)
         valid = drive.weights > 0
         before = slice(0, event.start)
         if (
@@ -165,7 +165,7 @@ class _Stretch:
     @property
     def size(self) -> int:
         """How many values are judged there."""
-        return domain_of(self.event).values(self.drive)
+        return find_domain(self.event).values(self.drive)
 
     @functools.cached_property
     def white_residual(self) -> np.ndarray:

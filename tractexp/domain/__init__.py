@@ -15,6 +15,6 @@ PHASORS, WAVES = PhasorDomain(), WaveDomain()
 DOMAINS: dict[str, Domain] = {domain.name: domain for domain in (PHASORS, WAVES)}
 
 
-def domain_of(of: Model | Event) -> Domain:
+def find_domain(of: Model | Event) -> Domain:
     """The domain of a model or an event."""
     return DOMAINS[of.domain]

@@ -11,7 +11,7 @@ from tractexp.configuration.plugin import discover, find
 from tractexp.errors import MODEL, UserError, list_allowed
 from tractexp.model.model import WAVES, Model
 from tractexp.record import Event
-from tractexp.record.window import LONGEST_WINDOW, mean_weights
+from tractexp.record.window import LONGEST_WINDOW, build_mean_weights
 from tractexp.recording.estimator import Estimator, estimator_of
 
 RECORDED = "recorded"  # the window that each record says
@@ -68,7 +68,7 @@ def find_averaging(event: Event, model: Model | None) -> Averaging | None:
     if window is None and not model.motor.within_a_cycle:
         return None
     if isinstance(window, Real):
-        return Averaging(mean_weights(float(window) / step), float(window))
+        return Averaging(build_mean_weights(float(window) / step), float(window))
     if window is None or window == RECORDED:
         shape = event.record.window
     else:

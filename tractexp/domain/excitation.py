@@ -12,7 +12,7 @@ from tractexp.record.window import sharpen_voltage
 WEIGHTS = {3: (0.5, 0.5, 1.0), 1: (1.0, 0.0, 0.0)}
 
 
-def phasors(
+def excite_phasors(
     event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
 ) -> Excitation:
     """The voltage and the power of an event; squared errors of P and of Q count by `weights`.
@@ -44,7 +44,7 @@ def phasors(
     )
 
 
-def waveforms(event: WaveEvent) -> WaveformDrive:
+def excite_waveforms(event: WaveEvent) -> WaveformDrive:
     """The voltage's space vector of an event, and its currents."""
     assert event.record.U2 is not None
     return WaveformDrive(

@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.domain import excitation
 from tractexp.domain.domain import DipGrid, Domain, simulate_compared
 from tractexp.domain.playback import Playback
-from tractexp.domain.port import Complex, Port, power_port
+from tractexp.domain.port import Complex, Port, build_power_port
 from tractexp.model.drive import PHASORS, Drive, Excitation
 from tractexp.model.model import Model
 from tractexp.noise import Noise
@@ -49,7 +49,7 @@ class PhasorDomain(Domain):
         self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
     ) -> Excitation:
         """U, f and U2 of an event as inputs, P and Q as measurements, each with its weight."""
-        return excitation.phasors(event, model, weights)
+        return excitation.excite_phasors(event, model, weights)
 
     def lacks(self, channel: str, events: Sequence[Event]) -> bool:
         return any(channel not in event.channels for event in events)
@@ -97,7 +97,7 @@ class PhasorDomain(Domain):
 
     def ports(self, event: Event) -> tuple[Port, ...]:
         """The one port of an event: U and P - jQ."""
-        return (power_port(event),)
+        return (build_power_port(event),)
 
     def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
         """P and Q (2, N) of a network's response to an event."""

@@ -79,8 +79,8 @@ class Playback:
             event=event,
             P=P,
             Q=Q,
-            epsilon_p=relative_error(record.P, P),
-            epsilon_q=relative_error(record.Q, Q),
+            epsilon_p=compute_relative_error(record.P, P),
+            epsilon_q=compute_relative_error(record.Q, Q),
         )
 
     @classmethod
@@ -90,14 +90,14 @@ class Playback:
         """
         return replace(
             cls.of_power(*measure_as_phasors(event, currents)),
-            epsilon_i=current_error(event, currents),
+            epsilon_i=compute_current_error(event, currents),
             waves=event,
             currents=currents,
             unsettled=measure_unsteadiness(event, currents),
         )
 
 
-def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
+def compute_relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
     """epsilon of Eq. (20): rms of the difference over rms of the measurement.
 
     Parameters
@@ -112,7 +112,7 @@ def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
 
     Examples
     --------
-    >>> relative_error(np.array([1.0, np.nan, 1.0]), np.array([1.1, 5.0, 0.9])).__round__(6)
+    >>> compute_relative_error(np.array([1.0, np.nan, 1.0]), np.array([1.1, 5.0, 0.9])).__round__(6)
     0.1
     """
     valid = np.isfinite(measured)
@@ -122,7 +122,7 @@ def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
     )
 
 
-def current_error(event: WaveEvent, currents: np.ndarray) -> float:
+def compute_current_error(event: WaveEvent, currents: np.ndarray) -> float:
     """epsilon_i: the error of calculated currents about a dip.
 
     Parameters
@@ -205,7 +205,9 @@ def measure_as_phasors(
     (M,) array [pu]
         Q of them.
     """
-    measured, calculated = (_phasors(event, i) for i in (np.nan_to_num(event.currents), currents))
+    measured, calculated = (
+        _measure_phasors(event, i) for i in (np.nan_to_num(event.currents), currents)
+    )
     was, own = event.phasors, event.phasors.record
     record = Record(
         own.name,
@@ -232,7 +234,7 @@ def measure_as_phasors(
     return phasors, calculated.S.real, calculated.S.imag
 
 
-def _phasors(event: WaveEvent, currents: np.ndarray) -> Phasors:
+def _measure_phasors(event: WaveEvent, currents: np.ndarray) -> Phasors:
     """Phasors of the recorded voltage and of currents (3, N) [pu], whose U and S are
     per unit, too.
     """

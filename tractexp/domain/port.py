@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from tractexp.record import Event, WaveEvent
 from tractexp.record.periodic import Periodic
-from tractexp.record.wave_event import stationary
+from tractexp.record.wave_event import transform_stationary
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -57,14 +57,14 @@ class Port:
         return (0.0 if self.steady is None else self.steady) * self.u
 
 
-def power_port(event: Event) -> Port:
+def build_power_port(event: Event) -> Port:
     """The port of phasors: U against P - jQ, both less their means before the dip."""
     record = event.record
     i = (record.P - event.P0) - 1j * (record.Q - event.Q0)
     return Port((record.U - event.U0).astype(complex), i, record.step, event.start, None)
 
 
-def current_ports(event: WaveEvent) -> tuple[Port, ...]:
+def build_current_ports(event: WaveEvent) -> tuple[Port, ...]:
     """The space vectors, and the zero sequence where it is compared, less their periodic courses
     before the dip.
 
@@ -73,8 +73,15 @@ def current_ports(event: WaveEvent) -> tuple[Port, ...]:
     """
     step, v = event.record.step, event.v * event.turn
     u = np.stack([v.real, v.imag, event.v_zero])
-    u, i = u - periodic_course(event, u), event.currents - periodic_course(event, event.currents)
-    vector = stationary(i[:1], event.rate, event.f0)[0] if event.phases == 1 else i[0] + 1j * i[1]
+    u, i = (
+        u - continue_periodic_course(event, u),
+        event.currents - continue_periodic_course(event, event.currents),
+    )
+    vector = (
+        transform_stationary(i[:1], event.rate, event.f0)[0]
+        if event.phases == 1
+        else i[0] + 1j * i[1]
+    )
     Y = (event.P0 - 1j * event.Q0) / event.U0**2
     vectors = Port(
         (u[0] + 1j * u[1]) / event.turn, vector / event.turn, step, event.start, Y, event.f0
@@ -83,7 +90,7 @@ def current_ports(event: WaveEvent) -> tuple[Port, ...]:
     return (vectors, zero) if event.compared_channels[2] else (vectors,)
 
 
-def periodic_course(event: WaveEvent, channels: np.ndarray) -> np.ndarray:
+def continue_periodic_course(event: WaveEvent, channels: np.ndarray) -> np.ndarray:
     """The course of channels before the dip, harmonics included, continued through the event.
 
     Parameters

@@ -29,7 +29,9 @@ LEFT = 2.0  # times what white noise leaves of an offset that the mean before th
 STRUCK = 8  # samples of the lead after which a single wrong sample of the voltage is put there
 
 
-def impulse_responses(problem: "Problem", values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def compute_impulse_responses(
+    problem: "Problem", values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The change of the currents by one standard deviation of one sample of the voltage, at free
     values (d,), of waveforms.
 
@@ -42,22 +44,22 @@ def impulse_responses(problem: "Problem", values: np.ndarray) -> tuple[np.ndarra
     noise = max(event.noise_U, SMALLEST_DEVIATION)
     # the zero's is a third
     shocks = [(noise, 0.0), (1j * noise, 0.0), (0.0, noise / np.sqrt(2))][: event.phases]
-    off = _differences(problem, values, 0, [_struck(event, *shock) for shock in shocks])[
-        :, :, : event.start
-    ]
+    off = _compute_differences(
+        problem, values, 0, [_strike_sample(event, *shock) for shock in shocks]
+    )[:, :, : event.start]
     if event.phases == 1:
         return off[0, 0], np.zeros(1)
     return (off[0, 0] + 1j * off[0, 1] - 1j * (off[1, 0] + 1j * off[1, 1])) / 2, off[2, 2]
 
 
-def input_errors(problem: "Problem", values: np.ndarray) -> np.ndarray:
+def compute_input_errors(problem: "Problem", values: np.ndarray) -> np.ndarray:
     """The modes (k, 3, N) [pu] in which errors of waveforms that are no noise show in the currents,
     at free values (d,).
 
     The offsets that the channels may have, and those of the voltage as the model passes them on.
     """
     shapes = [
-        offsets(problem.drive),
+        build_offsets(problem.drive),
         *(_measure_voltage_effects(problem, values, e) for e in range(problem.drive.events)),
     ]
     return np.concatenate(shapes)
@@ -70,7 +72,7 @@ def _measure_voltage_effects(problem: "Problem", values: np.ndarray, event: int)
     drive, part = problem.drive, problem.drive.part(event)
     plain = problem.events[event]
     assert isinstance(plain, WaveEvent)
-    off = _differences(
+    off = _compute_differences(
         problem, values, event, [*_shift_voltage_offsets(plain), *_vary_between_samples(plain)]
     )
     shapes = np.zeros((len(off), *drive.measurements.shape))
@@ -78,7 +80,7 @@ def _measure_voltage_effects(problem: "Problem", values: np.ndarray, event: int)
     return shapes
 
 
-def _differences(
+def _compute_differences(
     problem: "Problem", values: np.ndarray, event: int, variants: Sequence[Event]
 ) -> np.ndarray:
     """The change of an event's currents (n, 3, N) [pu] by variants of its voltage; 0 where one
@@ -135,7 +137,7 @@ def measure_offset_from_neighbors(v: np.ndarray) -> np.ndarray:
     return off
 
 
-def offsets(drive: Drive) -> np.ndarray:
+def build_offsets(drive: Drive) -> np.ndarray:
     """A constant in each compared current of each event, of one standard deviation,
     (k, 3, N) [pu].
     """
@@ -148,7 +150,7 @@ def offsets(drive: Drive) -> np.ndarray:
     return np.array(shapes)
 
 
-def _struck(event: WaveEvent, vector: complex, zero: float) -> WaveEvent:
+def _strike_sample(event: WaveEvent, vector: complex, zero: float) -> WaveEvent:
     """The event with one sample of the lead's voltage off, in the stationary frame, and what of it
     is not smoothed.
     """

@@ -11,15 +11,15 @@ import numpy as np
 from tractexp.domain import excitation, wave_errors
 from tractexp.domain.domain import DipGrid, Domain, simulate_compared
 from tractexp.domain.playback import Playback
-from tractexp.domain.port import Complex, Port, current_ports, periodic_course
+from tractexp.domain.port import Complex, Port, build_current_ports, continue_periodic_course
 from tractexp.model.drive import WAVES, Drive, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.noise.random_walk import RandomWalk
 from tractexp.noise.voltage import SmoothedEvent
-from tractexp.noise.waves import of_waves
+from tractexp.noise.waves import estimate_wave_noise
 from tractexp.record import Event, WaveEvent, convert_to_waves
-from tractexp.record.synthetic import synthetic_event
+from tractexp.record.synthetic import build_synthetic_event
 from tractexp.record.wave_event import COARSEST
 from tractexp.text.wording import join_words
 
@@ -55,7 +55,7 @@ class WaveDomain(Domain):
         self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
     ) -> WaveformDrive:
         """The sampled voltages of an event as inputs, its currents as measurements."""
-        return excitation.waveforms(cast(WaveEvent, event))
+        return excitation.excite_waveforms(cast(WaveEvent, event))
 
     def smooth_event(self, event: Event) -> SmoothedEvent:
         """As recorded: within a cycle nothing tells noise of the voltage from the voltage."""
@@ -84,14 +84,14 @@ class WaveDomain(Domain):
         shapes: np.ndarray | None,
     ) -> Noise:
         """A load does not wander within so short a record."""
-        responses = wave_errors.impulse_responses(problem, values)
-        return of_waves(
+        responses = wave_errors.compute_impulse_responses(problem, values)
+        return estimate_wave_noise(
             residual, valid, quiet, responses, cast(WaveEvent, problem.events[0]).phases, shapes
         )
 
     def input_errors(self, problem: "Problem", values: np.ndarray) -> np.ndarray:
         """The modes (k, 3, N) [pu] in which errors of the voltage show in the currents."""
-        return wave_errors.input_errors(problem, values)
+        return wave_errors.compute_input_errors(problem, values)
 
     def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
         """Calculated currents (C, N) beside those recorded, and the power of both."""
@@ -99,7 +99,7 @@ class WaveDomain(Domain):
 
     def ports(self, event: Event) -> tuple[Port, ...]:
         """The ports of an event: the space vector, and the zero sequence where there is one."""
-        return current_ports(cast(WaveEvent, event))
+        return build_current_ports(cast(WaveEvent, event))
 
     def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
         """Currents (3, N) of a network's responses: alpha, beta and zero, with what is periodic
@@ -107,7 +107,7 @@ class WaveDomain(Domain):
         """
         event, (vector, *zero) = cast(WaveEvent, event), responses
         i = vector * event.turn
-        return periodic_course(event, event.currents) + np.stack(
+        return continue_periodic_course(event, event.currents) + np.stack(
             [i.real, i.imag, zero[0].real if zero else np.zeros(len(i))]
         )
 
@@ -173,7 +173,9 @@ class WaveDomain(Domain):
         """Of a fault between two phases, types C and D of Bollen 2000, where the unbalance is 1."""
         v = (1 - shape.depth * course) * np.exp(1j * np.radians(shape.jump) * course)
         v = v + shape.unbalance * shape.depth * course * np.exp(-4j * np.pi * shape.frequency * t)
-        return synthetic_event(name, t, v, (1.0, shape.P0, shape.Q0), shape.frequency, start, end)
+        return build_synthetic_event(
+            name, t, v, (1.0, shape.P0, shape.Q0), shape.frequency, start, end
+        )
 
     def dip(
         self,
@@ -233,7 +235,7 @@ class WaveDomain(Domain):
                 * np.cumsum(np.concatenate([[0.0], (speed[1:] + speed[:-1]) / 2 * np.diff(fine)]))
             )
         means = before["U0"], before["P0"], before["Q0"]
-        event = synthetic_event(
+        event = build_synthetic_event(
             "played", fine, v, means, nominal + omega_s0 / (2 * np.pi), 1, len(fine) - 1
         )
         i = simulate_compared(model, values, Drive.from_events([self.excitation(event)]))

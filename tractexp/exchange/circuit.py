@@ -120,7 +120,7 @@ class TCircuit:
     @property
     def X_prime(self) -> float:
         """The transient reactance [pu]."""
-        return self.X_s + _parallel(self.X_m, self.X_1)
+        return self.X_s + _connect_parallel(self.X_m, self.X_1)
 
     @property
     def X_second(self) -> float:
@@ -128,7 +128,7 @@ class TCircuit:
         return (
             self.X_prime
             if self.X_2 is None
-            else self.X_s + _parallel(_parallel(self.X_m, self.X_1), self.X_2)
+            else self.X_s + _connect_parallel(_connect_parallel(self.X_m, self.X_1), self.X_2)
         )
 
     @property
@@ -141,7 +141,7 @@ class TCircuit:
         """The open-circuit time constant [s] of the second cage; 0 where there is none."""
         if self.X_2 is None or self.R_2 is None:
             return 0.0
-        return (self.X_2 + _parallel(self.X_m, self.X_1)) / (self.omega_n * self.R_2)
+        return (self.X_2 + _connect_parallel(self.X_m, self.X_1)) / (self.omega_n * self.R_2)
 
     def parameters(self) -> dict[str, float]:
         """{name: value} of what an identification finds of such a motor: the inverse of `single`
@@ -169,10 +169,10 @@ class TCircuit:
         """
         rotor = complex(self.R_1 / slip, self.X_1)
         if self.X_2 is not None and self.R_2 is not None:
-            rotor = _parallel(rotor, complex(self.R_2 / slip, self.X_2))
-        return complex(self.R_s, self.X_s) + _parallel(complex(0.0, self.X_m), rotor)
+            rotor = _connect_parallel(rotor, complex(self.R_2 / slip, self.X_2))
+        return complex(self.R_s, self.X_s) + _connect_parallel(complex(0.0, self.X_m), rotor)
 
 
-def _parallel(a: Number, b: Number) -> Number:
+def _connect_parallel(a: Number, b: Number) -> Number:
     """Two impedances in parallel."""
     return a * b / (a + b)

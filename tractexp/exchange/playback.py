@@ -94,7 +94,7 @@ def _play_in_other_simulator(form: Format, text: str, load: Identified) -> Agree
     """In the simulator of the format; None where that is not at hand."""
     there = form.play_back_dip(text, load)
     return there and _measure_agreement(
-        there.by, response(load, there, there.P[0], there.Q[0]), (there.P, there.Q)
+        there.by, play_load(load, there, there.P[0], there.Q[0]), (there.P, there.Q)
     )
 
 
@@ -107,11 +107,11 @@ def _play_in_this_simulator(form: Format, text: str, load: Identified) -> Agreem
     along = Simulated(
         "our own simulator, from the file's numbers,", STEP, U, np.zeros_like(U), U, U
     )
-    fit = response(load, along, load.ratio * before["P0"], load.ratio * before["Q0"])
+    fit = play_load(load, along, load.ratio * before["P0"], load.ratio * before["Q0"])
     return _measure_agreement(along.by, fit, _simulate_restored_load(restored, load, along))
 
 
-def response(
+def play_load(
     load: Identified, along: Simulated, P0: float, Q0: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """P and Q (N,) [pu] of a load along a voltage, drawing P0 and Q0 before it."""
@@ -157,7 +157,7 @@ def _simulate_restored_load(
         at_rest.get(f"{x}_motor", 0.0) + static
         for x, static in zip("PQ", restored.static, strict=True)
     )
-    return response(of_file, along, P0, Q0)
+    return play_load(of_file, along, P0, Q0)
 
 
 def _measure_agreement(

@@ -118,7 +118,7 @@ def rate_machine(result: Result) -> RatedMachine:
             " figures are those of no single machine"
         )
     circuit, slip = load.circuit, -load.steady_state.get("omega_before", 0.0) / load.omega_n
-    own, typical = _figures(circuit, load.inertia, slip), compute_typical_figures()
+    own, typical = _list_figures(circuit, load.inertia, slip), compute_typical_figures()
     return RatedMachine(
         rating,
         tuple(
@@ -134,11 +134,11 @@ def compute_typical_figures() -> dict[str, tuple[float, float]]:
     rows = []
     for *elements, inertia in TYPES:
         circuit = TCircuit(NOMINAL_SPEED, *elements)
-        rows.append(_figures(circuit, inertia, _rated_slip(circuit)))
+        rows.append(_list_figures(circuit, inertia, _find_rated_slip(circuit)))
     return {name: (min(r[name] for r in rows), max(r[name] for r in rows)) for name in ABOUT}
 
 
-def _figures(circuit: TCircuit, inertia: float, slip: float) -> dict[str, float]:
+def _list_figures(circuit: TCircuit, inertia: float, slip: float) -> dict[str, float]:
     """The figures of a circuit per unit of its rating, by their names."""
     running, standing = (abs(circuit.impedance(s)) for s in (slip, 1.0))
     return {
@@ -151,7 +151,7 @@ def _figures(circuit: TCircuit, inertia: float, slip: float) -> dict[str, float]
     }
 
 
-def _rated_slip(circuit: TCircuit) -> float:
+def _find_rated_slip(circuit: TCircuit) -> float:
     """The slip at which a machine of one cage draws its rated current at nominal voltage.
 
     There its impedance is 1, which is a quadratic equation in R_1 over the slip.

@@ -89,7 +89,7 @@ def is_number(cell: Any, decimal: str = ".") -> bool:
     (False, True)
     """
     try:
-        _number(cell, decimal)
+        _parse_number(cell, decimal)
     except ValueError:
         return False
     return True
@@ -100,7 +100,7 @@ def is_plain_number(cell: Any) -> bool:
     return is_number(cell) or is_number(cell, ",")
 
 
-def group_mark(cell: Any, decimal: str) -> str:
+def pick_group_mark(cell: Any, decimal: str) -> str:
     """The mark between groups of three digits of a number.
 
     Parameters
@@ -117,7 +117,7 @@ def group_mark(cell: Any, decimal: str) -> str:
 
     Examples
     --------
-    >>> group_mark("1,234,567", "."), group_mark("1,234", ".")
+    >>> pick_group_mark("1,234,567", "."), pick_group_mark("1,234", ".")
     (',', '')
     """
     match = GROUPED[decimal].fullmatch(cell.strip()) if isinstance(cell, str) else None
@@ -129,7 +129,7 @@ def group_mark(cell: Any, decimal: str) -> str:
 
 def is_grouped(cell: Any) -> bool:
     """Whether a cell is surely a number with its digits in groups."""
-    return any(group_mark(cell, decimal) for decimal in GROUPED)
+    return any(pick_group_mark(cell, decimal) for decimal in GROUPED)
 
 
 def find_group_mark(rows: Sequence[Sequence[Any]], decimal: str) -> str:
@@ -139,7 +139,7 @@ def find_group_mark(rows: Sequence[Sequence[Any]], decimal: str) -> str:
     before three digits.
     """
     cells = [cell for row in rows for cell in row if isinstance(cell, str)]
-    marks = {group_mark(cell, decimal) for cell in cells} - {""}
+    marks = {pick_group_mark(cell, decimal) for cell in cells} - {""}
     if decimal == "." and _are_commas_of_groups(cells):
         marks.add(",")
     return marks.pop() if len(marks) == 1 else ""
@@ -182,7 +182,7 @@ def _is_rising(values: Sequence[float]) -> bool:
     return all(a < b for a, b in itertools.pairwise(values))
 
 
-def numbers(
+def parse_numbers(
     cells: Sequence[Any], decimal: str = ".", gaps: bool = False, group: str = ""
 ) -> np.ndarray:
     """The numbers of a column's cells.
@@ -210,7 +210,7 @@ def numbers(
 
     Examples
     --------
-    >>> numbers(["1.234,5", ""], ",", gaps=True, group=".").tolist()
+    >>> parse_numbers(["1.234,5", ""], ",", gaps=True, group=".").tolist()
     [1234.5, nan]
     """
     values = np.empty(len(cells))
@@ -218,11 +218,11 @@ def numbers(
         if group and isinstance(cell, str) and GROUPED[decimal].fullmatch(cell.strip()):
             cell = cell.replace(group, "")
         try:
-            values[row] = _number(cell, decimal)
+            values[row] = _parse_number(cell, decimal)
         except ValueError:
             if not is_gap(cell):
                 raise BadCell(
-                    row, f"{quote_cell(cell)} is not a number{_comma(str(cell), decimal)}"
+                    row, f"{quote_cell(cell)} is not a number{_remark_on_comma(str(cell), decimal)}"
                 ) from None
             if not gaps:
                 what = (
@@ -240,7 +240,7 @@ def quote_cell(cell: Any) -> str:
     return f"'{cell!s:.40}'"
 
 
-def _number(cell: Any, decimal: str) -> float:
+def _parse_number(cell: Any, decimal: str) -> float:
     """The number that a cell is; raises `ValueError`."""
     if isinstance(cell, int | float) and not isinstance(cell, bool):
         return float(cell)
@@ -255,7 +255,7 @@ def _number(cell: Any, decimal: str) -> float:
         return float(text.replace("−", "-").replace("D", "e").replace("d", "e"))
 
 
-def _comma(cell: str, decimal: str) -> str:
+def _remark_on_comma(cell: str, decimal: str) -> str:
     """A remark on a decimal mark that is not the one of the file."""
     other = {".": ",", ",": "."}[decimal]
     return (

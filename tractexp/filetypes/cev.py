@@ -18,12 +18,12 @@ from tractexp.errors import UserError
 from tractexp.filetypes import timeline
 from tractexp.filetypes.cev_scale import ROOT, find_gain, find_usual_unit, read_ratio
 from tractexp.filetypes.cev_text import EventReport, find_marked_row, read_report, read_samples
-from tractexp.filetypes.comtrade_fields import number, quote_field
+from tractexp.filetypes.comtrade_fields import parse_number, quote_field
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.table import Rows
 from tractexp.filetypes.text import decode
-from tractexp.recording.recording import Channel, Recording, StatusChannel, unit_of
+from tractexp.recording.recording import Channel, Recording, StatusChannel, find_unit
 from tractexp.storage import files
 
 LARGEST = 32 * 2**20  # bytes: event reports last seconds
@@ -83,7 +83,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     return Recording(
         source=str(path),
         channels=[
-            _channel(
+            _build_channel(
                 report,
                 k,
                 timeline.resample_evenly(opened.values[:, k], runs, None),
@@ -99,8 +99,8 @@ def load(path: Path, encoding: str | None = None) -> Recording:
         start=_start(report, moment, remarks),
         trigger=None if opened.marked is None else moment,
         status=[
-            replace(each, raw=timeline.nearest(each.raw, runs))
-            for each in _states(report, opened.words)
+            replace(each, raw=timeline.take_nearest(each.raw, runs))
+            for each in _build_states(report, opened.words)
         ],
         notes=remarks.notes(),
         extra={
@@ -156,7 +156,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     back = np.exp(-2j * np.pi * opened.nominal * t)
     columns = [("t", "s", t), ("f", "Hz", opened.frequency[quarter:])]
     for k in filter(functools.partial(_is_named, report), range(opened.values.shape[1])):
-        channel = _channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks)
+        channel = _build_channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks)
         if channel.form == "waveform" and channel.phase in ("A", "B", "C", "AB", "BC", "CA"):
             x = channel.ratio * channel.read_values()
             X = (x[quarter:] + 1j * x[:-quarter]) * back
@@ -200,7 +200,7 @@ def _open_report(path: Path, encoding: str | None) -> _Opened:
     remarks = Remarks(str(path))
     report = read_report(path, text, remarks)
     values, marks, words = read_samples(path, report, remarks)
-    per_cycle, frequency = _rate(path, report)
+    per_cycle, frequency = _read_rate(path, report)
     _note_lost_rows(report, per_cycle, remarks)
     marked = find_marked_row(marks, ">*")
     if marked is None:
@@ -225,7 +225,7 @@ def _note_lost_rows(report: EventReport, per_cycle: float, remarks: Remarks) -> 
     """Note rows that are missing or double by the cycles that the summary announces: each has its
     checksum, and none a number.
     """
-    cycles = number(report.about.get("NUM_OF_CYC", ""))
+    cycles = parse_number(report.about.get("NUM_OF_CYC", ""))
     announced = round(per_cycle * cycles) if cycles and abs(cycles) < HUGE else 0
     if announced > 0 and announced != len(report.rows):
         remarks.add(
@@ -263,9 +263,9 @@ def _read_tracked_frequency(
     return column[last]
 
 
-def _rate(path: Path, report: EventReport) -> tuple[float, float]:
+def _read_rate(path: Path, report: EventReport) -> tuple[float, float]:
     """Samples a cycle and the frequency that the relay sampled by."""
-    numbers = {key: number(report.about.get(key, "")) for key in ("SAM/CYC_A", "FREQ")}
+    numbers = {key: parse_number(report.about.get(key, "")) for key in ("SAM/CYC_A", "FREQ")}
     per_cycle = numbers["SAM/CYC_A"]
     frequency = numbers["FREQ"]
     if per_cycle is None or not 1 <= per_cycle <= 10_000:
@@ -288,7 +288,7 @@ def _is_named(report: EventReport, k: int) -> bool:
     return report.columns[k] not in ("", "*")
 
 
-def _channel(
+def _build_channel(
     report: EventReport, k: int, values: np.ndarray, gain: float, remarks: Remarks
 ) -> Channel:
     """The channel of a column: its quantity and unit from the name, its values times the
@@ -298,7 +298,7 @@ def _channel(
     name, unit = (match[1], match[2] or "") if match else (report.columns[k], "")
     wave = _WAVE.fullmatch(name.upper())
     unit = unit or find_usual_unit(name, wave is not None, remarks)
-    quantity = "frequency" if name == "FREQ" else unit_of(unit)[0]
+    quantity = "frequency" if name == "FREQ" else find_unit(unit)[0]
     if wave is None:
         return Channel(name, values, unit, quantity, form="value")
     phase = wave[1] or ""
@@ -312,7 +312,7 @@ def _start(report: EventReport, before: float, remarks: Remarks) -> datetime | N
     None, with a remark, where the summary has no date.
     """
     keys = ("YEAR", "MONTH", "DAY", "HOUR", "MIN", "SEC", "MSEC")
-    parts = [number(report.about.get(key, "")) for key in keys]
+    parts = [parse_number(report.about.get(key, "")) for key in keys]
     try:
         year, month, day, hour, minute, second, milli = (
             int(part) for part in parts if part is not None
@@ -327,7 +327,7 @@ def _start(report: EventReport, before: float, remarks: Remarks) -> datetime | N
         return None
 
 
-def _states(report: EventReport, words: list[str]) -> list[StatusChannel]:
+def _build_states(report: EventReport, words: list[str]) -> list[StatusChannel]:
     """One channel for each bit with a name; a row without a word keeps the one before."""
     at = report.columns.index("TRIG")
     names = report.columns[at + 1].split() if len(report.columns) > at + 1 else []

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tractexp.filetypes.cev_text import EventReport, find_marked_row
-from tractexp.filetypes.comtrade_fields import number
+from tractexp.filetypes.comtrade_fields import parse_number
 from tractexp.filetypes.remarks import Remarks
 
 ROOT = float(np.sqrt(2))
@@ -29,7 +29,7 @@ def read_ratio(report: EventReport, name: str, remarks: Remarks) -> float:
         return 1.0
     column = ("CTR" if name[0] == "I" else "PTR") + "_" + name
     keys = (column, column[:-1] + "A", column[:3])
-    ratio = next((r for key in keys if (r := number(report.about.get(key, "")))), None)
+    ratio = next((r for key in keys if (r := parse_number(report.about.get(key, "")))), None)
     if ratio is None or ratio <= 0:
         remarks.add(
             f"secondary values (PRIM_VAL is NO), but no ratio {column} for {name}: they stay"
@@ -75,7 +75,7 @@ def _compare_with_summary(report: EventReport, sizes: np.ndarray) -> float | Non
     """
     ratios = []
     for column, here in zip(report.columns, sizes.tolist(), strict=False):
-        rms = number(report.about.get(column, "")) if column in CURRENTS else None
+        rms = parse_number(report.about.get(column, "")) if column in CURRENTS else None
         if rms and here > 0:
             ratios.append((rms, here / rms))
     return max(ratios)[1] if ratios else None

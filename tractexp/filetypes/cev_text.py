@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.filetypes.comtrade_fields import number, quote_field
+from tractexp.filetypes.comtrade_fields import parse_number, quote_field
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.remarks import Remarks
 
@@ -25,12 +25,12 @@ class EventReport:
     settings: str = ""
 
 
-def checksum(text: str) -> str:
+def compute_checksum(text: str) -> str:
     """The checksum of a row up to its last comma: the sum of its bytes, as four hexadecimal digits.
 
     Examples
     --------
-    >>> checksum("AB")
+    >>> compute_checksum("AB")
     '0083'
     """
     return f"{sum(text.encode('latin-1', 'replace')) & 0xFFFF:04X}"
@@ -76,7 +76,7 @@ def _split_row(row: str, line: int, remarks: Remarks) -> tuple[list[str], bool]:
         cells = [row]
     if len(cells) < 2 or not re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
         return cells, False
-    if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
+    if compute_checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
         remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
     return cells[:-1], True
 
@@ -132,7 +132,7 @@ def read_samples(
             )
         values.append(
             [
-                _value(path, line, name, cell)
+                _parse_value(path, line, name, cell)
                 for name, cell in zip(report.columns[:at], cells, strict=False)
             ]
         )
@@ -141,11 +141,11 @@ def read_samples(
     return np.array(values, float).reshape(len(values), at), marks, words
 
 
-def _value(path: Path, line: int, name: str, cell: str) -> float:
+def _parse_value(path: Path, line: int, name: str, cell: str) -> float:
     """The number of a cell; nan where the relay wrote none. Raises `UserError` for anything
     else.
     """
-    value = number(cell) if cell.strip() else float("nan")
+    value = parse_number(cell) if cell.strip() else float("nan")
     if value is None and (name == "*" or not set(cell.strip()) - {"$", "*", "-"}):
         return float("nan")  # so the relay writes a missing value
     if value is None or abs(value) > HUGE:

@@ -99,21 +99,21 @@ def is_date(cell: Any) -> bool:
     """Whether a cell is a day without a time."""
     if not isinstance(cell, str):
         return isinstance(cell, dt.date)
-    return any(_day(cell.strip(), form) is not None for form in DAYS)
+    return any(_parse_day(cell.strip(), form) is not None for form in DAYS)
 
 
-def first_day(cells: Sequence[Any]) -> dt.date | None:
+def find_first_day(cells: Sequence[Any]) -> dt.date | None:
     """The day of the first of some cells that are dates, read as all of them can be; None where
     they are none.
     """
     try:
         texts = [cell.strip() if isinstance(cell, str) else cell for cell in cells]
-        return _dates(texts, american=False)[0][texts[0]]
+        return _resolve_dates(texts, american=False)[0][texts[0]]
     except (BadCell, IndexError, KeyError, TypeError):
         return None
 
 
-def times(cells: Sequence[Any]) -> ClockTimes:
+def parse_times(cells: Sequence[Any]) -> ClockTimes:
     """The times of cells. Those without a date run on past midnight, those without hours past the
     full hour; leap seconds, and jumps of a clock that was set, are taken out.
 
@@ -121,7 +121,7 @@ def times(cells: Sequence[Any]) -> ClockTimes:
     """
     if not len(cells):
         return ClockTimes(np.empty(0))
-    moments = [_moment(cell, row) for row, cell in enumerate(cells)]
+    moments = [_parse_moment(cell, row) for row, cell in enumerate(cells)]
     _check_dates(moments, cells)
     clock = np.array([one.second for one in moments])
     if moments[0].day is not None:
@@ -131,7 +131,7 @@ def times(cells: Sequence[Any]) -> ClockTimes:
     seconds = seconds + _count_leap_seconds(moments)
     has_zone = any(one.zone for one in moments)
     seconds, jumps = _take_out_jumps(seconds, np.full(len(cells), np.inf) if has_zone else clock)
-    if _offset(zone := moments[0].zone):
+    if _parse_offset(zone := moments[0].zone):
         remarks.append((0, f"times are told in UTC, and the file's are those of UTC{zone}"))
     return ClockTimes(seconds - seconds[0], start, (*remarks, *jumps), moments[0].second)
 
@@ -165,7 +165,7 @@ def _add_days(
     """(seconds (N,) since the midnight before the first moment, the first moment, what is said of
     dates that can be read in several ways); `clock` (N,) are the seconds of the day.
     """
-    days, remarks = _dates([one.day for one in moments], any(one.half for one in moments))
+    days, remarks = _resolve_dates([one.day for one in moments], any(one.half for one in moments))
     dates = [days[one.day] for one in moments]
     since = np.array([(date - dates[0]).days * DAY for date in dates])
     start = dt.datetime.combine(dates[0], dt.time()) + dt.timedelta(seconds=clock[0])
@@ -211,7 +211,7 @@ def _match_jump(jump: float, usual: float, expected: Sequence[float]) -> float:
     return next((each for each in expected if abs(each - jump) <= usual), 0.0)
 
 
-def _moment(cell: Any, row: int) -> _Moment:
+def _parse_moment(cell: Any, row: int) -> _Moment:
     """The moment in a cell, with a zone that of UTC; raises `BadCell`."""
     moment = _read_text(cell, row) if isinstance(cell, str) else _read_object(cell)
     if moment is None:
@@ -256,11 +256,11 @@ def _read_text(cell: str, row: int) -> _Moment | None:
     day = (match["day"] or "").strip() or None
     if day and not is_date(day):
         raise BadCell(row, f"{quote_cell(day)} is no date; write it as 2024-03-31")
-    total = hours * 3600 + minutes * 60 + second - _offset(match["zone"])
+    total = hours * 3600 + minutes * 60 + second - _parse_offset(match["zone"])
     return _Moment(day, total, bool(match["half"]), match["zone"] or "", second >= 60)
 
 
-def _offset(zone: str | None) -> float:
+def _parse_offset(zone: str | None) -> float:
     """Seconds by which a zone is ahead of UTC."""
     if not zone or zone in ("Z", "UTC", "GMT"):
         return 0.0
@@ -268,7 +268,9 @@ def _offset(zone: str | None) -> float:
     return (1 if zone[0] == "+" else -1) * (int(digits[:2]) * 3600 + int(digits[2:]) * 60)
 
 
-def _dates(days: Sequence[Any], american: bool) -> tuple[dict[Any, dt.date], list[tuple[int, str]]]:
+def _resolve_dates(
+    days: Sequence[Any], american: bool
+) -> tuple[dict[Any, dt.date], list[tuple[int, str]]]:
     """{day as written: the day}, all read in one way, and what is said where several ways would do.
 
     Raises `BadCell` where no way reads all.
@@ -303,7 +305,7 @@ def _read_in_each_way(texts: Sequence[str]) -> dict[str, list[dt.date]]:
     """
     ways: dict[str, list[dt.date]] = {}
     for form in DAYS:
-        dates = [day for text in texts if (day := _day(text, form)) is not None]
+        dates = [day for text in texts if (day := _parse_day(text, form)) is not None]
         if len(dates) == len(texts) and dates not in ways.values():
             ways[form] = dates
     return ways
@@ -327,7 +329,7 @@ def _choose_way(ways: Mapping[str, Sequence[dt.date]], american: bool) -> tuple[
 
 
 @functools.lru_cache(maxsize=4096)
-def _day(text: str, form: str) -> dt.date | None:
+def _parse_day(text: str, form: str) -> dt.date | None:
     """The day that a text names in one way of writing; None for no day."""
     try:
         return dt.datetime.strptime(text, form).date()

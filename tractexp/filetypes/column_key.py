@@ -7,9 +7,9 @@ from typing import Any
 
 from tractexp.errors import DATA, UserError, list_allowed, name_setting, suggest_nearest
 from tractexp.filetypes.column_unit import fits, is_unit
-from tractexp.filetypes.columns import Role, role
+from tractexp.filetypes.columns import Role, find_role
 from tractexp.filetypes.table import TableFile
-from tractexp.recording.unit import amount
+from tractexp.recording.unit import parse_amount
 
 CONTRACT = ("t", "U", "P", "Q", "f", "U2", "U_angle")
 PHASES = ("a", "b", "c")
@@ -49,7 +49,7 @@ def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
             raise UserError(
                 f"{DATA.units} names '{quantity}'{list_allowed(quantity, QUANTITIES, 'Quantities')}"
             )
-        if not is_unit(amount(str(unit))[1]):
+        if not is_unit(parse_amount(str(unit))[1]):
             raise UserError(
                 f"{DATA.units}: {quantity}={unit} is not a unit; one is e.g. kV, V, kA, A, MW, kW,"
                 " Mvar, Hz, s, ms, deg, rad, pu"
@@ -111,7 +111,7 @@ def find_column(table: TableFile, key: str, choice: Any) -> int:
 
 def _may_hold_quantity(key: str, name: str, unit: str) -> bool:
     """Whether a column may hold a key's quantity, for its name says no other."""
-    named = role(name, unit)
+    named = find_role(name, unit)
     return named is None or named.quantity == Role(key).quantity
 
 

@@ -5,10 +5,10 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tractexp.filetypes.clock import first_day, is_time
+from tractexp.filetypes.clock import find_first_day, is_time
 from tractexp.filetypes.column_key import CONTRACT, PHASE_VOLTAGES, PHASES
-from tractexp.filetypes.column_unit import meaning
-from tractexp.filetypes.columns import Role, order_of, role
+from tractexp.filetypes.column_unit import find_meaning
+from tractexp.filetypes.columns import Role, find_role, order_of
 from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.table import TableFile
 
@@ -42,7 +42,7 @@ def find_options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list
     order = order_of(names, heading.units)
     options = {key: [_find_chosen_column(table, key, k, order)] for key, k in numbers.items()}
     others = find_other_columns(table, numbers.values())
-    read = {k: role(names[k], heading.units[k], order) for k in others}
+    read = {k: find_role(names[k], heading.units[k], order) for k in others}
     roles = {k: one for k, one in read.items() if one}
     exact = set(CONTRACT).intersection(map(heading.names.__getitem__, roles))
     if "U" not in {*exact, *numbers}:
@@ -52,7 +52,7 @@ def find_options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list
         name = heading.names[k]
         key = name if name in exact else renamed.get(one.key, one.key)
         if key not in numbers and (key not in exact or name == key):
-            options.setdefault(key, []).append(_named_column(k, name, key, one))
+            options.setdefault(key, []).append(_map_named_column(k, name, key, one))
     unnamed = [k for k in others if k not in roles]
     return _find_time_columns(table, _add_by_unit(heading, unnamed, _prefer_means(options)))
 
@@ -91,7 +91,7 @@ def _add_by_unit(
 
 def _is_measured_in(unit: str, quantity: str) -> bool:
     """Whether a unit is one of a quantity; those of apparent power are none."""
-    return (meaning(unit) or ("",))[0] == quantity and not unit.lower().endswith("va")
+    return (find_meaning(unit) or ("",))[0] == quantity and not unit.lower().endswith("va")
 
 
 def find_other_columns(table: TableFile, taken: Collection[int]) -> list[int]:
@@ -99,7 +99,7 @@ def find_other_columns(table: TableFile, taken: Collection[int]) -> list[int]:
     return [k for k, name in enumerate(table.heading.names) if name and k not in taken]
 
 
-def _named_column(number: int, name: str, key: str, by_name: Role) -> MappedColumn:
+def _map_named_column(number: int, name: str, key: str, by_name: Role) -> MappedColumn:
     """A column with the role that it has by its name, under a key: a whole U is not line to line
     for being called U, or U L1.
     """
@@ -114,7 +114,7 @@ def _find_chosen_column(table: TableFile, key: str, number: int, order: str) -> 
     A phase voltage counts as phase to ground unless its name says line to line.
     """
     unit = table.heading.units[number]
-    named = role(table.heading.names[number], unit, order)
+    named = find_role(table.heading.names[number], unit, order)
     line = named.line if named else None
     if line is None and named and named.key in PHASE_VOLTAGES:
         line = False
@@ -171,7 +171,7 @@ def _find_time_columns(
 
     Of a date and a time, the time; fractions alone are none of a known second.
     """
-    days = [one for one in options.get("day", []) if _begins_with_time(table, one.number)]
+    days = [one for one in options.get("day", []) if _does_begin_with_time(table, one.number)]
     seconds = options.pop("soc", [])
     if seconds and ("t" not in options or "frac" in options):
         options["t"] = seconds
@@ -185,11 +185,11 @@ def _find_time_columns(
     return options
 
 
-def _begins_with_time(table: TableFile, number: int) -> bool:
+def _does_begin_with_time(table: TableFile, number: int) -> bool:
     """Whether the first cell of a column is a time of day, with or without its date."""
     return any(is_time(row[number]) for row in table.sample[:1])
 
 
 def read_first_day(table: TableFile, days: Sequence[MappedColumn]) -> dt.date | None:
     """The date of the first row in a column of dates."""
-    return next((first_day([row[one.number] for row in table.sample]) for one in days), None)
+    return next((find_first_day([row[one.number] for row in table.sample]) for one in days), None)

@@ -3,8 +3,8 @@
 import re
 from collections.abc import Mapping
 
-from tractexp.recording.recording import unit_of
-from tractexp.recording.unit import amount
+from tractexp.recording.recording import find_unit
+from tractexp.recording.unit import parse_amount
 
 # {unit in lower case, but those of voltage and current: (quantity, factor to s, MW, Mvar, Hz, rad,
 # pu)}
@@ -116,10 +116,10 @@ def split_unit(name: str) -> tuple[str, str]:
 
 def is_unit(text: str) -> bool:
     """Whether a text is a unit of `UNITS`."""
-    return meaning(text) is not None and not text.strip().isdigit()
+    return find_meaning(text) is not None and not text.strip().isdigit()
 
 
-def meaning(unit: str) -> tuple[str, float] | None:
+def find_meaning(unit: str) -> tuple[str, float] | None:
     """What a unit means.
 
     Parameters
@@ -134,37 +134,37 @@ def meaning(unit: str) -> tuple[str, float] | None:
 
     Examples
     --------
-    >>> meaning("kW"), meaning("furlong")
+    >>> find_meaning("kW"), find_meaning("furlong")
     (('power', 0.001), None)
     """
     if unit.strip() == "mW":
         return "power", 1e-9
-    electrical = unit_of(unit)
+    electrical = find_unit(unit)
     return electrical if electrical[0] else UNITS.get(unit.strip().lower())
 
 
-def factor(unit: str) -> float:
+def find_factor(unit: str) -> float:
     """The factor from a unit to the one used inside (kV, kA, MW, Mvar, s); 1 for no unit.
 
     A setting's unit may have a number before it.
 
     Examples
     --------
-    >>> factor("V"), factor("89.8 kV")
+    >>> find_factor("V"), find_factor("89.8 kV")
     (0.001, 89.8)
     """
-    number, unit = amount(unit)
-    return number * (meaning(unit) or ("", 1.0))[1]
+    number, unit = parse_amount(unit)
+    return number * (find_meaning(unit) or ("", 1.0))[1]
 
 
 def fits(quantity: str, unit: str, exact: bool = False) -> bool:
     """Whether a unit is one of a quantity, as `data.units` calls it; P in Mvar, Q in MW are, unless
     `exact`.
     """
-    kind = unit_quantity(amount(unit)[1])
+    kind = find_unit_quantity(parse_amount(unit)[1])
     return kind in (FITTING[quantity] if exact else {*FITTING[quantity], *ALSO.get(quantity, ())})
 
 
-def unit_quantity(unit: str) -> str:
+def find_unit_quantity(unit: str) -> str:
     """The quantity of a unit; "" of per unit, and for no unit."""
-    return (meaning(unit) or ("",))[0]
+    return (find_meaning(unit) or ("",))[0]

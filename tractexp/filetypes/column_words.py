@@ -104,7 +104,7 @@ def find_quantity(words: Sequence[str], ground: bool = False) -> tuple[str, str]
     """(quantity, phase) that words say; None where they say none. A letter by itself is a phase
     where `ground` is said.
     """
-    return _compound(words) or _match_words(words, ground)
+    return _split_compound(words) or _match_words(words, ground)
 
 
 def find_marked_quantity(
@@ -141,7 +141,7 @@ def split_words(name: str) -> list[str]:
     return text.split()
 
 
-def _compound(words: Sequence[str]) -> tuple[str, str] | None:
+def _split_compound(words: Sequence[str]) -> tuple[str, str] | None:
     """Quantity and phase of a word such as ua, vl1, i_b, V1; None where there is none."""
     for word, after in itertools.pairwise([*words, ""]):
         if match := COMPOUND.fullmatch(word):

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tractexp.filetypes.column_unit import unit_quantity
+from tractexp.filetypes.column_unit import find_unit_quantity
 from tractexp.filetypes.column_words import (
     ANGLE,
     BY_UNIT,
@@ -71,7 +71,7 @@ def _count_marks(named: Sequence[tuple[str, str]], order: str) -> int:
     """How many columns of (name, unit) an order of phases gives marks: of the quantity with the
     most, pairs of phases or all three, or of voltages to ground.
     """
-    roles = filter(None, (role(name, unit, order) for name, unit in named))
+    roles = filter(None, (find_role(name, unit, order) for name, unit in named))
     marked = [one for one in roles if one.key.removesuffix("_angle")[1:] in PHASE_KEYS]
     keys = {one.key.removesuffix("_angle") for one in marked}
     counts = Counter((key[0], len(key)) for key in keys)
@@ -79,7 +79,7 @@ def _count_marks(named: Sequence[tuple[str, str]], order: str) -> int:
     return max(most, len({one.key for one in marked if one.line is False}))
 
 
-def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
+def find_role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     """The role of a column, by its name and unit; None where they do not tell.
 
     Parameters
@@ -98,13 +98,13 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
 
     Examples
     --------
-    >>> role("active power", "MW").key
+    >>> find_role("active power", "MW").key
     'P'
     """
     words = split_words(name)
-    kind = unit_quantity(unit)
+    kind = find_unit_quantity(unit)
     electrical = kind in (*BY_UNIT, "angle") or not ELECTRICAL.isdisjoint(map(WORDS.get, words))
-    if unmarked := _fraction(words, unit) or _find_other_role(words, unit, electrical):
+    if unmarked := _find_fraction(words, unit) or _find_other_role(words, unit, electrical):
         return unmarked
     spelled, ground = spell_marks(name, order)
     if spelled != normalize(name):
@@ -114,7 +114,7 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
         return None
     key, phase = said
     if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
-        return role(f"{name} {unit}", order=order)
+        return find_role(f"{name} {unit}", order=order)
     whole = BACKWARD.get(phase, phase)
     backward = phase in BACKWARD
     if key in ("U", "I") and _is_angle(words, kind):
@@ -124,7 +124,7 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     return Role(key + whole, unit)
 
 
-def _fraction(words: Sequence[str], unit: str) -> Role | None:
+def _find_fraction(words: Sequence[str], unit: str) -> Role | None:
     """The role of a column of fractions of a second; None for any other."""
     for word in words:
         if word in FRACTIONS and (len(words) == 1 or not FRACTIONS[word]):

@@ -18,9 +18,9 @@ from tractexp.filetypes.comtrade_lines import Analog, Header
 from tractexp.filetypes.comtrade_samples import NONE, ByteRange, Samples, read
 from tractexp.filetypes.comtrade_writer import write as write
 from tractexp.filetypes.remarks import Remarks
-from tractexp.filetypes.text import decode, lines
+from tractexp.filetypes.text import decode, split_lines
 from tractexp.filetypes.timeline import SampleStretch
-from tractexp.recording.recording import Channel, Recording, StatusChannel, quantity_of
+from tractexp.recording.recording import Channel, Recording, StatusChannel, find_quantity
 from tractexp.storage import files
 
 LARGEST_CFG = 4 * 2**20  # bytes: fifty thousand channels
@@ -77,16 +77,16 @@ def read_header(path: Path, encoding: str | None = None) -> Header:
     """
     path = Path(path)
     if path.suffix.lower() == ".cff":
-        parts = _sections(_find_existing_path(path))
+        parts = _find_sections(_find_existing_path(path))
         if "CFG" not in parts:
             raise UserError(f"{path}: no section CFG")
         place = parts["CFG"]
         first = parts["CFG"].line
     else:
-        place = _read_bytes(_pair(path)[0])
+        place = _read_bytes(_find_pair(path)[0])
         first = 1
-    text, _ = decode(_configuration(place), str(path), encoding)
-    return parse(str(path), lines(text), Remarks(str(path)), first)
+    text, _ = decode(_read_configuration(place), str(path), encoding)
+    return parse(str(path), split_lines(text), Remarks(str(path)), first)
 
 
 def _read_bytes(path: Path) -> ByteRange:
@@ -96,17 +96,17 @@ def _read_bytes(path: Path) -> ByteRange:
 
 def _read_pair(path: Path, encoding: str | None) -> Recording:
     """The recording of a .cfg and the .dat beside it."""
-    cfg, dat, note = _pair(path)
+    cfg, dat, note = _find_pair(path)
     remarks = Remarks(str(cfg))
     if note:
         remarks.add(note)
-    text, encoding = decode(_configuration(_read_bytes(cfg)), str(cfg), encoding)
-    return _recording(cfg, text, _read_bytes(dat), remarks, {"encoding": encoding})
+    text, encoding = decode(_read_configuration(_read_bytes(cfg)), str(cfg), encoding)
+    return _build_recording(cfg, text, _read_bytes(dat), remarks, {"encoding": encoding})
 
 
 def _read_combined(path: Path, encoding: str | None) -> Recording:
     """A .cff: its sections, the data last and by its length where it is binary."""
-    parts = _sections(path)
+    parts = _find_sections(path)
     if "CFG" not in parts or "DAT" not in parts:
         lack = "CFG" if "CFG" not in parts else "DAT"
         raise UserError(
@@ -114,15 +114,15 @@ def _read_combined(path: Path, encoding: str | None) -> Recording:
             " this is only the configuration, name it .cfg and put its .dat beside it"
         )
     remarks = Remarks(str(path))
-    text, encoding = decode(_configuration(parts["CFG"]), str(path), encoding)
+    text, encoding = decode(_read_configuration(parts["CFG"]), str(path), encoding)
     extra = {"encoding": encoding}
     for name, key in (("HDR", "header"), ("INF", "information")):
         if name in parts and (said := parts[name].content().strip()):
             extra[key] = decode(said, str(path))[0]
-    return _recording(path, text, parts["DAT"], remarks, extra, parts["CFG"].line)
+    return _build_recording(path, text, parts["DAT"], remarks, extra, parts["CFG"].line)
 
 
-def _sections(path: Path) -> dict[str, ByteRange]:
+def _find_sections(path: Path) -> dict[str, ByteRange]:
     """Where the sections of a .cff lie; bytes of binary data are not searched for headings."""
     sections: dict[str, ByteRange] = {}
     content: Any = ByteRange(path, 0, files.read_size(path)).numbers(np.dtype(np.uint8))
@@ -143,18 +143,20 @@ def _sections(path: Path) -> dict[str, ByteRange]:
     return sections
 
 
-def _recording(
+def _build_recording(
     path: Path, text: str, data: ByteRange, remarks: Remarks, extra: dict[str, Any], first: int = 1
 ) -> Recording:
     """The recording of a configuration's text and its data; what was odd is in its notes."""
-    header = parse(str(path), lines(text), remarks, first)
+    header = parse(str(path), split_lines(text), remarks, first)
     samples = read(data, header, remarks)
-    stretches = _stretches(data, header, samples, remarks)
+    stretches = _find_stretches(data, header, samples, remarks)
     if any(s.t is not None for s in stretches):
         remarks.add("samples at uneven times are interpolated to even ones (cubic splines)")
     return Recording(
         source=str(path),
-        channels=[_channel(header, k, samples, stretches) for k in range(len(header.analogs))],
+        channels=[
+            _build_channel(header, k, samples, stretches) for k in range(len(header.analogs))
+        ],
         segments=timeline.arrange_segments(stretches),
         frequency=header.frequency,
         station=header.station,
@@ -164,7 +166,7 @@ def _recording(
         status=[
             StatusChannel(
                 d.name,
-                timeline.nearest(samples.words[:, k // 16], stretches),
+                timeline.take_nearest(samples.words[:, k // 16], stretches),
                 d.phase,
                 d.circuit,
                 d.normal,
@@ -173,11 +175,13 @@ def _recording(
             for k, d in enumerate(header.digitals)
         ],
         notes=remarks.notes(),
-        extra={**extra, **_extra(header, samples, stretches)},
+        extra={**extra, **_collect_extra(header, samples, stretches)},
     )
 
 
-def _channel(header: Header, k: int, samples: Samples, stretches: list[SampleStretch]) -> Channel:
+def _build_channel(
+    header: Header, k: int, samples: Samples, stretches: list[SampleStretch]
+) -> Channel:
     """An analog channel with its raw integers, at even times, missing ones marked."""
     analog = header.analogs[k]
     raw = samples.analogs[k]
@@ -186,7 +190,7 @@ def _channel(header: Header, k: int, samples: Samples, stretches: list[SampleStr
         analog.name,
         timeline.resample_evenly(raw, stretches, missing),
         analog.unit,
-        quantity_of(analog.unit),
+        find_quantity(analog.unit),
         analog.phase,
         analog.circuit,
         analog.gain,
@@ -195,11 +199,11 @@ def _channel(header: Header, k: int, samples: Samples, stretches: list[SampleStr
         analog.skew * 1e-6,
         analog.limits,
         missing,
-        _side(header, analog),
+        _find_side(header, analog),
     )
 
 
-def _side(header: Header, analog: Analog) -> str:
+def _find_side(header: Header, analog: Analog) -> str:
     """Whether values are secondary without a ratio: S with 1 to 1; files of 1991 do not say."""
     if analog.side == "S" and analog.ratio == 1:
         return "S"
@@ -233,14 +237,14 @@ def _find_missing_text(analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, flo
     return raw, MISSING_TEXT[0]
 
 
-def _stretches(
+def _find_stretches(
     data: ByteRange, header: Header, samples: Samples, remarks: Remarks
 ) -> list[SampleStretch]:
     """Segments from the rates; from the time stamps where there are none."""
     fine = all("." in date and len(date.strip().rpartition(".")[2]) > 6 for date in header.dates)
     unit = header.timemult * (1e-9 if fine else 1e-6)
     if header.rates[0][0] <= 0:
-        return _stretches_by_stamps(data, header, samples, unit, remarks)
+        return _find_stretches_by_stamps(data, header, samples, unit, remarks)
     t = _read_stamped_times(header, samples.stamps, unit, remarks)
     result = timeline.build_from_rates(header.rates, t)
     if any(s.t is not None for s in result):
@@ -251,7 +255,7 @@ def _stretches(
     return result
 
 
-def _stretches_by_stamps(
+def _find_stretches_by_stamps(
     data: ByteRange, header: Header, samples: Samples, unit: float, remarks: Remarks
 ) -> list[SampleStretch]:
     """Segments from the time stamps, of `unit` s each."""
@@ -317,7 +321,9 @@ def _trigger(header: Header, stretches: list[SampleStretch], remarks: Remarks) -
     return None
 
 
-def _extra(header: Header, samples: Samples, stretches: list[SampleStretch]) -> dict[str, Any]:
+def _collect_extra(
+    header: Header, samples: Samples, stretches: list[SampleStretch]
+) -> dict[str, Any]:
     """Fields of the file that a recording has no attribute for, for a round trip."""
     extra: dict[str, Any] = {
         "format": "COMTRADE",
@@ -348,7 +354,7 @@ def _find_existing_path(path: Path) -> Path:
     return path
 
 
-def _pair(path: Path) -> tuple[Path, Path, str]:
+def _find_pair(path: Path) -> tuple[Path, Path, str]:
     """The .cfg and .dat files, whatever the case of their endings, and a remark on them."""
     ending = path.suffix.lower()
     if ending not in (".cfg", ".dat"):
@@ -390,7 +396,7 @@ def _find_companion(path: Path, ending: str) -> Path | None:
     )
 
 
-def _configuration(place: ByteRange) -> bytes:
+def _read_configuration(place: ByteRange) -> bytes:
     """The bytes of a configuration. Raises `UserError` for one that is too large."""
     if place.size > LARGEST_CFG:
         raise UserError(

@@ -2,9 +2,9 @@
 
 import functools
 
-from tractexp.filetypes.comtrade_fields import number, quote_field
+from tractexp.filetypes.comtrade_fields import parse_number, quote_field
 from tractexp.filetypes.comtrade_lines import Analog, Digital, Lines
-from tractexp.recording.recording import unit_of
+from tractexp.recording.recording import find_unit
 from tractexp.text.wording import count_noun
 
 GREATEST = 1e12  # of a multiplier, an offset or a ratio: beyond it no unit makes sense
@@ -34,21 +34,25 @@ def read_analog(rows: Lines, k: int, count: int) -> Analog:
     if side:
         ratio = value(fields[10], "primary ratio", 1.0), value(fields[11], "secondary ratio", 1.0)
     else:
-        ratio = number(fields[10]) or 1.0, number(fields[11]) or 1.0
+        ratio = parse_number(fields[10]) or 1.0, parse_number(fields[11]) or 1.0
     limits = _read_limits(fields)
     analog = Analog(name, fields[2], fields[3], fields[4], gain, offset, skew, limits, *ratio, side)
-    return _checked_ratio(rows, line, channel, analog)
+    return _check_ratio(rows, line, channel, analog)
 
 
 def _is_without_side(fields: list[str]) -> bool:
     """Whether the fields of an analog channel are whole but for P or S at their end."""
-    return len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None
+    return (
+        len(fields) == 12
+        and parse_number(fields[4]) is None
+        and parse_number(fields[11]) is not None
+    )
 
 
 def _read_limits(fields: list[str]) -> tuple[float, float] | None:
     """The least and the greatest raw value that a channel declares; None where it does not."""
-    low = number(fields[8])
-    high = number(fields[9])
+    low = parse_number(fields[8])
+    high = parse_number(fields[9])
     return None if low is None or high is None or low >= high else (low, high)
 
 
@@ -75,7 +79,7 @@ def read_value(
     if not field and default is not None:
         rows.remarks.add(f"no {what}, {default:g} taken", line)
         return default
-    parsed = number(field)
+    parsed = parse_number(field)
     if parsed is None or abs(parsed) > GREATEST:
         raise rows.refuse(
             line,
@@ -85,12 +89,12 @@ def read_value(
     return parsed
 
 
-def _checked_ratio(rows: Lines, line: int, channel: str, analog: Analog) -> Analog:
+def _check_ratio(rows: Lines, line: int, channel: str, analog: Analog) -> Analog:
     """Secondary values need a ratio; a channel that is neither voltage nor current may lack it."""
     if analog.side != "S" or (analog.primary > 0 and analog.secondary > 0):
         return analog
     words = f"its ratio {analog.primary:g}/{analog.secondary:g} is not positive"
-    if unit_of(analog.unit)[0]:
+    if find_unit(analog.unit)[0]:
         raise rows.refuse(
             line,
             f"{channel} is in secondary values, but {words}; write the ratio of its transformer"

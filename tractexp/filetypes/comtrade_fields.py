@@ -14,12 +14,12 @@ _DATE = re.compile(
 )
 
 
-def number(text: str) -> float | None:
+def parse_number(text: str) -> float | None:
     """A finite number as files write it; None for any other text.
 
     Examples
     --------
-    >>> number(" 1.5D3 "), number("inf")
+    >>> parse_number(" 1.5D3 "), parse_number("inf")
     (1500.0, None)
     """
     text = text.strip()
@@ -34,7 +34,7 @@ def quote_field(text: str) -> str:
     return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
 
 
-def date(text: str, american: bool) -> tuple[datetime | None, str]:
+def parse_date(text: str, american: bool) -> tuple[datetime | None, str]:
     """The date of a field, in whichever order its numbers allow.
 
     Parameters
@@ -53,7 +53,7 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
 
     Examples
     --------
-    >>> date("31/12/2024,23:59:59.5", american=False)[0].isoformat()
+    >>> parse_date("31/12/2024,23:59:59.5", american=False)[0].isoformat()
     '2024-12-31T23:59:59.500000'
     """
     match = _DATE.fullmatch(text.strip())

@@ -9,7 +9,7 @@ import re
 from datetime import datetime, timedelta
 
 from tractexp.filetypes.comtrade_channel import GREATEST, read_analog, read_digital
-from tractexp.filetypes.comtrade_fields import date, number, quote_field
+from tractexp.filetypes.comtrade_fields import parse_date, parse_number, quote_field
 from tractexp.filetypes.comtrade_lines import Header, Lines
 from tractexp.filetypes.comtrade_rate import is_rate, read_rate_count, read_rates
 from tractexp.filetypes.remarks import Remarks
@@ -32,20 +32,20 @@ def parse(where: str, lines: list[str], remarks: Remarks, first: int = 1) -> Hea
     """
     rows = Lines(where, lines, remarks, first)
     header = Header()
-    _station(rows, header)
-    analogs, digitals = _counts(rows)
+    _read_station(rows, header)
+    analogs, digitals = _read_counts(rows)
     header.lines["analog"] = rows.rest[0][0] if rows.rest else 0
     header.analogs = [read_analog(rows, k, analogs) for k in range(analogs)]
     header.digitals = [read_digital(rows, k, digitals) for k in range(digitals)]
-    count = _frequency(rows, header)
+    count = _read_frequency(rows, header)
     read_rates(rows, header, count)
-    _dates(rows, header)
-    _kind(rows, header)
+    _read_dates(rows, header)
+    _read_kind(rows, header)
     _read_trailer(rows, header)
     return header
 
 
-def _station(rows: Lines, header: Header) -> None:
+def _read_station(rows: Lines, header: Header) -> None:
     """Read station, device and revision, where the line is there."""
     if _COUNTS.fullmatch(rows.peek()):
         rows.remarks.add("the line of station and device is missing", rows.rest[0][0])
@@ -66,7 +66,7 @@ def _station(rows: Lines, header: Header) -> None:
     header.station, header.device = fields[0], ",".join(fields[1:])
 
 
-def _counts(rows: Lines) -> tuple[int, int]:
+def _read_counts(rows: Lines) -> tuple[int, int]:
     """The numbers of analog and of status channels."""
     line, text = rows.take("the numbers of channels")
     match = _COUNTS.fullmatch(text)
@@ -99,12 +99,12 @@ def _counts(rows: Lines) -> tuple[int, int]:
     return analogs, digitals
 
 
-def _frequency(rows: Lines, header: Header) -> int | None:
+def _read_frequency(rows: Lines, header: Header) -> int | None:
     """The nominal frequency; returns the announced number of sampling rates."""
     line, text = rows.take("the nominal frequency")
     header.lines["frequency"] = line
     text = _SIXTEEN.sub("16.6667", text)
-    parsed = number(text.strip(", "))
+    parsed = parse_number(text.strip(", "))
     if (
         parsed is not None
         and 0 < parsed < MOST_RATES
@@ -138,7 +138,7 @@ def _frequency(rows: Lines, header: Header) -> int | None:
     return read_rate_count(rows)
 
 
-def _dates(rows: Lines, header: Header) -> None:
+def _read_dates(rows: Lines, header: Header) -> None:
     """Read when the first sample and the trigger were, where the lines are there."""
     entries: list[tuple[int, str]] = []
     while len(entries) < 2 and rows.rest and _LIKE_DATE.search(rows.peek()):
@@ -163,7 +163,7 @@ def _dates(rows: Lines, header: Header) -> None:
 
 def _read_date(rows: Lines, line: int, text: str, american: bool) -> datetime | None:
     """The moment that a line says, with a remark on how it was read; None where it is none."""
-    moment, remark = date(text, american)
+    moment, remark = parse_date(text, american)
     if remark:
         rows.remarks.add(remark, line)
     return moment
@@ -172,7 +172,7 @@ def _read_date(rows: Lines, line: int, text: str, american: bool) -> datetime | 
 _LIKE_DATE = re.compile(r"^[\s,]*$|\d.*[/:.,\-]|[/:,\-].*\d", re.ASCII)
 
 
-def _kind(rows: Lines, header: Header) -> None:
+def _read_kind(rows: Lines, header: Header) -> None:
     """Read the type of the data file. Raises `UserError` for one that there is not."""
     line, text = rows.take("the type of the data file")
     header.kind, header.lines["kind"] = text.strip(", ").upper(), line
@@ -189,7 +189,7 @@ def _read_trailer(rows: Lines, header: Header) -> None:
     # a line with commas within is the time codes already
     if rows.rest and "," not in rows.peek().strip(", "):
         line, text = rows.take("the time multiplier")
-        parsed = number(text.strip(", "))
+        parsed = parse_number(text.strip(", "))
         if parsed is None or not 0 < parsed <= GREATEST:
             rows.remarks.add(
                 f"time multiplier {quote_field(text)} is no number from 0 to {GREATEST:g}, 1 taken",

@@ -1,6 +1,6 @@
 """The lines of a COMTRADE configuration that tell its sampling rates."""
 
-from tractexp.filetypes.comtrade_fields import number, quote_field
+from tractexp.filetypes.comtrade_fields import parse_number, quote_field
 from tractexp.filetypes.comtrade_lines import Header, Lines
 
 
@@ -10,7 +10,7 @@ def read_rate_count(rows: Lines) -> int | None:
         rows.remarks.add("the number of sampling rates is missing", rows.rest[0][0])
         return None
     line, text = rows.take("the number of sampling rates")
-    parsed = number(text.strip(", "))
+    parsed = parse_number(text.strip(", "))
     if parsed is None or parsed < 0 or parsed != int(parsed) or parsed > 1e6:
         raise rows.refuse(
             line,
@@ -60,7 +60,7 @@ def _take_rate(rows: Lines) -> tuple[int, float, float]:
     one.
     """
     line, text = rows.take("the sampling rates")
-    fields = [number(part) for part in text.strip(", ").split(",")]
+    fields = [parse_number(part) for part in text.strip(", ").split(",")]
     rate, end = (*fields, None, None)[:2]
     if len(fields) != 2 or rate is None or end is None or end != int(end) or abs(end) > 1e15:
         raise rows.refuse(
@@ -77,4 +77,4 @@ def _take_rate(rows: Lines) -> tuple[int, float, float]:
 def is_rate(text: str) -> bool:
     """Whether a line is a sampling rate with its last sample."""
     fields = text.strip(", ").split(",")
-    return len(fields) == 2 and all(number(part) is not None for part in fields)
+    return len(fields) == 2 and all(parse_number(part) is not None for part in fields)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.filetypes.comtrade_fields import number, quote_field
+from tractexp.filetypes.comtrade_fields import parse_number, quote_field
 from tractexp.filetypes.comtrade_header import VALUE
 from tractexp.filetypes.comtrade_lines import Header
 from tractexp.filetypes.remarks import Remarks
@@ -72,7 +72,7 @@ class Samples:
     words: np.ndarray  # (N, ceil(D/16)) 16 status channels each
 
 
-def row(kind: str, analogs: int, digitals: int) -> np.dtype:
+def build_row_type(kind: str, analogs: int, digitals: int) -> np.dtype:
     """The structure of one binary sample: number, time stamp, analog values and words of 16
     states.
     """
@@ -101,17 +101,19 @@ def read(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
                 f"{place.path}: not text, but line {header.lines['kind']} of the configuration says"
                 " ASCII; write BINARY, BINARY32 or FLOAT32 there"
             )
-        return _text(place, header, remarks)
-    return _binary(place, header, remarks)
+        return _read_text(place, header, remarks)
+    return _read_binary(place, header, remarks)
 
 
-def _binary(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
+def _read_binary(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     """The samples of a binary file, without a copy; bytes over and samples short are noted or
     refused.
     """
-    one = row(header.kind, len(header.analogs), len(header.digitals))
+    one = build_row_type(header.kind, len(header.analogs), len(header.digitals))
     count_there = place.size // one.itemsize
-    _enough(place, header, remarks, count_there, header.samples * one.itemsize, place.size, "bytes")
+    _check_count(
+        place, header, remarks, count_there, header.samples * one.itemsize, place.size, "bytes"
+    )
     over = place.size - count_there * one.itemsize
     if over > 2:  # a line end or Ctrl-Z behind the data says nothing
         remarks.add(
@@ -125,7 +127,7 @@ def _binary(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     )
 
 
-def _enough(
+def _check_count(
     place: ByteRange,
     header: Header,
     remarks: Remarks,
@@ -176,7 +178,7 @@ def _check_sample_numbers(place: ByteRange, header: Header, numbers: np.ndarray)
         )
 
 
-def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
+def _read_text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     """The samples of an ASCII file, line by line."""
     width = 2 + len(header.analogs) + len(header.digitals)
     wanted = header.samples
@@ -190,7 +192,7 @@ def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     table = np.empty((room, len(header.analogs)), order="F")
     words = np.zeros((room, -(-len(header.digitals) // 16)), np.uint16)
     filled = 0
-    for cells in _blocks(place, width, remarks):
+    for cells in _read_blocks(place, width, remarks):
         block = cells[: room - filled]
         there = slice(filled, filled + len(block))
         head[there], table[there] = block[:, :2], block[:, 2 : 2 + len(header.analogs)]
@@ -199,13 +201,13 @@ def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     # the state of a status channel is one digit, and whole
     if not header.digitals and not place.ends_a_line():
         remarks.add(f"{place.path.name} ends without a line end: its last value may be cut short")
-    _enough(place, header, remarks, filled, wanted, filled, "lines")
+    _check_count(place, header, remarks, filled, wanted, filled, "lines")
     count = header.samples
     if np.isnan(table[:count]).any():
         remarks.add(
             f"{int(np.isnan(table[:count]).sum())} empty cells in {place.path.name}: no value there"
         )
-    _steps(place, head[:count, 0], remarks)
+    _note_steps(place, head[:count, 0], remarks)
     return Samples(
         head[:count, 0],
         head[:count, 1],
@@ -214,7 +216,7 @@ def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     )
 
 
-def _blocks(place: ByteRange, width: int, remarks: Remarks) -> Iterator[np.ndarray]:
+def _read_blocks(place: ByteRange, width: int, remarks: Remarks) -> Iterator[np.ndarray]:
     """Cells (M, width) of one block of lines after the other; nan where a cell is empty."""
     line, carried, remaining = place.line, b"", place.size
     with files.open_ordinary_file(place.path) as file:
@@ -225,11 +227,11 @@ def _blocks(place: ByteRange, width: int, remarks: Remarks) -> Iterator[np.ndarr
             cut = len(block) if remaining == 0 else block.rfind(b"\n") + 1
             lines = (carried + block[:cut]).replace(b"\0", b"").splitlines()
             carried = block[cut:]
-            yield _cells(place, width, lines, line, remaining == 0, remarks)
+            yield _read_cells(place, width, lines, line, remaining == 0, remarks)
             line += len(lines)
 
 
-def _cells(
+def _read_cells(
     place: ByteRange, width: int, lines: list[bytes], first: int, last: bool, remarks: Remarks
 ) -> np.ndarray:
     """Numbers (rows, width) of the lines of an ASCII file, of which the first is numbered
@@ -243,11 +245,11 @@ def _cells(
     rows = _check_width(place, width, numbered, last, remarks)
     if not rows:
         return np.empty((0, width))
-    flat = _numbers(b",".join(text for _, text in rows), len(rows) * width)
+    flat = _parse_numbers(b",".join(text for _, text in rows), len(rows) * width)
     if flat is None:  # empty cells, or something that is no number
         flat = np.array(
             [
-                _cell(place, n, k, cell)
+                _parse_cell(place, n, k, cell)
                 for n, text in rows
                 for k, cell in enumerate(text.split(b","))
             ]
@@ -279,7 +281,7 @@ def _check_width(
     return rows
 
 
-def _numbers(text: bytes, count: int) -> np.ndarray | None:
+def _parse_numbers(text: bytes, count: int) -> np.ndarray | None:
     """The numbers of a line; None where it has another count, or what is no number."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -290,12 +292,12 @@ def _numbers(text: bytes, count: int) -> np.ndarray | None:
     return values if len(values) == count and (np.abs(values) <= HUGE).all() else None
 
 
-def _cell(place: ByteRange, line: int, k: int, cell: bytes) -> float:
+def _parse_cell(place: ByteRange, line: int, k: int, cell: bytes) -> float:
     """The number of a cell, nan where it is empty. Raises `UserError` with line and channel for
     anything else.
     """
     text = cell.decode("latin-1").strip()
-    value = np.nan if not text or text.lower() == "nan" else number(text)
+    value = np.nan if not text or text.lower() == "nan" else parse_number(text)
     if value is None or abs(value) > HUGE:
         what = ("sample number", "time stamp")[k] if k < 2 else f"channel {k - 1}"
         raise UserError(
@@ -305,7 +307,7 @@ def _cell(place: ByteRange, line: int, k: int, cell: bytes) -> float:
     return value
 
 
-def _steps(place: ByteRange, numbers: np.ndarray, remarks: Remarks) -> None:
+def _note_steps(place: ByteRange, numbers: np.ndarray, remarks: Remarks) -> None:
     """Note a missing or double sample, which moves all after it; nothing is mended."""
     steps = np.diff(numbers)
     odd = np.flatnonzero(steps != np.median(steps)) if len(steps) else []

@@ -9,8 +9,8 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.filetypes.column_unit import split_unit, unit_quantity
-from tractexp.filetypes.columns import role
+from tractexp.filetypes.column_unit import find_unit_quantity, split_unit
+from tractexp.filetypes.columns import find_role
 from tractexp.filetypes.comtrade_lines import Header
 from tractexp.filetypes.table import Rows
 from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel
@@ -47,8 +47,8 @@ def _read_meanings(header: Header) -> tuple[set[str], set[str]]:
     """(the quantities that the channels' units say, the keys that their names and units say)."""
     parted = [(*split_unit(one.name.strip()), one.unit) for one in header.analogs]
     columns = [(name, unit or inside) for name, inside, unit in parted]
-    roles = itertools.starmap(role, columns)
-    return {unit_quantity(unit) for _, unit in columns}, {one.key for one in roles if one}
+    roles = itertools.starmap(find_role, columns)
+    return {find_unit_quantity(unit) for _, unit in columns}, {one.key for one in roles if one}
 
 
 def table(path: Path, encoding: str | None = None) -> Rows:
@@ -80,7 +80,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     for name, channel in zip(names, recording.channels, strict=True):
         columns.append(
             (
-                *_heading(name, channel, names.count(name) > 1),
+                *_build_heading(name, channel, names.count(name) > 1),
                 channel.ratio * channel.read_values()[part],
             )
         )
@@ -97,7 +97,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     return rows
 
 
-def _heading(name: str, channel: Channel, repeated: bool) -> tuple[str, str]:
+def _build_heading(name: str, channel: Channel, repeated: bool) -> tuple[str, str]:
     """(name of a column, with what it is measured on where others have the same name; unit)."""
     bare, unit = split_unit(name)
     where = " ".join(filter(None, (channel.circuit.strip(), channel.phase.strip())))

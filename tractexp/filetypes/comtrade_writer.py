@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError, check_choice
-from tractexp.filetypes.comtrade_fields import date
+from tractexp.filetypes.comtrade_fields import parse_date
 from tractexp.filetypes.comtrade_header import EPOCH, VALUE
-from tractexp.filetypes.comtrade_samples import NONE, row
+from tractexp.filetypes.comtrade_samples import NONE, build_row_type
 from tractexp.recording.recording import Channel, Recording
 from tractexp.storage import files
 
@@ -56,10 +56,14 @@ def write(
             f"{path}: a .cff is of the standard of 2013; give revision=2013, or a name that ends in"
             " .cfg"
         )
-    kind = _kind(recording, kind, revision)
-    rates, stamps, timemult = _times(recording)
-    data = _ascii(recording, stamps) if kind == "ASCII" else _binary(recording, kind, stamps)
-    text = "\r\n".join(_lines(recording, kind, revision, rates, timemult)) + "\r\n"
+    kind = _choose_kind(recording, kind, revision)
+    rates, stamps, timemult = _list_times(recording)
+    data = (
+        _write_ascii(recording, stamps)
+        if kind == "ASCII"
+        else _pack_binary(recording, kind, stamps)
+    )
+    text = "\r\n".join(_write_lines(recording, kind, revision, rates, timemult)) + "\r\n"
     if path.suffix.lower() == ".cff":
         return [files.write(path, _combine_sections(recording, text, kind, data))]
     dat = path.with_suffix(".DAT" if path.suffix.isupper() else ".dat")
@@ -67,7 +71,7 @@ def write(
     return [files.write(path, text), dat]
 
 
-def _kind(recording: Recording, first_kind: str, revision: int) -> str:
+def _choose_kind(recording: Recording, first_kind: str, revision: int) -> str:
     """The first kind, from `first_kind` on, that holds all values."""
     if first_kind == "FLOAT32":
         return first_kind
@@ -115,7 +119,7 @@ def _find_lacking_samples(channel: Channel) -> np.ndarray:
     return lacking if channel.missing is None else lacking | (raw == channel.missing)
 
 
-def _limits(channel: Channel, kind: str) -> tuple[float, float]:
+def _find_limits(channel: Channel, kind: str) -> tuple[float, float]:
     """The least and greatest raw value that the channel declares, or its kind has; wider where a
     value would else be taken for a missing one.
     """
@@ -134,7 +138,7 @@ def _limits(channel: Channel, kind: str) -> tuple[float, float]:
     return low, high
 
 
-def _times(recording: Recording) -> tuple[list[tuple[float, int]], np.ndarray, float]:
+def _list_times(recording: Recording) -> tuple[list[tuple[float, int]], np.ndarray, float]:
     """Rates with last samples, time stamps (N,) and their multiplier: the file's own where it had
     some.
     """
@@ -164,7 +168,7 @@ def _has_stamps_alone(extra: Mapping[str, Any]) -> bool:
     return bool(rates) and rates[0][0] == 0 and "stamps" in extra
 
 
-def _lines(
+def _write_lines(
     recording: Recording, kind: str, revision: int, rates: list[tuple[float, int]], timemult: float
 ) -> list[str]:
     """The lines of a configuration."""
@@ -178,8 +182,8 @@ def _lines(
         f"{count + states},{count}A,{states}D",
     ]
     for k, (channel, side) in enumerate(zip(recording.channels, sides, strict=True), 1):
-        primary, secondary, letter = _side(channel, side)
-        low, high = _limits(channel, kind)
+        primary, secondary, letter = _describe_side(channel, side)
+        low, high = _find_limits(channel, kind)
         fields = [k, *map(_name, (channel.name, channel.phase, channel.circuit, channel.unit))]
         numbers = (
             channel.gain,
@@ -190,14 +194,14 @@ def _lines(
             primary,
             secondary,
         )
-        lines.append(",".join(map(str, [*fields, *map(_number, numbers), letter])))
+        lines.append(",".join(map(str, [*fields, *map(_format_number, numbers), letter])))
     for k, status in enumerate(recording.status, 1):
         lines.append(
             f"{k},{_name(status.name)},{_name(status.phase)},{_name(status.circuit)},{status.normal}"
         )
-    lines += [_number(recording.frequency), "0" if rates[0][0] == 0 else str(len(rates))]
-    lines += [f"{_number(rate)},{stop}" for rate, stop in rates]
-    lines += [*_format_moments(recording), kind, _number(timemult)]
+    lines += [_format_number(recording.frequency), "0" if rates[0][0] == 0 else str(len(rates))]
+    lines += [f"{_format_number(rate)},{stop}" for rate, stop in rates]
+    lines += [*_format_moments(recording), kind, _format_number(timemult)]
     if revision >= 2013:
         lines += [
             recording.extra.get("time_code") or "0,0",
@@ -206,7 +210,9 @@ def _lines(
     return lines
 
 
-def _side(channel: Channel, original: tuple[float, float, str]) -> tuple[float, float, str]:
+def _describe_side(
+    channel: Channel, original: tuple[float, float, str]
+) -> tuple[float, float, str]:
     """Primary and secondary of a channel's transformer, and the side that its values are on."""
     primary, secondary, side = original
     if channel.ratio == 1 and side != "S":
@@ -223,7 +229,7 @@ def _format_moments(recording: Recording) -> tuple[str, str]:
     where they still hold.
     """
     lines = recording.extra.get("dates", ("", ""))
-    start, triggered = (date(line, False)[0] for line in lines)
+    start, triggered = (parse_date(line, False)[0] for line in lines)
     if recording.extra.get("revision", 1991) >= 1999 and start and triggered:
         trigger = None if triggered == EPOCH else (triggered - start) / timedelta(seconds=1)
         if (start, trigger) == (recording.start, recording.trigger):
@@ -238,15 +244,17 @@ def _name(text: str) -> str:
     return " ".join(text.replace(",", ";").splitlines()).strip()
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     """A number as short as it can be read back to the bit."""
     return str(int(value)) if value == int(value) and abs(value) < 1e15 else repr(float(value))
 
 
-def _binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
+def _pack_binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
     """The bytes of all samples, with their numbers and time stamps."""
-    table = np.zeros(recording.samples, row(kind, len(recording.channels), len(recording.status)))
-    table["n"] = _numbers(recording)
+    table = np.zeros(
+        recording.samples, build_row_type(kind, len(recording.channels), len(recording.status))
+    )
+    table["n"] = _list_numbers(recording)
     good = (stamps >= 0) & (stamps < NONE)
     table["t"] = np.where(good, stamps, NONE).astype(np.uint32)
     for k, channel in enumerate(recording.channels):
@@ -268,18 +276,18 @@ def _binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
     return table.tobytes()
 
 
-def _numbers(recording: Recording) -> np.ndarray:
+def _list_numbers(recording: Recording) -> np.ndarray:
     """The samples' own numbers, or 1, 2, ..."""
     own = recording.extra.get("numbers")
     count = recording.samples
     return np.asarray(own) if own is not None and len(own) == count else np.arange(1, count + 1)
 
 
-def _ascii(recording: Recording, stamps: np.ndarray) -> bytes:
+def _write_ascii(recording: Recording, stamps: np.ndarray) -> bytes:
     """The lines of all samples; what is missing is an empty cell."""
-    columns = [_cells(_numbers(recording)), _cells(stamps)]
+    columns = [_format_cells(_list_numbers(recording)), _format_cells(stamps)]
     for channel in recording.channels:
-        cells = _cells(np.asarray(channel.raw))
+        cells = _format_cells(np.asarray(channel.raw))
         for i in np.flatnonzero(_find_lacking_samples(channel)):
             cells[i] = ""
         columns.append(cells)
@@ -287,13 +295,13 @@ def _ascii(recording: Recording, stamps: np.ndarray) -> bytes:
     return ("\r\n".join(map(",".join, zip(*columns, strict=True))) + "\r\n").encode()
 
 
-def _cells(values: np.ndarray) -> list[str]:
+def _format_cells(values: np.ndarray) -> list[str]:
     """The shortest text that reads back as the same number."""
     if values.dtype.kind in "iu":
         return values.astype(str).tolist()
     if values.dtype == np.float32:
         values = values.astype(np.float64)
-    return ["" if value != value else _number(value) for value in values.tolist()]
+    return ["" if value != value else _format_number(value) for value in values.tolist()]
 
 
 def _combine_sections(recording: Recording, text: str, kind: str, data: bytes) -> bytes:

@@ -11,10 +11,10 @@ import numpy as np
 
 from tractexp.errors import DATA, UserError
 from tractexp.filetypes.column_key import PHASES
-from tractexp.filetypes.column_unit import factor
-from tractexp.filetypes.columns import Role, role
+from tractexp.filetypes.column_unit import find_factor
+from tractexp.filetypes.columns import Role, find_role
 from tractexp.filetypes.mapping import map_times
-from tractexp.filetypes.moments import times_of
+from tractexp.filetypes.moments import compute_times
 from tractexp.filetypes.table import TableFile
 from tractexp.recording.railway import (
     ALTERNATING,
@@ -67,7 +67,7 @@ def describe_direct_table(table: TableFile, units: Mapping[str, str]) -> str:
 def _read_roles(table: TableFile) -> dict[int, Role]:
     """{number of a column: its role by its name without what says direct current}."""
     names = [NAMED.sub(" ", name).strip() for name in table.heading.names]
-    roles = map(role, names, table.heading.units)
+    roles = map(find_role, names, table.heading.units)
     return {k: one for k, one in enumerate(roles) if one}
 
 
@@ -92,27 +92,27 @@ def _read_column(table: TableFile, number: int, unit: str) -> tuple[np.ndarray, 
     kinds = {one.number: "number" for one in mapping.columns.values()}
     kinds |= {mapping.columns["t"].number: "time"}
     cells = table.read({**kinds, number: "gaps"})
-    x = cells[number].values * factor(unit)
+    x = cells[number].values * find_factor(unit)
     if not unit and np.nanmedian(x) > LARGEST_DIRECT_KILOVOLTS:
         x = x / 1000
-    return times_of(table, mapping, cells).t, x
+    return compute_times(table, mapping, cells).t, x
 
 
 def _find_direct(t: np.ndarray, x: np.ndarray) -> DirectVoltage | None:
     """The direct voltage that a column (N,) [kV] shows; None where it is none."""
-    rate = _sampling_rate(t)
+    rate = _find_sampling_rate(t)
     direct = DirectVoltage.from_values(x, rate) if rate else None
     return direct if direct and direct.is_direct else None
 
 
-def _sampling_rate(t: np.ndarray) -> float:
+def _find_sampling_rate(t: np.ndarray) -> float:
     """Samples a second of times (N,) [s]; 0 where they do not increase."""
     return (len(t) - 1) / float(t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else 0.0
 
 
 def _is_told(mean: float, t: np.ndarray, x: np.ndarray) -> bool:
     """Whether the ripple of a voltage (N,) [kV], or its mean, says that it is direct."""
-    return bool(_find_pulses(x, _sampling_rate(t))) or _is_direct_alone(mean)
+    return bool(_find_pulses(x, _find_sampling_rate(t))) or _is_direct_alone(mean)
 
 
 def _is_direct_alone(mean: float) -> bool:
@@ -137,7 +137,7 @@ def check_alternating(
     direct = None if declared or not is_near_direct_nominal(level) else _find_direct(t, U)
     if direct is None:
         return []
-    pulses = _find_pulses(U, _sampling_rate(t))
+    pulses = _find_pulses(U, _find_sampling_rate(t))
     without_Q = np.nanmax(np.abs(Q), initial=0.0) <= NO_Q * np.nanmax(np.abs(P), initial=0.0)
     telling = {
         f"a ripple of {pulses:g} Hz": pulses,

@@ -28,7 +28,9 @@ class TableHeading:
     line: int | None  # number of the row with the names, from 0; None where there is none
 
 
-def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = None) -> TableHeading:
+def find_heading(
+    rows: Sequence[Sequence[Any]], source: str, header: int | None = None
+) -> TableHeading:
     """The heading of a table's first rows; `header` is the row of the names, from 0, None to search
     for it.
 
@@ -40,9 +42,9 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     if named is None:
         blank = ("",) * len(rows[first])
         return TableHeading(blank, blank, first, None)
-    parted = [split_unit(_text(cell)) for cell in rows[named]]
+    parted = [split_unit(_format_cell(cell)) for cell in rows[named]]
     names, units = map(list, zip(*parted, strict=True))
-    beside = _units_beside(rows, named, first, any(units))
+    beside = _find_units_beside(rows, named, first, any(units))
     if beside is not None:
         own = _pad_texts(_strip_brackets(rows[beside]), len(units))
         units = [unit or by_name for unit, by_name in zip(own, units, strict=False)]
@@ -59,7 +61,7 @@ def _find_first_values(rows: Sequence[Sequence[Any]], source: str, header: int |
     """
     begin = 0 if header is None else header + 1
     for i in range(begin, len(rows)):
-        if _begins(rows, i):
+        if _is_beginning(rows, i):
             return i
     if len(rows) == 1 and len(rows[0]) > 1:
         raise UserError(f"{source}: there are no rows below the header line")
@@ -84,25 +86,25 @@ def is_value(cell: Any) -> bool:
     return is_plain_number(cell) or is_grouped(cell) or is_time(cell)
 
 
-def _text(cell: Any) -> str:
+def _format_cell(cell: Any) -> str:
     """A cell as text; "" where it is empty."""
     return "" if cell is None else str(cell).strip()
 
 
-def _numeric(row: Sequence[Any]) -> bool:
+def _is_numeric(row: Sequence[Any]) -> bool:
     """Whether a row holds values: two or more, and not fewer than texts."""
     values = sum(is_value(cell) for cell in row)
     texts = sum(not (is_value(cell) or is_gap(cell) or is_date(cell)) for cell in row)
     return values >= 2 and values >= texts
 
 
-def _begins(rows: Sequence[Sequence[Any]], i: int) -> bool:
+def _is_beginning(rows: Sequence[Sequence[Any]], i: int) -> bool:
     """Whether values begin with row `i`: it and those after it are alike. One bad cell in a row is
     no heading.
     """
     following = [row for row in rows[i : i + FEWEST_ALIKE_ROWS] if row]
-    return _numeric(rows[i]) and all(
-        _numeric(row) and len(row) >= len(rows[i]) - 1 for row in following
+    return _is_numeric(rows[i]) and all(
+        _is_numeric(row) and len(row) >= len(rows[i]) - 1 for row in following
     )
 
 
@@ -111,7 +113,7 @@ def _find_name_row(rows: Sequence[Sequence[Any]], first: int) -> int | None:
     units.
     """
     for i in range(first - 1, -1, -1):
-        texts = [_text(cell) for cell in rows[i]]
+        texts = [_format_cell(cell) for cell in rows[i]]
         filled = [text for text in texts if text]
         enough = len(filled) >= 2 and 2 * len(filled) >= len(rows[first]) - 1
         if enough and not (_are_units(_strip_brackets(rows[i])) and i > 0):
@@ -119,7 +121,7 @@ def _find_name_row(rows: Sequence[Sequence[Any]], first: int) -> int | None:
     return None
 
 
-def _units_beside(
+def _find_units_beside(
     rows: Sequence[Sequence[Any]], named: int, first: int, with_units: bool
 ) -> int | None:
     """The row of units below the names, or above names without units of their own (one letter alone
@@ -133,7 +135,7 @@ def _units_beside(
 
 def _strip_brackets(row: Sequence[Any]) -> list[str]:
     """The texts of a row without brackets."""
-    return [_text(cell).strip("[]() ") for cell in row]
+    return [_format_cell(cell).strip("[]() ") for cell in row]
 
 
 def _are_units(texts: Sequence[str]) -> bool:
@@ -147,7 +149,7 @@ def _join_group_names(groups: Sequence[Any], names: list[str]) -> list[str]:
     """The names, after those of the row above them where it is one of groups ("Bus 1; Bus 1; Load
     2").
     """
-    above = _spread_merged_cells([_text(cell) for cell in groups], names)
+    above = _spread_merged_cells([_format_cell(cell) for cell in groups], names)
     repeated = _find_repeated(names)
     over = [upper for upper, name in zip(above, names, strict=False) if name in repeated]
     told = all(over) and len({*over}) > 1

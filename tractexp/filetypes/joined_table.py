@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.filetypes.columns import role
+from tractexp.filetypes.columns import find_role
 from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.mapping import map_times
-from tractexp.filetypes.moments import TableTimes, times_of
+from tractexp.filetypes.moments import TableTimes, compute_times
 from tractexp.filetypes.table import TableColumn, TableFile
 from tractexp.recording.event_files import SampledFile, align, move_samples, tell_apart
 
@@ -28,7 +28,7 @@ class JoinedTable(TableFile):
     def __init__(self, parts: Sequence[TableFile], paths: Sequence[str]) -> None:
         """Raises `UserError` for other rates, and for times that do not overlap."""
         self.parts, self.source = parts, parts[0].source
-        read = list(map(_times, parts))
+        read = list(map(_find_times, parts))
         every = list(map(itemgetter(0), read))
         used = list(map(itemgetter(1), read))
         self.aligned = align(list(map(_describe_samples, parts, every)))
@@ -41,13 +41,13 @@ class JoinedTable(TableFile):
         if times.start is not None:
             self.start, t = times.start + timedelta(seconds=float(t[0] - times.t[0])), t - t[0]
         self.t, self.frequency = t, parts[0].frequency
-        self.columns, names, said = _columns(parts, used, tell_apart(paths))
+        self.columns, names, said = _collect_columns(parts, used, tell_apart(paths))
         self.heading = TableHeading(
             ("t", *(name for name, _ in names)), ("s", *(unit for _, unit in names)), 0, 0
         )
         rows = zip(*(part.sample for part in parts), strict=False)
         self.sample = [
-            [float(moment), *(_cell(row[k], number) for k, number in self.columns)]
+            [float(moment), *(_get_cell(row[k], number) for k, number in self.columns)]
             for moment, row in zip(t, rows, strict=False)
         ]
         notes = [
@@ -86,17 +86,17 @@ class JoinedTable(TableFile):
         return self.parts[0].place(row + self.aligned.first[0])
 
 
-def _cell(row: Sequence[object], number: int) -> object:
+def _get_cell(row: Sequence[object], number: int) -> object:
     """A row's cell; "" where the row is shorter."""
     return row[number] if number < len(row) else ""
 
 
-def _times(part: TableFile) -> tuple[TableTimes, set[int]]:
+def _find_times(part: TableFile) -> tuple[TableTimes, set[int]]:
     """When the rows of a table were taken, and the columns that say it."""
     mapping = map_times(part)
     numbers = {one.number for one in mapping.columns.values()}
     kinds = {number: "number" for number in numbers} | {mapping.columns["t"].number: "time"}
-    return times_of(part, mapping, part.read(kinds)), numbers | set(mapping.beside)
+    return compute_times(part, mapping, part.read(kinds)), numbers | set(mapping.beside)
 
 
 def _describe_samples(part: TableFile, times: TableTimes) -> SampledFile:
@@ -136,7 +136,7 @@ def _list_columns(
                 yield k, number, name.strip(), part.heading.units[number]
 
 
-def _columns(
+def _collect_columns(
     parts: Sequence[TableFile], times: Sequence[set[int]], told: Sequence[str]
 ) -> tuple[list[tuple[int, int]], list[tuple[str, str]], list[str]]:
     """(part, number) of each column but times, its name and unit, and notes on those left out.
@@ -159,7 +159,8 @@ def _hold_same_cells(parts: Sequence[TableFile], one: Place, other: Place) -> bo
     """Whether two columns hold the same cells, and not one value alone, as dead channels do."""
     (j, a), (k, b) = one, other
     if any(
-        _cell(x, a) != _cell(y, b) for x, y in zip(parts[j].sample, parts[k].sample, strict=False)
+        _get_cell(x, a) != _get_cell(y, b)
+        for x, y in zip(parts[j].sample, parts[k].sample, strict=False)
     ):
         return False
     first = list(parts[j].cells(a))
@@ -171,12 +172,12 @@ def _tell(name: str, unit: str, told: str, is_shared: bool) -> str:
     """A column's name, with what its file's name says where others have it or it says nothing; that
     alone where it says all.
     """
-    own = role(name, unit)
+    own = find_role(name, unit)
     if own and not is_shared:
         return name
-    if not own and role(told, unit):
+    if not own and find_role(told, unit):
         return told
     options = [f"{name} {told}", f"{told} {name}", told]
-    known = [(option, one) for option in options if (one := role(option, unit))]
+    known = [(option, one) for option in options if (one := find_role(option, unit))]
     with_phase = [option for option, one in known if len(one.key) > 1]
     return next(iter((*with_phase, *(option for option, _ in known))), f"{name} {told}".strip())

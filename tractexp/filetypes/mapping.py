@@ -62,7 +62,7 @@ def map_columns(
     for one in chosen.values():
         _check_unit(table, one)
     days = _find_days(options, chosen["t"])
-    notes = _notes(table, chosen, days, other_columns)
+    notes = _note_columns(table, chosen, days, other_columns)
     return Mapped(kind, chosen, tuple(notes), read_first_day(table, days))
 
 
@@ -149,7 +149,7 @@ def _check_unit(table: TableFile, one: MappedColumn) -> None:
         )
 
 
-def _notes(
+def _note_columns(
     table: TableFile,
     chosen: Mapping[str, MappedColumn],
     days: Sequence[MappedColumn],

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.errors import DATA, UserError
-from tractexp.filetypes.column_unit import factor
+from tractexp.filetypes.column_unit import find_factor
 from tractexp.filetypes.mapping import Mapped
 from tractexp.filetypes.table import TableColumn, TableFile
 
@@ -44,7 +44,9 @@ class TableTimes:
     notes: tuple[str, ...]
 
 
-def times_of(table: TableFile, mapping: Mapped, cells: Mapping[int, TableColumn]) -> TableTimes:
+def compute_times(
+    table: TableFile, mapping: Mapped, cells: Mapping[int, TableColumn]
+) -> TableTimes:
     """The times of a table, of which `cells` are the columns that were read.
 
     Without a unit, numbers too large for seconds since 1970 are its milli-, micro- or nanoseconds.
@@ -99,16 +101,18 @@ def _read_numeric_times(
             " row"
         )
         return TableTimes(
-            (values - first) * factor(since), _since_1970(first * factor(since)), (note,)
+            (values - first) * find_factor(since),
+            _convert_seconds(first * find_factor(since)),
+            (note,),
         )
-    t = values * factor(unit)
+    t = values * find_factor(unit)
     if abs(t[0]) > EPOCH:
         note = f"t counted from {t[0]:.6f} s, the first row"
-        return TableTimes(t - t[0], _since_1970(float(t[0])), (note,))
+        return TableTimes(t - t[0], _convert_seconds(float(t[0])), (note,))
     return TableTimes(t, None, ())
 
 
-def _since_1970(seconds: float) -> dt.datetime | None:
+def _convert_seconds(seconds: float) -> dt.datetime | None:
     """The moment, in UTC, so many seconds after 1970; None where no record is so old or so new."""
     if not EARLIEST <= seconds <= LATEST:
         return None
@@ -124,7 +128,7 @@ def _read_ticks(values: np.ndarray, fastest: float) -> TableTimes | None:
         if EARLIEST <= begun <= LATEST and span * TICK_SECONDS * fastest >= len(values) - 1:
             said = f"t is in tenths of a microsecond since {since} by its size: counted from"
             note = f"{said} {first:.0f}, the first row"
-            return TableTimes((values - first) * TICK_SECONDS, _since_1970(begun), (note,))
+            return TableTimes((values - first) * TICK_SECONDS, _convert_seconds(begun), (note,))
     return None
 
 
@@ -166,14 +170,14 @@ def _add_fractions(
         return replace(
             whole, notes=(*whole.notes, f"{label} not used: the times have fractions of seconds")
         )
-    by, said = _unit_of(mapping.columns["frac"].role.unit, whole.t, fractions)
+    by, said = _find_unit(mapping.columns["frac"].role.unit, whole.t, fractions)
     if (
         by > 0
         and fractions.max(initial=0.0) >= COUNTED
         and (fractions == np.round(fractions)).all()
     ):
         fractions = np.mod(fractions, COUNTED)
-        by, said = _unit_of("", whole.t, fractions)
+        by, said = _find_unit("", whole.t, fractions)
     if not by > 0 or fractions.min(initial=0.0) < 0 or fractions.max(initial=0.0) * by >= 1 + 1e-9:
         raise UserError(
             f"{table.source}: {label} holds no fractions of the seconds beside it: up to"
@@ -187,12 +191,12 @@ def _add_fractions(
     return TableTimes(t - t[0] if counted_from_first else t, start, (*whole.notes, note))
 
 
-def _unit_of(unit: str, seconds: np.ndarray, fractions: np.ndarray) -> tuple[float, str]:
+def _find_unit(unit: str, seconds: np.ndarray, fractions: np.ndarray) -> tuple[float, str]:
     """(seconds that one of the fractions is, what says so): their unit, or by how much they fall in
     a new second.
     """
     if unit:
-        return factor(unit), f"which are in {unit}"
+        return find_factor(unit), f"which are in {unit}"
     most = float(fractions.max(initial=0.0))
     if most < 1:
         return 1.0, "which are below 1"

@@ -7,12 +7,12 @@ import numpy as np
 from tractexp.errors import DATA, UserError
 from tractexp.filetypes.column_key import LINES, PHASES
 from tractexp.filetypes.column_options import MappedColumn
-from tractexp.filetypes.column_unit import factor
+from tractexp.filetypes.column_unit import find_factor
 from tractexp.filetypes.mapping import Mapped
 from tractexp.filetypes.power_columns import Powers, has_absolute_unit, read_columns
 from tractexp.filetypes.table import TableFile
 from tractexp.record.angle import unwrap_angle
-from tractexp.record.phasor import sequences
+from tractexp.record.phasor import compute_sequences
 from tractexp.recording.nominal_voltage import is_between_phases, measure_offset_from_nominal
 
 # the positive sequence of line voltages over that of phase voltages
@@ -157,7 +157,7 @@ def _find_angle_unit(
     angles = {key: one for key, one in mapping.columns.items() if key.endswith("_angle")}
     unit = next(filter(None, (one.role.unit for one in angles.values())), "")
     if unit:
-        return factor(unit), []
+        return find_factor(unit), []
     widest = max(float(np.nanmax(np.abs(values[key]), initial=0.0)) for key in angles)
     if widest > 2 * np.pi:
         return np.pi / 180, ["angles taken as degrees, for they exceed 2 pi"]
@@ -187,7 +187,7 @@ def _compute_sequences(X: np.ndarray, keys: list[str]) -> tuple[np.ndarray, np.n
     three = [
         X[keys.index(k)] if (k := keys[0][0] + mark) in keys else -X.sum(axis=0) for mark in marks
     ]
-    positive, negative = sequences(np.array(three))
+    positive, negative = compute_sequences(np.array(three))
     if marks == LINES:
         return positive / FORWARD, negative / FORWARD.conjugate()
     return positive, negative

@@ -9,10 +9,10 @@ import numpy as np
 from tractexp.errors import DATA, UserError
 from tractexp.filetypes.column_key import PHASES
 from tractexp.filetypes.column_options import MappedColumn
-from tractexp.filetypes.column_unit import PER_UNIT, factor
+from tractexp.filetypes.column_unit import PER_UNIT, find_factor
 from tractexp.filetypes.direct_table import check_alternating
 from tractexp.filetypes.mapping import Mapped
-from tractexp.filetypes.moments import times_of
+from tractexp.filetypes.moments import compute_times
 from tractexp.filetypes.row_quality import find_bad_rows, find_filled_rows
 from tractexp.filetypes.table import TableFile
 from tractexp.record.angle import unwrap_angle
@@ -58,7 +58,7 @@ def read_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
         notes += merged
     columns |= {key: values[key] for key in ("f", "U2") if key in values}
     for key in ANGLES & values.keys():
-        columns["U_angle"], note = _turned_angle(mapping.columns[key], values[key])
+        columns["U_angle"], note = _unwrap_angle(mapping.columns[key], values[key])
         notes.append(note)
     absolute = {
         "U": has_absolute_unit(mapping, keys["U"][0]),
@@ -102,14 +102,14 @@ def _settle_voltage(
     return replace(result, notes=(*result.notes, *notes))
 
 
-def _turned_angle(one: MappedColumn, values: np.ndarray) -> tuple[np.ndarray, str]:
+def _unwrap_angle(one: MappedColumn, values: np.ndarray) -> tuple[np.ndarray, str]:
     """An angle (N,) in rad, not wrapped, and what is said of it.
 
     Without a unit it is in degrees where it steps by more than a turn in rad, else in rad.
     """
     steps = np.abs(np.diff(values[np.isfinite(values)]))
     by_degrees = float(steps.max(initial=0.0)) > LARGEST_TURN_STEP * 2 * np.pi
-    scale = factor(one.role.unit) if one.role.unit else np.pi / 180 if by_degrees else 1.0
+    scale = find_factor(one.role.unit) if one.role.unit else np.pi / 180 if by_degrees else 1.0
     unit = one.role.unit or (
         "deg, for in rad it would step by more than a turn" if by_degrees else "rad"
     )
@@ -215,10 +215,10 @@ def read_columns(
         for key, one in mapping.columns.items()
         if not key.endswith("_angle")
         and key not in ("t", "frac")
-        and (by := factor(one.role.unit)) != 1
+        and (by := find_factor(one.role.unit)) != 1
     }
     values.pop("frac", None)
-    read = times_of(table, mapping, cells)
+    read = compute_times(table, mapping, cells)
     values["t"] = read.t
     bad, said = find_bad_rows(table, len(read.t))
     for key in values.keys() - {"t"}:

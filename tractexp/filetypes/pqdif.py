@@ -18,8 +18,8 @@ from tractexp.filetypes.pqdif_channels import (
     ChannelDefinition,
     PqdifContent,
     SeriesDefinition,
+    count_seconds,
     read_observations,
-    seconds,
 )
 from tractexp.filetypes.pqdif_records import SIGNATURE, tag
 from tractexp.filetypes.remarks import Remarks
@@ -114,19 +114,21 @@ def load(path: Path, encoding: str | None = None) -> Recording:
             f"{path}: there are no waveforms in this PQDIF file; logs of voltage, P and Q are read"
             f" as a table: data=csv data.path={path}"
         )
-    segments, evened = _segments(str(path), stretches)
+    segments, evened = _cut_segments(str(path), stretches)
     start = content.observations[0].start
     begin = stretches[0].t[0]
     last = segments[-1].start + (segments[-1].stop - segments[-1].first) / segments[-1].rate
-    stated = (seconds(o.triggered, start) - begin for o in content.observations if o.triggered)
+    stated = (
+        count_seconds(o.triggered, start) - begin for o in content.observations if o.triggered
+    )
     triggers = sorted({float(t) for t in stated if 0 < t < last})
     return Recording(
         source=str(path),
-        channels=[_channel(*channels[k], values) for k, values in evened.items()],
+        channels=[_build_channel(*channels[k], values) for k, values in evened.items()],
         segments=segments,
         frequency=content.frequency if 10 <= content.frequency <= 100 else 50.0,
         station=content.station,
-        start=_moment(start, float(begin), remarks),
+        start=_read_moment(start, float(begin), remarks),
         trigger=triggers[0] if triggers else None,
         triggers=triggers if len(triggers) > 1 else (),
         notes=remarks.notes(),
@@ -134,7 +136,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     )
 
 
-def _channel(definition: ChannelDefinition, unit: str, values: np.ndarray) -> Channel:
+def _build_channel(definition: ChannelDefinition, unit: str, values: np.ndarray) -> Channel:
     """A defined channel with its values (N,)."""
     quantity = QUANTITIES.get(unit, "")
     phase = PHASES.get(definition.phase, "")
@@ -149,7 +151,7 @@ def _read_waves(
     """
     stretches: dict[tuple[float, ...], ObservedStretch] = {}
     for each in content.observations:
-        begin = seconds(each.start, content.observations[0].start)
+        begin = count_seconds(each.start, content.observations[0].start)
         own: dict[tuple[float, ...], ObservedStretch] = {}
         for one in each.instances:
             sampled = ((d, v) for d, v in one.series if d.value in (VALUE, INSTANT))
@@ -163,14 +165,16 @@ def _read_waves(
                     " damaged"
                 )
             channels[one.channel.number] = (one.channel, UNITS.get(definition.unit, ""))
-            stretch = own.setdefault(_key(begin, one.t), ObservedStretch(begin + one.t, {}))
+            stretch = own.setdefault(_key_times(begin, one.t), ObservedStretch(begin + one.t, {}))
             stretch.columns[one.channel.number] = values
         for stretch in _merge_rates([*own.values()], remarks):
-            stretches.setdefault(_key(0.0, stretch.t), stretch).columns.update(stretch.columns)
+            stretches.setdefault(_key_times(0.0, stretch.t), stretch).columns.update(
+                stretch.columns
+            )
     return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
 
 
-def _key(begin: float, t: np.ndarray) -> tuple[float, ...]:
+def _key_times(begin: float, t: np.ndarray) -> tuple[float, ...]:
     """(first [s], count, duration [s]) of times (N,), to the microsecond: equal where they are the
     same times.
     """
@@ -223,7 +227,7 @@ def _keep_fullest_set(
     return [each for each, own in zip(stretches, sets, strict=True) if own == full]
 
 
-def _segments(
+def _cut_segments(
     where: str, stretches: Sequence[ObservedStretch]
 ) -> tuple[list[timeline.Segment], dict[int, np.ndarray]]:
     """Segments of even sampling, and the values (N,) of each channel in them; times begin with the
@@ -248,7 +252,7 @@ def _segments(
     }
 
 
-def _moment(start: tuple[int, float], more: float, remarks: Remarks) -> datetime | None:
+def _read_moment(start: tuple[int, float], more: float, remarks: Remarks) -> datetime | None:
     """The date of so many days since 1900 and seconds; None, with a remark, where it is none."""
     try:
         return ZERO + timedelta(days=start[0], seconds=start[1] + more)
@@ -301,24 +305,24 @@ def _read_logs(content: PqdifContent, names: dict[int, tuple[str, str]]) -> list
     circuits = {i.channel.circuit for o in content.observations for i in o.instances}
     numbers: dict[tuple[int, int], int] = {}
     for each in content.observations:
-        begin = seconds(each.start, content.observations[0].start)
+        begin = count_seconds(each.start, content.observations[0].start)
         for one in each.instances:
             values = {d.value for d, _ in one.series}
             for k, (definition, column) in enumerate(one.series):
-                name = _column(one.channel, definition, VALUE in values)
+                name = _name_column(one.channel, definition, VALUE in values)
                 if not name or len(one.t) < 2:
                     continue
                 number = numbers.setdefault((one.channel.number, k), len(numbers))
                 circuit = one.channel.circuit if len(circuits) > 1 else ""
                 names[number] = (" ".join(filter(None, (circuit, name))), UNITS[definition.unit])
                 stretch = stretches.setdefault(
-                    _key(begin, one.t), ObservedStretch(begin + one.t, {})
+                    _key_times(begin, one.t), ObservedStretch(begin + one.t, {})
                 )
                 stretch.columns[number] = column
     return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
 
 
-def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value: bool) -> str:
+def _name_column(channel: ChannelDefinition, definition: SeriesDefinition, has_value: bool) -> str:
     """The name of a logged series, by quantity and phase; "" for a least or greatest value, and
     other quantities.
     """

@@ -18,7 +18,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_samples import HUGE
-from tractexp.filetypes.pqdif_records import Collection, records, tag
+from tractexp.filetypes.pqdif_records import Collection, read_records, tag
 from tractexp.filetypes.remarks import Remarks
 from tractexp.storage import files
 
@@ -124,7 +124,7 @@ class Observation:
     instances: tuple[Instance, ...]
 
 
-def seconds(moment: tuple[int, float], since: tuple[int, float]) -> float:
+def count_seconds(moment: tuple[int, float], since: tuple[int, float]) -> float:
     """From one moment to another [s]."""
     return DAY_SECONDS * (moment[0] - since[0]) + moment[1] - since[1]
 
@@ -143,7 +143,7 @@ def read_observations(
     """
     files.check_there(path)
     reading = PqdifContent(kinds, remarks)
-    for kind, body in records(path, encoding, remarks):
+    for kind, body in read_records(path, encoding, remarks):
         if kind == SOURCE:
             reading.source(body)
         elif kind == SETTINGS:
@@ -214,7 +214,7 @@ class PqdifContent:
         listed = body.collection(INSTANCES)
         if start is None or listed is None:
             self.remarks.add(
-                f"{_record(body)}: an observation without start or channels is not read"
+                f"{_name_record(body)}: an observation without start or channels is not read"
             )
             return
         every = [_Stored(each) for each in listed.collections(INSTANCE)]
@@ -277,7 +277,7 @@ class PqdifContent:
                 series.append((definition, values * ratio))
                 continue
             counts = f"{len(values)} values at {count} times"
-            self.remarks.add(f"{_record(one.own)}: {channel.name} has {counts}: not read")
+            self.remarks.add(f"{_name_record(one.own)}: {channel.name} has {counts}: not read")
         return series
 
     def _times(
@@ -398,6 +398,6 @@ class _Stored:
         return pairs
 
 
-def _record(body: Collection) -> str:
+def _name_record(body: Collection) -> str:
     """Which record of the file it is, for remarks."""
     return body.body.where.rpartition(": ")[2]

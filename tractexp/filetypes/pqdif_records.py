@@ -182,7 +182,7 @@ class Collection:
         return int(value["day"]), float(value["second"])
 
 
-def records(
+def read_records(
     path: Path, encoding: str | None, remarks: Remarks
 ) -> Iterator[tuple[bytes, Collection]]:
     """(tag, body's collection) of each record after the container. Raises `UserError` for what is
@@ -206,14 +206,14 @@ def records(
         reached[at], following = stored.end, stored.following
         body = _decompress_body(stored.content, room, where) if compressed else stored.content
         room -= len(body)
-        if stored.checksum not in (0, *_checksums(stored.content, body)):
+        if stored.checksum not in (0, *_list_checksums(stored.content, body)):
             remarks.add(
                 f"record {count}: the checksum does not fit: it was altered, or damaged on its way"
             )
         if body:
             collection = Collection(Body(body, where, encoding), 0)
             if stored.kind == CONTAINER:
-                compressed = _compression(collection, where)
+                compressed = _is_compressed(collection, where)
             else:
                 yield stored.kind, collection
         if not 0 < following < len(data) or following in reached:
@@ -273,7 +273,7 @@ def _describe_end(where: str, count: int) -> str:
     return f"the file ends {where} record {count}: it is not whole; what comes before is read"
 
 
-def _checksums(content: bytes, body: bytes) -> Iterator[int]:
+def _list_checksums(content: bytes, body: bytes) -> Iterator[int]:
     """The checksums that writers give a record: Adler-32 or CRC-32, of its body compressed
     or not.
     """
@@ -300,7 +300,7 @@ def _tell_unreached(data: bytes, reached: Mapping[int, int], remarks: Remarks) -
         end = max(end, stop)
 
 
-def _compression(container: Collection, where: str) -> bool:
+def _is_compressed(container: Collection, where: str) -> bool:
     """Whether the records after the container are compressed, each by itself."""
     style = container.number(STYLE)
     algorithm = container.number(ALGORITHM)

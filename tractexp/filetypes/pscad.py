@@ -93,8 +93,8 @@ def table(path: Path, form: TableForm) -> Results:
             f"{path} is a simulator's output without names: PSCAD writes them to {case}.inf beside"
             " it, which is not there; export that of another simulator as .csv"
         )
-    parts = [_columns(each, form) for each in beside if each == path or _is_part(each, number)]
-    return Results(str(path), parts, _names(names, form.encoding))
+    parts = [_read_columns(each, form) for each in beside if each == path or _is_part(each, number)]
+    return Results(str(path), parts, _read_names(names, form.encoding))
 
 
 def _is_part(path: Path, number: re.Match[str] | None) -> bool:
@@ -103,13 +103,13 @@ def _is_part(path: Path, number: re.Match[str] | None) -> bool:
     return own is not None and number is not None and own[1] == number[1]
 
 
-def _columns(path: Path, form: TableForm) -> TextTable:
+def _read_columns(path: Path, form: TableForm) -> TextTable:
     """The columns of one file, below its title."""
     _, _, body = files.read(path).partition(b"\n")
     return open_text(str(path), b"\n" + body, TableForm(decimal=".", encoding=form.encoding))
 
 
-def _names(path: Path, encoding: str | None) -> list[tuple[str, str]]:
+def _read_names(path: Path, encoding: str | None) -> list[tuple[str, str]]:
     """(name, unit) of each channel, by their numbers."""
     text, _ = decode(files.read(path, LARGEST), str(path), encoding)
     every: dict[int, tuple[str, str]] = {}

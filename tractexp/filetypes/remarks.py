@@ -22,11 +22,11 @@ class Remarks:
     def notes(self) -> tuple[str, ...]:
         """One sentence for each remark, with its lines."""
         return tuple(
-            f"{self.where}{_places(lines)}: {words}" for words, lines in self._lines.items()
+            f"{self.where}{_list_places(lines)}: {words}" for words, lines in self._lines.items()
         )
 
 
-def _places(lines: list[int]) -> str:
+def _list_places(lines: list[int]) -> str:
     """ ", line 3" or ", lines 3, 4 and 7 more"."""
     if not lines:
         return ""

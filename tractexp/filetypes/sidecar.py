@@ -48,11 +48,11 @@ def read_sidecar(path: str) -> Sidecar:
     return Sidecar(
         str(content["name"]) if "name" in content else None,
         tuple(note for note in notes if isinstance(note, str)),
-        _base(file, content.get("base")),
+        _read_base(file, content.get("base")),
         _take_kind(dict, content, "columns"),
         {key: str(unit) for key, unit in _take_kind(dict, content, "units").items()},
         content.get("uniform") is True,
-        _window(file, content.get("window")),
+        _read_window(file, content.get("window")),
         tuple(map(str, _take_kind(list, content, "more"))),
         _take_kind(dict, content, "recording") or None,
     )
@@ -63,7 +63,7 @@ def _take_kind(kind: type[Any], content: Mapping[str, Any], key: str) -> Any:
     return content[key] if isinstance(content.get(key), kind) else kind()
 
 
-def _window(file: Any, content: Any) -> Window | None:
+def _read_window(file: Any, content: Any) -> Window | None:
     """The recorder's window; None where the sidecar has none. Raises `UserError` for another
     form.
     """
@@ -75,7 +75,7 @@ def _window(file: Any, content: Any) -> Window | None:
         raise UserError(f"{file}: window is not as task=convert writes it; leave it out") from error
 
 
-def _base(file: Any, content: Any) -> Base | None:
+def _read_base(file: Any, content: Any) -> Base | None:
     """The base of per-unit values, where the sidecar tells it in numbers; else None."""
     if not isinstance(content, dict):
         return None

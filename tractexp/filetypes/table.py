@@ -13,10 +13,10 @@ from typing import Any, Self
 import numpy as np
 
 from tractexp.errors import DATA, UserError, check_choice, list_allowed, suggest_nearest
-from tractexp.filetypes.cells import BadCell, find_group_mark, is_number, numbers
-from tractexp.filetypes.clock import is_time, times
+from tractexp.filetypes.cells import BadCell, find_group_mark, is_number, parse_numbers
+from tractexp.filetypes.clock import is_time, parse_times
 from tractexp.filetypes.column_unit import split_unit
-from tractexp.filetypes.heading import TableHeading, check_column_count, heading
+from tractexp.filetypes.heading import TableHeading, check_column_count, find_heading
 from tractexp.filetypes.reading_process import BadFile, ReadingProcess
 from tractexp.storage import files
 from tractexp.storage.files import locate_file
@@ -166,7 +166,7 @@ class Rows(TableFile):
         columns = {}
         for number, kind in wanted.items():
             try:
-                columns[number] = column(
+                columns[number] = parse_column(
                     self.columns(number), kind, ".", find_group_mark(self.sample, ".")
                 )
             except BadCell as bad:
@@ -174,14 +174,14 @@ class Rows(TableFile):
         return columns
 
 
-def column(cells: Sequence[Any], kind: str, decimal: str, group: str = "") -> TableColumn:
+def parse_column(cells: Sequence[Any], kind: str, decimal: str, group: str = "") -> TableColumn:
     """Cells as what is wanted of them; raises `BadCell`."""
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
         return TableColumn(cells)
     if kind == "time" and any(_is_clock(cell, decimal) for cell in cells[:1]):
-        read = times(cells)
+        read = parse_times(cells)
         return TableColumn(read.values, read.start, True, read.begin, read.remarks)
-    return TableColumn(numbers(cells, decimal, kind == "gaps", group))
+    return TableColumn(parse_numbers(cells, decimal, kind == "gaps", group))
 
 
 def _is_clock(cell: Any, decimal: str) -> bool:
@@ -189,7 +189,7 @@ def _is_clock(cell: Any, decimal: str) -> bool:
     return not is_number(cell, decimal) and (is_time(cell) or ":" in str(cell))
 
 
-def instrument_of(path: Path | str) -> ModuleType | None:
+def find_instrument(path: Path | str) -> ModuleType | None:
     """The module of the instrument whose file it is, by its beginning or ending; None for another
     file.
 
@@ -216,22 +216,22 @@ def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
         paths = (path, *form.join)
         return JoinedTable([open_table(one, alone) for one in paths], paths)
 
-    if instrument := instrument_of(locate_file(path)):
+    if instrument := find_instrument(locate_file(path)):
         return instrument.table(locate_file(path), form.encoding)
     if Path(path).suffix.lower() == pscad.ENDING:
         return pscad.table(locate_file(path), form)
-    data = content(path, None if whole else HEAD, whole=(PARQUET, *SPREADSHEETS))
+    data = read_content(path, None if whole else HEAD, whole=(PARQUET, *SPREADSHEETS))
     if data.startswith(PARQUET):
-        return _parquet(path, data)
+        return _read_parquet(path, data)
     if data.startswith(SPREADSHEETS):
-        return _sheet(path, data, form)
+        return _read_sheet(path, data, form)
     for mark, kind in FOREIGN.items():
         if data.startswith(mark):
             raise UserError(f"{path}: this is no table but {kind}")
     return open_text(path, data, form)
 
 
-def content(path: str, limit: int | None = None, whole: tuple[bytes, ...] = ()) -> bytes:
+def read_content(path: str, limit: int | None = None, whole: tuple[bytes, ...] = ()) -> bytes:
     """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole
     lines to a limit, but for files that begin as `whole` do.
 
@@ -259,7 +259,7 @@ def _describe_missing(path: str, file: Path) -> str:
     return f"{path}: there is no such file in {folder}{hint}"
 
 
-def _parquet(path: str, data: bytes) -> TableFile:
+def _read_parquet(path: str, data: bytes) -> TableFile:
     """A Parquet file as a table. Raises `UserError` for one that is damaged or too large."""
     try:
         with ReadingProcess("columns", data) as file:
@@ -281,25 +281,25 @@ def _parquet(path: str, data: bytes) -> TableFile:
     return Rows(path, head, columns.__getitem__, sample, first=1)
 
 
-def _sheet(path: str, data: bytes, form: TableForm) -> TableFile:
+def _read_sheet(path: str, data: bytes, form: TableForm) -> TableFile:
     """One sheet of a workbook: the chosen one, else the first with rows of numbers."""
     try:
         with ReadingProcess("workbook", data) as book:
-            return _sheet_of(path, book, form)
+            return _choose_sheet(path, book, form)
     except BadFile as bad:
         why = str(bad) or "not a workbook that can be read; save it as .xlsx"
         raise UserError(f"{path}: {why}, or the sheet as CSV") from bad
 
 
-def _sheet_of(path: str, book: ReadingProcess, form: TableForm) -> TableFile:
+def _choose_sheet(path: str, book: ReadingProcess, form: TableForm) -> TableFile:
     """The sheet that is named, else the first that can be read as a table."""
     names = book.content
     if form.sheet is not None:
-        return _rows_of(path, book, _sheet_name(path, names, form.sheet), form)
+        return _read_rows(path, book, _find_sheet_name(path, names, form.sheet), form)
     refused: list[UserError] = []
     for name in names:
         try:
-            rows = _rows_of(path, book, name, form)
+            rows = _read_rows(path, book, name, form)
         except UserError as error:
             refused.append(error)
             continue
@@ -313,7 +313,7 @@ def _sheet_of(path: str, book: ReadingProcess, form: TableForm) -> TableFile:
     raise refused[0] if refused else UserError(f"{path}: the workbook has no sheets")
 
 
-def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
+def _find_sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
     """The name of a sheet, given by its name or number. Raises `UserError` with those there are."""
     if str(sheet) in names:
         return str(sheet)
@@ -324,7 +324,7 @@ def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
     )
 
 
-def _rows_of(path: str, book: ReadingProcess, name: str, form: TableForm) -> Rows:
+def _read_rows(path: str, book: ReadingProcess, name: str, form: TableForm) -> Rows:
     """A sheet as a table. Raises `UserError` where it cannot be read."""
     try:
         rows = book.read(name)
@@ -339,7 +339,7 @@ def _rows_of(path: str, book: ReadingProcess, name: str, form: TableForm) -> Row
             f"{source} is empty; it must have a line naming the columns, such as t, U, P, Q"
         )
     header = None if form.header is None else int(np.searchsorted(filled, form.header - 1))
-    head = heading([_trim_row(rows[i]) for i in filled[:200]], source, header)
+    head = find_heading([_trim_row(rows[i]) for i in filled[:200]], source, header)
     body = filled[head.first :]
     last = body[-1] + 1
     return Rows(

@@ -28,7 +28,7 @@ def find_kind(
     for kind, keys in kinds.items():
         if "t" not in options or not {*chosen} <= {"t", "frac", *keys}:
             continue
-        if kind == "waves" and not _oscillates(table, options, keys):
+        if kind == "waves" and not _does_oscillate(table, options, keys):
             named = ", ".join(options[key][0].label for key in keys)
             raise UserError(
                 f"{table.source}: the columns {named} hold magnitudes without angles, and there are"
@@ -45,20 +45,20 @@ def _find_kinds(table: TableFile, options: Mapping[str, Any]) -> dict[str, list[
     Columns of one quantity alone, and columns beside powers, are waveforms only where they
     oscillate.
     """
-    wave = _waveform(options)
-    powers = _powers(options)
-    swings = _oscillates(table, options, wave)
+    wave = _list_waveforms(options)
+    powers = _list_powers(options)
+    swings = _does_oscillate(table, options, wave)
     if len({key[0] for key in wave}) == 1 and not swings:
         wave = []
-    kinds = {"phasors": _phasors(options), "waves": wave, "powers": powers}
+    kinds = {"phasors": _list_phasors(options), "waves": wave, "powers": powers}
     if powers:
-        kinds["powers"] = [*powers, *_telling_current(table, options, powers)]
+        kinds["powers"] = [*powers, *_find_telling_current(table, options, powers)]
         if not (swings and has_quantity(options, "P")):
             kinds = {"powers": kinds["powers"], "phasors": kinds["phasors"]}
     return {kind: keys for kind, keys in kinds.items() if keys}
 
 
-def _powers(options: Mapping[str, Any]) -> list[str]:
+def _list_powers(options: Mapping[str, Any]) -> list[str]:
     """The keys of U, P and Q, and of what stands beside them; [] where one is missing."""
     U = list_quantity_keys(options, "U", ("U", "U1")) or list_single_phases(options, "U")
     P = list_quantity_keys(options, "P", ("P",))
@@ -69,7 +69,7 @@ def _powers(options: Mapping[str, Any]) -> list[str]:
     return [*U, *P, *Q, *(key for key in ("f", "U2") if key in options), *angle]
 
 
-def _telling_current(
+def _find_telling_current(
     table: TableFile, options: Mapping[str, list[MappedColumn]], powers: Sequence[str]
 ) -> list[str]:
     """The key of a current [kA] beside powers, which tells whether a voltage whose name does not is
@@ -85,16 +85,16 @@ def _telling_current(
     return [keys[0]] if current.role.unit and known else []
 
 
-def _phasors(options: Mapping[str, Any]) -> list[str]:
+def _list_phasors(options: Mapping[str, Any]) -> list[str]:
     """Magnitudes and angles of voltages and currents, and f; [] where those of one are missing."""
-    voltages = _phasor_keys(options, "U")
-    currents = _phasor_keys(options, "I")
+    voltages = _list_phasor_keys(options, "U")
+    currents = _list_phasor_keys(options, "I")
     if not (voltages and currents):
         return []
     return [*voltages, *currents, *(key for key in ("f",) if key in options)]
 
 
-def _phasor_keys(options: Mapping[str, Any], letter: str) -> list[str]:
+def _list_phasor_keys(options: Mapping[str, Any], letter: str) -> list[str]:
     """Magnitudes and angles of one quantity: of three phases where they are there, else of the
     positive sequence, else of two phases (of U two lines), which say the third. [] for none.
     """
@@ -106,7 +106,7 @@ def _phasor_keys(options: Mapping[str, Any], letter: str) -> list[str]:
     return []
 
 
-def _waveform(options: Mapping[str, Any]) -> list[str]:
+def _list_waveforms(options: Mapping[str, Any]) -> list[str]:
     """Voltages and currents that may be waveforms: both, or those of one kind where no power stands
     beside them.
     """
@@ -125,7 +125,7 @@ def _find_single_phase(options: Mapping[str, Any], letter: str) -> list[str]:
     return [key for key in (letter, f"{letter}a", f"{letter}1") if key in options][:1]
 
 
-def _oscillates(
+def _does_oscillate(
     table: TableFile, options: Mapping[str, list[MappedColumn]], keys: Sequence[str]
 ) -> bool:
     """Whether a voltage among the columns takes both signs, as a waveform does and a magnitude does

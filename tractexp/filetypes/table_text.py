@@ -20,13 +20,13 @@ from tractexp.filetypes.cells import (
     BadCell,
     find_group_mark,
     find_rising_group_mark,
-    group_mark,
     is_number,
+    pick_group_mark,
 )
 from tractexp.filetypes.clock import is_time
 from tractexp.filetypes.column_unit import split_unit
-from tractexp.filetypes.heading import TableHeading, heading, is_value
-from tractexp.filetypes.table import TableColumn, TableFile, TableForm, column
+from tractexp.filetypes.heading import TableHeading, find_heading, is_value
+from tractexp.filetypes.table import TableColumn, TableFile, TableForm, parse_column
 from tractexp.filetypes.text import MARKS, decode
 from tractexp.text.wording import count_noun
 
@@ -50,13 +50,13 @@ class TextTable(TableFile):
     ) -> None:
         """`data` is UTF-8. Raises `UserError` where it holds no table."""
         self.source, self.data = source, data
-        lines = _lines(data[:HEAD], whole=len(data) <= HEAD)
+        lines = _list_lines(data[:HEAD], whole=len(data) <= HEAD)
         if not lines:
             raise UserError(
                 f"{source}: the file is empty; it must start with a line naming the columns t,U,P,Q"
             )
-        self.delimiter = _delimiter([text for _, text in lines])
-        rows = [_cells(text, self.delimiter) for _, text in lines]
+        self.delimiter = _find_delimiter([text for _, text in lines])
+        rows = [_cut_cells(text, self.delimiter) for _, text in lines]
         header = (
             None
             if form.header is None
@@ -79,12 +79,12 @@ class TextTable(TableFile):
         """The heading; the last remark above the values where names stand in a comment, as NumPy
         writes them.
         """
-        result = heading(rows, self.source, header)
+        result = find_heading(rows, self.source, header)
         if result.line is not None or result.first:
             return result
         remarks = re.findall(rb"^\s*[#%]+[ \t]*(.*?)\r?$", self.data[:HEAD], re.MULTILINE)
         for remark in reversed(remarks):
-            cells = _cells(remark.decode(errors="replace"), self.delimiter)
+            cells = _cut_cells(remark.decode(errors="replace"), self.delimiter)
             if len(cells) == len(rows[0]) and not any(map(is_number, cells)):
                 names, units = zip(*map(split_unit, cells), strict=True)
                 return TableHeading(names, units, 0, 0)
@@ -135,10 +135,12 @@ class TextTable(TableFile):
     def _count_last_decimals(self, last: bytes, before: Sequence[bytes]) -> tuple[int, set[int]]:
         """(decimals of the last cell of a line, those of the lines before with as many cells)."""
         cells, *others = [
-            _cells(text.decode(errors="replace"), self.delimiter) for text in (last, *before)
+            _cut_cells(text.decode(errors="replace"), self.delimiter) for text in (last, *before)
         ]
-        counts = {_decimals(row[-1], self.decimal) for row in others if len(row) == len(cells)}
-        return _decimals(cells[-1], self.decimal), counts
+        counts = {
+            _count_decimals(row[-1], self.decimal) for row in others if len(row) == len(cells)
+        }
+        return _count_decimals(cells[-1], self.decimal), counts
 
     def cells(self, number: int) -> list[str]:
         """The cells of a column."""
@@ -223,7 +225,9 @@ class TextTable(TableFile):
         bad = list[tuple[int, int, str]]()
         for n, kind in kinds.items():
             try:
-                values[n] = column([row[n] for row in rows], kind, self.decimal, self.group).values
+                values[n] = parse_column(
+                    [row[n] for row in rows], kind, self.decimal, self.group
+                ).values
             except BadCell as one:
                 bad.append((before + one.row, n, one.why))
         if bad:
@@ -233,7 +237,7 @@ class TextTable(TableFile):
     def _read_clock(self, number: int, cells: Sequence[str]) -> TableColumn:
         """A column of times of day; raises `UserError` for a cell that is none."""
         try:
-            return column(cells, "time", self.decimal)
+            return parse_column(cells, "time", self.decimal)
         except BadCell as one:
             raise self.refuse(one.row, number, one.why) from None
 
@@ -309,7 +313,7 @@ def _detect_unmarked_utf16(data: bytes) -> str | None:
     return None
 
 
-def _lines(head: bytes, whole: bool) -> list[tuple[int, str]]:
+def _list_lines(head: bytes, whole: bool) -> list[tuple[int, str]]:
     """The first lines that hold more than a remark, with their numbers from 1."""
     lines = head.decode(errors="replace").split("\n")
     lines = lines if whole else lines[:-1]
@@ -317,12 +321,12 @@ def _lines(head: bytes, whole: bool) -> list[tuple[int, str]]:
     return [(n, text) for n, text in bare if text.strip()][:SAMPLE]
 
 
-def _delimiter(lines: Sequence[str]) -> str:
+def _find_delimiter(lines: Sequence[str]) -> str:
     """The mark that cuts most of the last lines into equally many values, two or more."""
     tail = lines[len(lines) // 2 :][-50:]
 
     def alike(mark: str) -> tuple[float, int]:
-        rows = [_cells(line, mark) for line in tail]
+        rows = [_cut_cells(line, mark) for line in tail]
         width = max(set(map(len, rows)), key=[len(row) for row in rows].count)
         share = sum(len(row) == width for row in rows) / len(rows) if width > 1 else 0.0
         valued = any(sum(map(is_value, row)) >= 2 for row in rows)
@@ -332,7 +336,7 @@ def _delimiter(lines: Sequence[str]) -> str:
     return best if alike(best)[0] > 0 else ","
 
 
-def _decimals(cell: str, mark: str) -> int:
+def _count_decimals(cell: str, mark: str) -> int:
     """How many characters stand behind a number's decimal mark, with its exponent; 0 where there is
     none.
     """
@@ -346,23 +350,24 @@ def _detect_marks(sample: Sequence[Sequence[str]], decimal: str) -> tuple[str, s
     rising = "" if decimal else find_rising_group_mark(sample)
     if rising:
         return {".": ",", ",": "."}[rising], rising
-    decimal = decimal or _decimal(sample)
+    decimal = decimal or _find_decimal(sample)
     return decimal, find_group_mark(sample, decimal)
 
 
-def _decimal(sample: Sequence[Sequence[str]]) -> str:
+def _find_decimal(sample: Sequence[Sequence[str]]) -> str:
     """The decimal mark: a comma where more cells have one than a point."""
     cells = [cell for row in sample for cell in row]
     commas = sum(
-        (is_number(cell, ",") and "," in cell) or group_mark(cell, ",") == "." for cell in cells
+        (is_number(cell, ",") and "," in cell) or pick_group_mark(cell, ",") == "."
+        for cell in cells
     )
     points = sum(
-        (is_number(cell) and "." in cell) or group_mark(cell, ".") == "," for cell in cells
+        (is_number(cell) and "." in cell) or pick_group_mark(cell, ".") == "," for cell in cells
     )
     return "," if commas > points else "."
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
+def _cut_cells(line: str, delimiter: str) -> list[str]:
     """The cells of one line, bare."""
     if delimiter == " ":
         return line.split()

@@ -22,9 +22,9 @@ from tractexp.filetypes.power_columns import (
     take_line_voltage,
 )
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar
-from tractexp.filetypes.table import TableFile, TableForm, instrument_of, open_table
+from tractexp.filetypes.table import TableFile, TableForm, find_instrument, open_table
 from tractexp.record import Base, Record
-from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
+from tractexp.recording.snapshot import OTHER_FREQUENCY, find_nominal_frequency
 from tractexp.storage.files import locate_file
 
 LEAST_LIVE_VOLTAGE = 0.5  # of the median voltage: at less the frequency is noise
@@ -117,7 +117,7 @@ def kind_of(path: str, *join: str) -> str:
     """
     try:
         sidecar = read_sidecar(path)
-        instrument = instrument_of(locate_file(path))
+        instrument = find_instrument(locate_file(path))
         if sidecar.recording is not None or (
             instrument and instrument.holds_waveforms(locate_file(path))
         ):
@@ -174,7 +174,7 @@ def _tune_nominal_frequency(result: Powers, declared: float, source: MappedColum
             " unit of it: not used"
         )
         return replace(result, columns=columns, notes=(*result.notes, note), frequency=declared)
-    columns["f"], nominal = f, nearest_nominal(level)
+    columns["f"], nominal = f, find_nominal_frequency(level)
     if nominal is None or abs(nominal / declared - 1) < OTHER_FREQUENCY:
         return replace(result, columns=columns, frequency=declared)
     note = (

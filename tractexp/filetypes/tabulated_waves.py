@@ -9,10 +9,10 @@ from tractexp.errors import DATA, UserError
 from tractexp.filetypes.cells import is_plain_number
 from tractexp.filetypes.column_key import LINES, PHASES
 from tractexp.filetypes.column_options import find_other_columns
-from tractexp.filetypes.columns import role
+from tractexp.filetypes.columns import find_role
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.mapping import Mapped
-from tractexp.filetypes.moments import times_of
+from tractexp.filetypes.moments import compute_times
 from tractexp.filetypes.table import TableColumn, TableFile
 from tractexp.record.gap import (
     find_lost_rows,
@@ -42,18 +42,18 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
     keys = {one.number: key for key, one in mapping.columns.items()}
     times = [number for number in keys if keys[number] in ("t", "frac")]
     named = find_other_columns(table, times)
-    numbers = {k: "gaps" for k in named if _is_sampled(_numbers_of(table, k))}
+    numbers = {k: "gaps" for k in named if _is_sampled(_find_numbers(table, k))}
     _refuse_other_rates(table, sorted(keys.keys() - {*numbers, *times}))
     kinds = dict.fromkeys(times, "number") | {mapping.columns["t"].number: "time"}
     cells = table.read({**kinds, **numbers})
     _refuse_wild(table, {k: cells[k] for k in numbers})
-    read = times_of(table, mapping, cells)
+    read = compute_times(table, mapping, cells)
     steps = np.diff(read.t)
     rate = 1 / max(float(np.median(steps)), 1e-12) if len(steps) else 0.0
     lost = find_lost_rows(read.t, limit_wave_gap(rate, nominal))
-    segments, odd = _segments(table, insert_times(read.t, lost))
+    segments, odd = _find_segments(table, insert_times(read.t, lost))
     channels = [
-        _channel(table, mapping, k, insert_missing(cells[k].values, lost), keys.get(k, ""))
+        _build_channel(table, mapping, k, insert_missing(cells[k].values, lost), keys.get(k, ""))
         for k in numbers
     ]
     notes = [*table.notes, *read.notes, *odd]
@@ -76,7 +76,7 @@ def _refuse_wild(table: TableFile, cells: Mapping[int, TableColumn]) -> None:
             )
 
 
-def _numbers_of(table: TableFile, number: int) -> list[bool]:
+def _find_numbers(table: TableFile, number: int) -> list[bool]:
     """Which of a column's first cells are numbers."""
     return [number < len(row) and is_plain_number(row[number]) for row in table.sample[:20]]
 
@@ -92,7 +92,7 @@ def _is_sampled(numbers: Sequence[bool]) -> bool:
 def _refuse_other_rates(table: TableFile, numbers: Sequence[int]) -> None:
     """Raise `UserError` for a column of samples that has a number in some rows only."""
     for number in numbers:
-        there = _numbers_of(table, number)
+        there = _find_numbers(table, number)
         if any(there):
             raise UserError(
                 f"{table.source}: column {table.label(number)} has a number in {sum(there)} of its"
@@ -102,13 +102,13 @@ def _refuse_other_rates(table: TableFile, numbers: Sequence[int]) -> None:
             )
 
 
-def _channel(
+def _build_channel(
     table: TableFile, mapping: Mapped, number: int, values: np.ndarray, key: str
 ) -> Channel:
     """A column as a channel; its key says what it measures, else its name."""
     name = table.label(number)
     unit = table.heading.units[number]
-    meaning = role(name, unit)
+    meaning = find_role(name, unit)
     key = key or (meaning.key if meaning else "")
     unit = mapping.columns[key].role.unit if key in mapping.columns else unit
     quantity = (
@@ -119,7 +119,7 @@ def _channel(
     return Channel(name, values, unit, quantity, phase)
 
 
-def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]]:
+def _find_segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]]:
     """Runs of even sampling; a note on jitter and on gaps."""
     _check_times(table, t)
     steps = np.diff(t)

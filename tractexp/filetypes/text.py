@@ -60,7 +60,7 @@ def _guess(content: bytes) -> str:
     return "latin-1" if accents > 0.5 * letters else "cp1251"
 
 
-def lines(text: str) -> list[str]:
+def split_lines(text: str) -> list[str]:
     """The lines of a text, whichever of the three line ends it uses; what follows Ctrl-Z at its end
     is cut off.
     """

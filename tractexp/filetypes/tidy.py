@@ -57,18 +57,18 @@ def write_recording(recording: Recording, path: Path) -> list[Path]:
     t = np.full(recording.samples, np.nan)
     for segment in recording.segments:
         t[segment.first : segment.stop] = segment.t
-    named = unique(["t", *(c.name.strip() for c in (*recording.channels, *recording.status))])
+    named = make_unique(["t", *(c.name.strip() for c in (*recording.channels, *recording.status))])
     values = [
         t,
         *map(_read_raw_values, recording.channels),
         *(s.values() for s in recording.status),
     ]
     table = _write_columns(dict(zip(named, values, strict=True)), path)
-    content = {"source": recording.source, "recording": _content(recording)}
+    content = {"source": recording.source, "recording": _describe_recording(recording)}
     return [table, files.write_json(path.with_suffix(".json"), content)]
 
 
-def unique(names: Sequence[str]) -> list[str]:
+def make_unique(names: Sequence[str]) -> list[str]:
     """The names, with a number behind those that would occur twice; "unnamed" for none."""
     result: list[str] = []
     for name in names:
@@ -98,7 +98,7 @@ def restore_recording(path: str, content: Mapping[str, Any]) -> Recording:
         _check_segments(path, segments, len(cells[1].values))
         return Recording(
             path,
-            [_channel(one, cells[k].values) for k, one in enumerate(channels, 1)],
+            [_build_channel(one, cells[k].values) for k, one in enumerate(channels, 1)],
             segments,
             float(content["frequency"]),
             content["station"],
@@ -110,7 +110,7 @@ def restore_recording(path: str, content: Mapping[str, Any]) -> Recording:
                 for k, one in enumerate(status, 1 + len(channels))
             ],
             list(content["notes"]),
-            {key: _extra(value) for key, value in content["extra"].items()},
+            {key: _convert_extra(value) for key, value in content["extra"].items()},
             tuple(content.get("triggers", ())),  # which earlier versions did not write
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -139,13 +139,13 @@ def _check_segments(path: str, segments: Sequence[Segment], rows: int) -> None:
         )
 
 
-def _extra(value: Any) -> Any:
+def _convert_extra(value: Any) -> Any:
     """A stored array as an array, any other value unchanged."""
     marked = isinstance(value, dict) and set(value) == {"array", "type"}
     return np.array(value["array"], dtype=value["type"]) if marked else value
 
 
-def recording_of(record: Record) -> Recording:
+def convert_record(record: Record) -> Recording:
     """A record as a recording of magnitudes in kV (line to line), MW, Mvar and Hz, for formats that
     know no other.
     """
@@ -175,7 +175,7 @@ def _read_raw_values(channel: Channel) -> np.ndarray:
     return channel.read_values()
 
 
-def _content(recording: Recording) -> dict[str, Any]:
+def _describe_recording(recording: Recording) -> dict[str, Any]:
     """A recording without its samples, for the sidecar."""
     fields = (
         "name",
@@ -217,7 +217,7 @@ def _content(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _channel(content: Mapping[str, Any], values: np.ndarray) -> Channel:
+def _build_channel(content: Mapping[str, Any], values: np.ndarray) -> Channel:
     """A channel with the raw numbers that its converter gave."""
     fields = dict(content)
     kind, limits = np.dtype(fields.pop("raw")), fields.pop("limits")

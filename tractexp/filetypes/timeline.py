@@ -177,7 +177,7 @@ def resample_evenly(
     )
 
 
-def nearest(raw: np.ndarray, stretches: Sequence[SampleStretch]) -> np.ndarray:
+def take_nearest(raw: np.ndarray, stretches: Sequence[SampleStretch]) -> np.ndarray:
     """States (N,) at even times: those of the sample closest in time."""
     if all(s.t is None for s in stretches):
         return raw

@@ -21,7 +21,7 @@ from tractexp.identification.verdict import (
 )
 from tractexp.inference.information import SHARE
 from tractexp.inference.problem import Problem
-from tractexp.record.change import runs
+from tractexp.record.change import find_runs
 
 
 def advise(
@@ -204,5 +204,5 @@ def _find_goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
 def _format_spans(forecasts: Sequence[IntervalForecast], enough: np.ndarray) -> str:
     """The depths of the forecasts (n,) that are `enough`, as text: '5 to 15 % or 27.5 to 95 %'."""
     depths = np.array([f.shape.depth for f in forecasts])
-    spans = [(100 * depths[part][0], 100 * depths[part][-1]) for part in runs(enough)]
+    spans = [(100 * depths[part][0], 100 * depths[part][-1]) for part in find_runs(enough)]
     return " or ".join(f"{a:.3g} to {b:.3g} %" if b > a else f"{a:.3g} %" for a, b in spans)

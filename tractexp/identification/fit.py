@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.domain import Playback, domain_of
+from tractexp.domain import Playback, find_domain
 from tractexp.errors import UserError
 from tractexp.inference.model_error import compute_model_error
 from tractexp.inference.problem import Problem
@@ -44,7 +44,7 @@ def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
     """Play one event through the model. Raises `UserError` where these parameters have no steady
     state there.
     """
-    domain = domain_of(model)
+    domain = find_domain(model)
     event = domain.event(event)
     drive = Drive.from_events([domain.excitation(event, model)])
     if refusal := model.refusal(values, drive):
@@ -56,7 +56,7 @@ def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
 
 def explain_refusal(model: Model, values: np.ndarray, event: Event) -> str:
     """Return why an event cannot be played through the model at these values; "" where it can."""
-    domain = domain_of(model)
+    domain = find_domain(model)
     return (
         model.refusal(values, Drive.from_events([domain.excitation(domain.event(event), model)]))
         or ""

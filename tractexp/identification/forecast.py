@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.domain.playback import LAST_SHARE, STALLED_POWER
 from tractexp.errors import UserError
 from tractexp.inference.interval import INTERVAL_LEVEL
@@ -187,7 +187,7 @@ def tell_of_dip(
     dip = f"the next dip of {100 * TOLD_DEPTH:.0f} %"
 
     def calculate(values: np.ndarray) -> np.ndarray:
-        return np.stack(domain_of(model).play(model, values, t, U, before))
+        return np.stack(find_domain(model).play(model, values, t, U, before))
 
     drawn = complex(first.P0, first.Q0)
     try:

@@ -171,7 +171,7 @@ def fit_networks(ports: Sequence[Port], most: int) -> list[PoleNetwork]:
         return tuple(part for one in _fit(ports, most) for part in (one.poles, one.coefficients))
 
     parts = store.DESCENTS.arrays(
-        store.key(store.describe_environment(), "networks", ports, most), compute
+        store.compute_key(store.describe_environment(), "networks", ports, most), compute
     )
     return [PoleNetwork(*pair) for pair in zip(parts[::2], parts[1::2], strict=True)]
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.errors import UserError
 from tractexp.identification.fit import TRAIN, Fit, tabulate_model_errors
 from tractexp.identification.linear_network import BlackBox, choose_network, fit_black_boxes
@@ -83,7 +83,7 @@ def play_network(fits: Sequence[Fit]) -> tuple[BlackBox, list[Fit]]:
     """
     events = [fit.waves or fit.event for fit in fits]
     split = sum(fit.role == TRAIN for fit in fits)
-    box = choose_network(fit_black_boxes(domain_of(events[0]), events[:split]), events[:split])
+    box = choose_network(fit_black_boxes(find_domain(events[0]), events[:split]), events[:split])
     pairs = zip(fits, events, strict=True)
     return box, [Fit(role=fit.role, **vars(box.play(event))) for fit, event in pairs]
 

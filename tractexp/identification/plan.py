@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.domain import PHASORS, Domain, domain_of
+from tractexp.domain import PHASORS, Domain, find_domain
 from tractexp.errors import TASK, UserError, check_range, list_allowed
 from tractexp.inference.information import Information
 from tractexp.inference.interval import compute_interval_factor
@@ -61,7 +61,7 @@ class DipShape:
         dip.
         """
         noise = noise or Noise((estimate_noise_before(event),))
-        domain = domain_of(event)
+        domain = find_domain(event)
         (noise_P, noise_Q, *_), memory = noise.levels, noise.memory(event.record.step)
         return cls(
             event.depth,

@@ -8,8 +8,8 @@ from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.observed import Observed
 from tractexp.noise.color import (
     FEWEST_NOISE_SAMPLES,
+    cut_stretches,
     fit_autoregression,
-    stretches,
     white_noise,
 )
 from tractexp.noise.model import Noise, Pair
@@ -66,7 +66,7 @@ def fit_residual_noise(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
     for part in drive.parts:
         pair = []
         for c in range(drive.channels):
-            pieces = stretches(residuals[c, part], likelihood.valid[c, part])
+            pieces = cut_stretches(residuals[c, part], likelihood.valid[c, part])
             enough = sum(map(len, pieces)) >= FEWEST_NOISE_SAMPLES
             pair.append(
                 fit_autoregression(pieces).scale_noise(back) if enough else white_noise(1.0)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.configuration.plugin import build
-from tractexp.domain import DOMAINS, domain_of
+from tractexp.domain import DOMAINS, find_domain
 from tractexp.errors import UserError
 from tractexp.identification import stored
 from tractexp.identification.adequacy import ACCEPTED
@@ -342,7 +342,7 @@ class Driven:
     def calculate(self, values: np.ndarray) -> np.ndarray:
         """P and Q (2, N) [pu] at other values (d,)."""
         omega_s0 = 0.0 if self.omega_s is None else float(self.omega_s[: self.start or None].mean())
-        play = domain_of(self.model).play
+        play = find_domain(self.model).play
         power = play(self.model, values, self.t, self.U, self.before, self.omega_s, omega_s0)
         return np.stack(power)
 

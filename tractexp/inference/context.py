@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.cache import store
-from tractexp.domain import Domain, domain_of
+from tractexp.domain import Domain, find_domain
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.differences import divide_differences, replace_diverged, step_both_ways
@@ -200,12 +200,14 @@ class Context:
             self.prior,
             sorted(self.kernels.fixed.items()),
         )
-        return store.key(store.describe_environment(), repr(parts), self.records.window, *content)
+        return store.compute_key(
+            store.describe_environment(), repr(parts), self.records.window, *content
+        )
 
     @property
     def domain(self) -> Domain:
         """The domain that the load's equations are written for: phasors or waves."""
-        return domain_of(self.load)
+        return find_domain(self.load)
 
     @property
     def events(self) -> tuple[Event, ...]:

@@ -238,7 +238,7 @@ def run_descents(
         )
 
     wants = [(tuple(names), unit) for names, unit in wanted]
-    key = context.digest and store.key(context.digest, noise, wants, prior, effort)
+    key = context.digest and store.compute_key(context.digest, noise, wants, prior, effort)
     unit, deviance, simulations = store.DESCENTS.arrays(key, all_descended)
     # of what was made before, what it took then
     context.effort.spend(int(simulations) + spent - context.effort.total)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.errors import RefusedEffect
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.fit_problem import FitProblem
@@ -169,7 +169,7 @@ class Kernels:
         """Steps that the models need by which effects are tested, every effect at its null: some
         are stiff.
         """
-        domain = domain_of(self.family.model)
+        domain = find_domain(self.family.model)
         family = self.family
         if not domain.stiff:
             return 1

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.inference.differences import compute_central_differences
 from tractexp.inference.fit_problem import FitProblem
 from tractexp.inference.least_squares import Descent, descend
 from tractexp.inference.prior import compute_departures
 from tractexp.inference.problem import Problem
 from tractexp.inference.separable import Sensitivities
-from tractexp.noise.color import SMALLEST_DEVIATION, fit_autoregression, stretches
+from tractexp.noise.color import SMALLEST_DEVIATION, cut_stretches, fit_autoregression
 from tractexp.noise.model import Noise, Pair
 from tractexp.record import Event
 
@@ -31,7 +31,7 @@ def estimate_noise_before(event: Event) -> Pair:
     pair = []
     for quiet, level in zip(event.calm, event.levels, strict=True):
         color = fit_autoregression(
-            stretches(quiet, np.isfinite(quiet)), domain_of(event).quiet_order
+            cut_stretches(quiet, np.isfinite(quiet)), find_domain(event).quiet_order
         )
         pair.append(color.scale_noise(max(level, SMALLEST_DEVIATION) / color.deviation[0]))
     return tuple(pair)

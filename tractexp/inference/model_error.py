@@ -16,9 +16,9 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from tractexp.domain import Playback
-from tractexp.domain.playback import relative_error
+from tractexp.domain.playback import compute_relative_error
 from tractexp.inference.blocks import LENGTH, reach
-from tractexp.noise.random_walk import WANDERING_COSINES, without_drift, without_slow
+from tractexp.noise.random_walk import WANDERING_COSINES, remove_drift, remove_slow
 from tractexp.record import Event
 from tractexp.text.wording import join_words
 
@@ -133,7 +133,7 @@ def compute_relative_errors(played: Sequence[Playback]) -> tuple[float, float]:
     """epsilon_p and epsilon_q of Eq. (20) over some events together, as fractions."""
     measured = {c: np.concatenate([getattr(one.event.record, c) for one in played]) for c in "PQ"}
     calculated = {c: np.concatenate([getattr(one, c) for one in played]) for c in "PQ"}
-    epsilon_p, epsilon_q = (relative_error(measured[c], calculated[c]) for c in "PQ")
+    epsilon_p, epsilon_q = (compute_relative_error(measured[c], calculated[c]) for c in "PQ")
     return epsilon_p, epsilon_q
 
 
@@ -281,6 +281,6 @@ def estimate_noise_variance(event: Event) -> float:
     for row in event.calm:
         quiet = row[np.isfinite(row)]
         if len(quiet) > 4 * WANDERING_COSINES:
-            fast = without_slow(without_drift([quiet - quiet.mean()])[0])
+            fast = remove_slow(remove_drift([quiet - quiet.mean()])[0])
             total += float(np.sum(fast**2) / (len(quiet) - WANDERING_COSINES - 2))
     return total

@@ -17,8 +17,8 @@ from tractexp.inference.problem import Problem
 from tractexp.inference.separable import Sensitivities
 from tractexp.model.drive import Drive
 from tractexp.noise.model import Noise
-from tractexp.noise.quiet import louder
-from tractexp.noise.random_walk import walk_of_load, without_slow
+from tractexp.noise.quiet import is_louder
+from tractexp.noise.random_walk import find_load_walk, remove_slow
 from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
 
@@ -102,10 +102,10 @@ class Observed:
         after = [part for part in self.problem.quiet if part.stop not in starts]
         for c in np.flatnonzero(valid.any(axis=1)):
             calm, late = (
-                [without_slow(residuals[c, p][valid[c, p]]) for p in parts]
+                [remove_slow(residuals[c, p][valid[c, p]]) for p in parts]
                 for parts in (before, after)
             )
-            if louder(late, calm):
+            if is_louder(late, calm):
                 return before
         return self.problem.quiet
 
@@ -192,6 +192,6 @@ def estimate_noise(
         Where too few samples are quiet.
     """
     walk = functools.partial(
-        walk_of_load, records.events, records.drive, records.power, left, columns, valid
+        find_load_walk, records.events, records.drive, records.power, left, columns, valid
     )
     return records.domain.noise(residual, valid, quiet, *model, walk, input_errors)

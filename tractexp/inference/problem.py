@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.domain import Domain, domain_of
+from tractexp.domain import Domain, find_domain
 from tractexp.errors import MODEL, UserError, check_range
 from tractexp.inference.bounds import check_name, narrow_bounds
 from tractexp.inference.loss import REFUSED, Loss
@@ -16,7 +16,7 @@ from tractexp.inference.steps import Step, choose_steps, count_steps
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.model.parts import Effect
-from tractexp.noise.quiet import quiet_stretches
+from tractexp.noise.quiet import find_quiet_stretches
 from tractexp.noise.random_walk import Load
 from tractexp.parameter import Box, spread_evenly
 from tractexp.record import Event
@@ -277,7 +277,7 @@ class Problem:
     @property
     def domain(self) -> Domain:
         """The domain in which model and records are compared: phasors or waveforms."""
-        return domain_of(self.model)
+        return find_domain(self.model)
 
     @property
     def steady(self) -> list[slice]:
@@ -289,7 +289,7 @@ class Problem:
     @property
     def quiet(self) -> list[slice]:
         """The stretches of the drive in which little happens: what is left there is noise."""
-        return quiet_stretches(self.events, self.drive)
+        return find_quiet_stretches(self.events, self.drive)
 
     @property
     def power(self) -> Load:

@@ -11,7 +11,7 @@ from tractexp.domain.averaging import RECORDED
 from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
 from tractexp.record import Event, Window
-from tractexp.record.window import averaged_power, mean_weights, sharpen_voltage
+from tractexp.record.window import averaged_power, build_mean_weights, sharpen_voltage
 from tractexp.recording.estimator import list_estimators
 
 CYCLES = (1, 2, 3, 4, 5, 6)  # of the plain means
@@ -61,7 +61,7 @@ class RecorderWindow(Measurement):
     def weights(self, step: float) -> np.ndarray:
         """The weights (odd,) of samples `step` [s] apart around the middle one."""
         return (
-            mean_weights(self.window / step)
+            build_mean_weights(self.window / step)
             if self.shape is None
             else self.shape.compute_weights(step)
         )

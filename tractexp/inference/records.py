@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.errors import DATA, MODEL, UserError
 from tractexp.inference.recorder_window import RecorderWindow
 from tractexp.model.model import Model
@@ -59,7 +59,7 @@ class Records:
         -------
         Records
         """
-        driving = tuple(domain_of(e).smooth_event(e) for e in events)
+        driving = tuple(find_domain(e).smooth_event(e) for e in events)
         if window is not None:
             driving = tuple(replace(s, event=window.sharpen_event(s.event)) for s in driving)
         return cls(tuple(events), driving, window)

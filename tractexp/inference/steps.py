@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.errors import MODEL, UserError
 from tractexp.model.drive import Drive
 from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
@@ -83,7 +83,7 @@ def count_steps(model: Model, drive: Drive, events: Sequence[Event], candidates:
     -------
     int
     """
-    fine = domain_of(model).finest
+    fine = find_domain(model).finest
     until = _find_ends(model, events)
     return int(model.substeps(drive, candidates, fine, until=until)[0].max())
 
@@ -111,7 +111,7 @@ def choose_steps(
     UserError
         Where the finest step that is allowed leaves too large an error.
     """
-    domain = domain_of(model)
+    domain = find_domain(model)
     until = _find_ends(model, events)
     fine = domain.finest
     chosen, error = model.substeps(drive, probes, fine, share, until)
@@ -137,7 +137,7 @@ def choose_steps(
 def _find_ends(model: Model, events: Sequence[Event]) -> list[float]:
     """Seconds of each event, from its first sample on, in which the step is judged."""
     ends = [e.record.t[min(e.end, e.record.samples - 1)] - e.record.t[0] for e in events]
-    return [end + domain_of(model).aftermath for end in ends]
+    return [end + find_domain(model).aftermath for end in ends]
 
 
 def _find_lasting(

@@ -105,7 +105,7 @@ class Arrays:
         return INTEGERS[operation](a, b)
 
 
-def values_of(phase: Any, scope: dict[Any, np.ndarray], points: int) -> list[np.ndarray]:
+def evaluate_phase(phase: Any, scope: dict[Any, np.ndarray], points: int) -> list[np.ndarray]:
     """The values (points,) of a phase's expressions; nan and infinity where they have none."""
     from tractexp.kernel.expressions import Expressions
 

@@ -21,7 +21,7 @@ from tractexp.kernel.function import Function
 from tractexp.kernel.graph import Symbol
 from tractexp.kernel.kernel import PREFIX, Room
 from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH, VECTOR_LANES
-from tractexp.kernel.lowered import Lowered, symbols
+from tractexp.kernel.lowered import Lowered, collect_phase_symbols
 from tractexp.kernel.numbers import Numbers
 
 # of a step: how far the two stages in the middle go along a slope
@@ -47,7 +47,7 @@ Values = Mapping[Symbol, str]
 Samples = Callable[[str], str]  # an input by its name as a vector of the samples from one on
 
 
-def text(lowered: Lowered, title: str, integration: str, width: int = VECTOR_LANES) -> str:
+def write_kernel(lowered: Lowered, title: str, integration: str, width: int = VECTOR_LANES) -> str:
     """The kernel's IR, for vectors of `width` doubles. The same equations give the same text.
 
     Its second line tells the room that a call needs.
@@ -55,7 +55,7 @@ def text(lowered: Lowered, title: str, integration: str, width: int = VECTOR_LAN
     return _Emitter(lowered, integration, width).text(title)
 
 
-def _real(name: str) -> Symbol:
+def _make_real(name: str) -> Symbol:
     """A real symbol of that name."""
     return Symbol(name, real=True)
 
@@ -68,9 +68,10 @@ class _Emitter:
         named method.
         """
         self.lowered, self.half_way, self.width = lowered, HALF_WAY[integration], width
-        self.given = [*lowered.parameters, _real("P0"), _real("Q0")]
+        self.given = [*lowered.parameters, _make_real("P0"), _make_real("Q0")]
         self.used = {
-            name: symbols(getattr(lowered, name)) for name in ("derivative", "renewal", "output")
+            name: collect_phase_symbols(getattr(lowered, name))
+            for name in ("derivative", "renewal", "output")
         }
         sampled = self.used["renewal"] | self.used["output"]
         lane = [*self.given, *lowered.starts, *lowered.constants]
@@ -119,7 +120,7 @@ class _Emitter:
         phase = self.lowered.rest
         assert phase is not None
         scope = {
-            _real(s): lanes.everywhere(scalars.load(f.offset_address("%event", k)))
+            _make_real(s): lanes.everywhere(scalars.load(f.offset_address("%event", k)))
             for k, s in enumerate(EVENT)
         }
         memories = lowered.starts[len(lowered.states) :]
@@ -147,13 +148,12 @@ class _Emitter:
         memories = len(self.lowered.memories)
         states = len(self.lowered.states)
         self.copied = f.room(f"[{(len(self.given) + memories) * self.width} x double]")
-        self.solved = f.room(
-            f"[{(steady.room(states) + len(self.lowered.starts) + 1) * self.width} x double]"
-        )
+        vectors = steady.count_vectors(states) + len(self.lowered.starts) + 1
+        self.solved = f.room(f"[{vectors * self.width} x double]")
         with f.loop(0, "%events") as e:
             self.event_at = f.offset_address("%event", f.integer("mul", e, len(EVENT)))
             self.event = {
-                _real(s): scalars.part(f.offset_address(self.event_at, k), "")
+                _make_real(s): scalars.part(f.offset_address(self.event_at, k), "")
                 for k, s in enumerate(EVENT)
             }
             self.begin, self.end = f.count("%first", e), f.count("%first", f.integer("add", e, 1))
@@ -213,7 +213,7 @@ class _Emitter:
             return
         f, scalars, count = self.f, self.scalars, len(self.moving)
         per_sample = f.integer("mul", self.substeps, 2)
-        step = self.lanes.everywhere(self.event[_real("step")])
+        step = self.lanes.everywhere(self.event[_make_real("step")])
         event = {s: self.lanes.everywhere(value) for s, value in self.event.items()}
         with (
             f.loop(self.begin, self.end, self.width) as i,
@@ -396,7 +396,7 @@ class _Emitter:
         last = f.value(f"icmp eq i64 {f.integer('add', i, 1)}, {self.end}")
         steps = f.value(f"select i1 {last}, i64 1, i64 {self.substeps}")
         length = self.scalars.divide(
-            self.event[_real("step")], f.value(f"sitofp i64 {self.substeps} to double")
+            self.event[_make_real("step")], f.value(f"sitofp i64 {self.substeps} to double")
         )
         with f.loop(0, steps, always=True) as j:
             row = f.integer(

@@ -13,7 +13,7 @@ Basic = sympy.Basic
 Symbol = sympy.Symbol
 
 
-def nodes(expression: Basic) -> Iterator[Basic]:
+def walk_nodes(expression: Basic) -> Iterator[Basic]:
     """Each different part of an expression, itself first."""
     visited, waiting = {expression}, [expression]
     while waiting:
@@ -24,16 +24,16 @@ def nodes(expression: Basic) -> Iterator[Basic]:
         waiting += new
 
 
-def symbols_of(expression: Basic) -> set[Symbol]:
+def collect_symbols(expression: Basic) -> set[Symbol]:
     """The symbols that an expression is made of."""
-    return {part for part in nodes(expression) if isinstance(part, Symbol)}
+    return {part for part in walk_nodes(expression) if isinstance(part, Symbol)}
 
 
-def arguments(expression: sympy.Expr) -> tuple[sympy.Expr, ...]:
+def list_arguments(expression: sympy.Expr) -> tuple[sympy.Expr, ...]:
     """The arguments of an expression, which are expressions."""
     return expression.args  # pyright: ignore[reportReturnType] # SymPy calls them `Basic`, as those of a set are
 
 
-def operations(expression: Basic) -> int:
+def count_operations(expression: Basic) -> int:
     """How many operations compute an expression, each different part of it once."""
-    return sum(max(len(part.args) - 1, 1) for part in nodes(expression) if part.args)
+    return sum(max(len(part.args) - 1, 1) for part in walk_nodes(expression) if part.args)

@@ -56,7 +56,7 @@ class Kernel:
         """The compiled simulation, what has to live as long as it, and the address in memory of
         Newton's method, which it calls.
         """
-        code, newton = objects.load(self.text), objects.load(steady.text(self.room.width))
+        code, newton = objects.load(self.text), objects.load(steady.write_steady(self.room.width))
         return FUNCTION(code.address), (code, newton), newton.address
 
     def run(
@@ -127,13 +127,13 @@ class Kernel:
             _check("outputs", outputs, (room.outputs, n, samples))
         if started:
             _check("starts", starts, (events, room.starts, n))
-        lengths = _lengths(first.tolist(), substeps.tolist(), samples)
+        lengths = _list_lengths(first.tolist(), substeps.tolist(), samples)
         block, work, points, signals, space = self._space(n, lengths)
         arrays = (candidates, event, first, inputs, measured, weights, substeps, sums, miss)
-        further = _address(outputs) if stored else 0, _address(starts) if started else 0
+        further = _find_address(outputs) if stored else 0, _find_address(starts) if started else 0
         function, _, newton = self._machine_code
         function(
-            *map(_address, arrays),
+            *map(_find_address, arrays),
             *further,
             work,
             points,
@@ -190,7 +190,7 @@ class Kernel:
                 max(signals, room.signals * whole),
             )
         space = np.empty(work + points + signals + VECTOR // 8)
-        address = -(-_address(space) // VECTOR) * VECTOR
+        address = -(-_find_address(space) // VECTOR) * VECTOR
         return block, address, address + 8 * work, address + 8 * (work + points), space
 
 
@@ -207,7 +207,7 @@ def _check(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype 
     )
 
 
-def _address(array: np.ndarray) -> int:
+def _find_address(array: np.ndarray) -> int:
     """Where its first element lies; a third of the time that `array.ctypes` takes, where the array
     can be written.
     """
@@ -217,7 +217,7 @@ def _address(array: np.ndarray) -> int:
         return array.ctypes.data
 
 
-def _lengths(first: list[int], substeps: list[int], samples: int) -> list[tuple[int, int]]:
+def _list_lengths(first: list[int], substeps: list[int], samples: int) -> list[tuple[int, int]]:
     """Samples and steps a sample of each event. Raises `ValueError` where they point outside the
     arrays.
     """

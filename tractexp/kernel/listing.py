@@ -11,24 +11,24 @@ if TYPE_CHECKING:
 MOST_PRINTED_NODES = 500  # nodes of an expression: no one reads more
 
 
-def equations(lowered: "Lowered") -> Iterator[str]:
+def list_equations(lowered: "Lowered") -> Iterator[str]:
     """The equations as they were lowered, a line each, by when they are computed."""
-    yield from _phase("before the event", [f"{s}" for s in lowered.starts], lowered.start)
+    yield from _list_phase("before the event", [f"{s}" for s in lowered.starts], lowered.start)
     if lowered.rest is not None:
-        yield from _phase(
+        yield from _list_phase(
             "zero before the event", [f"balance {s}" for s in lowered.states], lowered.rest
         )
-    yield from _phase("over an event", [f"{s}" for s in lowered.constants], lowered.constant)
-    yield from _phase(
+    yield from _list_phase("over an event", [f"{s}" for s in lowered.constants], lowered.constant)
+    yield from _list_phase(
         "in each stage of a step", [f"d {s}/dt" for s in lowered.states], lowered.derivative
     )
-    yield from _phase(
+    yield from _list_phase(
         "at each sample, memories", [f"{s}" for s in lowered.memories], lowered.renewal
     )
-    yield from _phase("at each sample", list(lowered.outputs), lowered.output)
+    yield from _list_phase("at each sample", list(lowered.outputs), lowered.output)
 
 
-def _phase(when: str, names: Sequence[str], phase: "Phase") -> Iterator[str]:
+def _list_phase(when: str, names: Sequence[str], phase: "Phase") -> Iterator[str]:
     """The lines of one phase: what is computed there, by name."""
     if not phase.expressions:
         return

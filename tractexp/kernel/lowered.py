@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import sympy
 
-from tractexp.kernel.graph import Symbol, symbols_of
+from tractexp.kernel.graph import Symbol, collect_symbols
 
 Assignments = tuple[tuple[Symbol, sympy.Expr], ...]
 
@@ -41,7 +41,7 @@ class Lowered:
     outputs: tuple[str, ...]  # what its expressions are called
 
 
-def symbols(phase: Phase) -> set[Symbol]:
+def collect_phase_symbols(phase: Phase) -> set[Symbol]:
     """All symbols a phase reads or makes."""
     parts = (*phase.expressions, *(e for _, e in (*phase.steps, *phase.signals)))
-    return set[Symbol]().union(*map(symbols_of, parts))
+    return set[Symbol]().union(*map(collect_symbols, parts))

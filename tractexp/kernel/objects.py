@@ -10,7 +10,7 @@ import itertools
 import threading
 from typing import Any
 
-from tractexp.cache.store import CODE, key
+from tractexp.cache.store import CODE, compute_key
 from tractexp.kernel import target
 
 FUNCTIONS = ("run", "steady")  # what a text may define for callers, one each
@@ -33,37 +33,37 @@ def load(text: str) -> MachineCode:
     name = next(name for name in FUNCTIONS if f"define void @{name}(" in text)
     from llvmlite import binding as llvm
 
-    code = object_code(text)
+    code = load_object_code(text)
     with _one_at_a_time:
         library = (
             llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
         )
-        return MachineCode(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
+        return MachineCode(library.link(_choose_linker(), f"{name}_{next(_numbers)}"), name)
 
 
-def object_code(text: str) -> bytes:
+def load_object_code(text: str) -> bytes:
     """Object code of this IR, from the store or compiled and written there."""
-    return CODE.get(key(target.key(), text), lambda: machine_code(text))
+    return CODE.get(compute_key(target.compute_key(), text), lambda: compile_machine_code(text))
 
 
-def machine_code(text: str, machine: Any = None) -> bytes:
+def compile_machine_code(text: str, machine: Any = None) -> bytes:
     """Object code of IR, for this machine or another that LLVM knows.
 
     Of LLVM's passes over IR only the one that reorders sums and products is of use: the text has
     its common values once and its loops as they shall be.
     """
-    chosen = machine or target.machine()
+    chosen = machine or target.choose_machine()
     with _one_at_a_time:
-        return chosen.emit_object(_ready(text, chosen))
+        return chosen.emit_object(_prepare_module(text, chosen))
 
 
-def assembly(text: str) -> str:
+def write_assembly(text: str) -> str:
     """The machine code as assembly, for people and benchmarks to read."""
     with _one_at_a_time:
-        return target.machine().emit_assembly(_ready(text, target.machine()))
+        return target.choose_machine().emit_assembly(_prepare_module(text, target.choose_machine()))
 
 
-def _ready(text: str, machine: Any) -> Any:
+def _prepare_module(text: str, machine: Any) -> Any:
     """The module of a text, its passes made."""
     from llvmlite import binding as llvm
 
@@ -77,7 +77,7 @@ def _ready(text: str, machine: Any) -> Any:
 
 
 @functools.cache
-def _linker() -> Any:
+def _choose_linker() -> Any:
     """LLVM's linker that places all sections of an object in one piece of memory.
 
     Code finds its constants within 2 GB. The older linker places each section where the system has
@@ -85,4 +85,4 @@ def _linker() -> Any:
     """
     from llvmlite import binding as llvm
 
-    return llvm.create_lljit_compiler(target.machine(), use_jit_link=True)
+    return llvm.create_lljit_compiler(target.choose_machine(), use_jit_link=True)

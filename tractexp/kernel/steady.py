@@ -18,12 +18,12 @@ LARGEST_MISS = 1e6  # by which a steady state is missed
 ARGUMENTS = "ptr %rest, ptr %event, ptr %given, ptr %x, ptr %missed, ptr %work, i64 %n"
 
 
-def room(states: int) -> int:
+def count_vectors(states: int) -> int:
     """Vectors of work space that the method needs."""
     return states * (states + 2)
 
 
-def text(width: int) -> str:
+def write_steady(width: int) -> str:
     """IR of `@steady`: solves rest(event, given, x, balances) = 0 for n states x; `missed` is 0
     where it is solved.
 

@@ -59,7 +59,7 @@ class Stencil:
         description = get_text_of_module(
             self.expression.__module__,
             settings,
-            lambda: "\n".join(map(str, ir_of(self))),
+            lambda: "\n".join(map(str, write_ir(self))),
             "stencil",
         )
         first, last, text = description.split("\n", 2)
@@ -88,8 +88,8 @@ class Stencil:
         channels, count, samples = out.shape
         whole = (len(parts), channels, count)
         named = [shifts[name] for name in self.shifts] if isinstance(shifts, Mapping) else [shifts]
-        each = np.stack([_spread("shifts", shift, whole, WHOLE) for shift in named])
-        numbers = [_spread(name, given[name], whole, NUMBERS) for name in self.numbers]
+        each = np.stack([_broadcast("shifts", shift, whole, WHOLE) for shift in named])
+        numbers = [_broadcast(name, given[name], whole, NUMBERS) for name in self.numbers]
         for name in self.rows:
             _check(name, given[name], out.shape)
         for name in self.shared:
@@ -122,7 +122,7 @@ class Stencil:
         self._function[0](places.ctypes.data, each.ctypes.data, sizes.ctypes.data)
 
 
-def _spread(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype) -> np.ndarray:
+def _broadcast(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype) -> np.ndarray:
     """An array as large as `shape`, which it must fit."""
     try:
         return np.ascontiguousarray(np.broadcast_to(np.asarray(array, dtype=kind), shape))
@@ -142,7 +142,7 @@ def _check(name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
         )
 
 
-def ir_of(stencil: Stencil) -> tuple[int, int, str]:
+def write_ir(stencil: Stencil) -> tuple[int, int, str]:
     """The first and last sample that a stencil reads, counted from each one's own, and its IR for
     this machine.
     """
@@ -150,7 +150,7 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
 
     from tractexp.kernel.expressions import Expressions
     from tractexp.kernel.function import Function
-    from tractexp.kernel.graph import symbols_of
+    from tractexp.kernel.graph import collect_symbols
 
     elements: dict[Any, tuple[str, int, str]] = {}
 
@@ -165,7 +165,7 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
         for name in (*stencil.rows, *stencil.sums, *stencil.shared)
     }
     expression = stencil.expression(**arrays, **single)
-    used = symbols_of(expression)
+    used = collect_symbols(expression)
     elements = {symbol: element for symbol, element in elements.items() if symbol in used}
     f = Function()
     lanes, scalars = Numbers(f, VECTOR_LANES), Numbers(f, 1)

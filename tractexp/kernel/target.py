@@ -16,7 +16,7 @@ CHOICE, GENERIC = "TRACTEXP_CPU", "generic"
 
 
 @functools.cache
-def processor() -> tuple[str, str]:
+def describe_processor() -> tuple[str, str]:
     """LLVM's name of the processor and its features, as `+avx2,-avx512f,...`.
 
     Raises `UserError` where TRACTEXP_CPU is set to anything but `generic`.
@@ -30,20 +30,20 @@ def processor() -> tuple[str, str]:
 
 
 @functools.cache
-def machine() -> Any:
+def choose_machine() -> Any:
     """LLVM's target machine."""
     from llvmlite import binding as llvm
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    name, features = processor()
+    name, features = describe_processor()
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=name, features=features, opt=2, reloc="pic", codemodel="small"
     )
 
 
 @functools.cache
-def key() -> str:
+def compute_key() -> str:
     """All that object code hangs on beside its text: system, processor, features, and the versions
     of LLVM.
     """
@@ -51,5 +51,10 @@ def key() -> str:
     from llvmlite import binding as llvm
 
     return repr(
-        (llvm.get_process_triple(), processor(), llvm.llvm_version_info, llvmlite.__version__)
+        (
+            llvm.get_process_triple(),
+            describe_processor(),
+            llvm.llvm_version_info,
+            llvmlite.__version__,
+        )
     )

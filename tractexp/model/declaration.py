@@ -30,18 +30,18 @@ def declare_equations(
     """
     eq = Equations(domain)
     for what, part in (("motor", motor), ("static load", static)):
-        if why := _foreign(eq, part):
+        if why := _explain_foreign(eq, part):
             raise UserError(f"the {what} '{part.label}' does not go with domain={domain}: {why}")
     try:
-        _motor(eq, motor)
-        _static(eq, static)
+        _declare_motor(eq, motor)
+        _declare_static(eq, static)
     except Unfit as why:
         raise UserError(
             f"the motor '{motor.name}' and the static load '{static.name}' do not compose: {why}"
         ) from why
     for effect in effects:
         with _refuse(effect):
-            _effect(eq, effect)
+            _declare_effect(eq, effect)
     if not any(eq.outputs().values()):
         raise UserError(
             f"the {title} draw no power; choose a model/motor or a model/static other than 'none'"
@@ -62,19 +62,19 @@ def _refuse(effect: Effect) -> Iterator[None]:
         raise RefusedEffect(effect.name, str(why)) from why
 
 
-def _foreign(eq: Equations, part: Part) -> str:
+def _explain_foreign(eq: Equations, part: Part) -> str:
     """Why a part makes no sense in the equations' domain; "" where it does."""
     return part.phasors_only if eq.waves else part.waves_only
 
 
-def motor_alone(motor: Motor) -> Equations:
+def declare_motor_alone(motor: Motor) -> Equations:
     """The equations of a motor without load and effects."""
     eq = Equations()
-    _motor(eq, motor)
+    _declare_motor(eq, motor)
     return eq
 
 
-def _motor(eq: Equations, motor: Motor) -> None:
+def _declare_motor(eq: Equations, motor: Motor) -> None:
     """The motor draws V conj(I)."""
     eq.write("motor")
     there = len(eq.definitions)
@@ -97,7 +97,7 @@ def _motor(eq: Equations, motor: Motor) -> None:
     eq.consume(eq.place(sites.P_motor, re(drawn)), eq.place(sites.Q_motor, im(drawn)))
 
 
-def _static(eq: Equations, static: Static) -> None:
+def _declare_static(eq: Equations, static: Static) -> None:
     """The static load draws its law times what the other parts leave."""
     eq.write("static")
     own = eq.declare(static.parameters)
@@ -169,9 +169,9 @@ def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -
             )
 
 
-def _effect(eq: Equations, effect: Effect) -> None:
+def _declare_effect(eq: Equations, effect: Effect) -> None:
     """Raises `Unfit` with the reason where the effect makes no sense for the equations."""
-    if why := _foreign(eq, effect) or effect.refusal(eq):
+    if why := _explain_foreign(eq, effect) or effect.refusal(eq):
         raise Unfit(why)
     eq.write(effect.name)
     if not isinstance(effect, Measurement):

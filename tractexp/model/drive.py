@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.record.angle import integrate
-from tractexp.record.curve import slopes
+from tractexp.record.curve import compute_slopes
 
 PHASORS, WAVES = DOMAINS = ("phasors", "waves")
 OUTPUTS = {
@@ -79,7 +79,7 @@ class Excitation:
             [
                 self.U,
                 omega_s,
-                slopes(self.U) / self.step,
+                compute_slopes(self.U) / self.step,
                 absent if self.U2 is None else self.U2,
                 np.arange(len(self.U)) * self.step,
                 integrate(omega_s, self.step) if self.U_angle is None else self.U_angle,
@@ -150,12 +150,12 @@ class WaveformDrive:
         rows = [
             self.U,
             np.full(n, self.omega_s0),
-            slopes(self.U) / self.step,
+            compute_slopes(self.U) / self.step,
             self.U2,
             np.arange(n) * self.step,
             self.omega_s0 * np.arange(n) * self.step,
         ]
-        rates = (band_limited(y) / self.step for y in smooth)
+        rates = (differentiate_spline(y) / self.step for y in smooth)
         return np.stack([*rows, *smooth, *rates, self.turn.real, self.turn.imag])
 
     @property
@@ -164,7 +164,7 @@ class WaveformDrive:
         return self.currents
 
 
-def band_limited(y: np.ndarray) -> np.ndarray:
+def differentiate_spline(y: np.ndarray) -> np.ndarray:
     """The slope at each sample, per sample, of the cubic spline through them.
 
     What stands behind an anti-alias filter overshoots by itself: of negative sequence and of
@@ -182,7 +182,9 @@ def band_limited(y: np.ndarray) -> np.ndarray:
     """
     from scipy.interpolate import CubicSpline
 
-    return CubicSpline(np.arange(len(y)), y)(np.arange(len(y)), 1) if len(y) > 3 else slopes(y)
+    return (
+        CubicSpline(np.arange(len(y)), y)(np.arange(len(y)), 1) if len(y) > 3 else compute_slopes(y)
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ import sympy
 from sympy import I, conjugate, im, re
 
 from tractexp.errors import Unfit, Unknown, UserError, suggest_nearest
-from tractexp.kernel.graph import Symbol, symbols_of
+from tractexp.kernel.graph import Symbol, collect_symbols
 from tractexp.kernel.layout import EVENT, INPUTS, WAVE_INPUTS
 from tractexp.model import sites
 from tractexp.model.apart import Apart
@@ -25,9 +25,9 @@ from tractexp.model.real_form import RealForm, expand_definitions
 from tractexp.model.sites import Site
 from tractexp.model.states import UNSAID, Memory, Requirement, State
 from tractexp.model.symbols import is_real as _is_real
+from tractexp.model.symbols import make_real_symbol as _real
+from tractexp.model.symbols import make_vector_symbol as _complex
 from tractexp.model.symbols import phasor_parts, start_symbol
-from tractexp.model.symbols import real_symbol as _real
-from tractexp.model.symbols import vector_symbol as _complex
 from tractexp.parameter import Parameter
 
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
@@ -306,7 +306,7 @@ class Equations:
         whole = self.expand(expression, lambda s: s.name not in sites.SITES)
         real = {
             s
-            for s in symbols_of(whole)
+            for s in collect_symbols(whole)
             if s.name in sites.SITES and sites.SITES[s.name].kind == "real"
         }
         left: Any = whole.xreplace(
@@ -671,7 +671,7 @@ class Equations:
         """Raise `UserError` where a value before the event is written in what moves after it."""
         inputs = {self.U: "eq.U0", self.omega_s: "eq.omega_s0", self.U2: "eq.U20"}
         moving = {*map(_real, INPUTS), *self.states, *self.memories}
-        if stray := sorted(symbols_of(self.expand(expression)) & moving, key=str):
+        if stray := sorted(collect_symbols(self.expand(expression)) & moving, key=str):
             use = "".join(f"{inputs[s]} or " for s in stray if s in inputs)
             raise UserError(
                 f"{what} contains {stray[0]}, which moves; use {use}eq.evaluate_before(...)"
@@ -754,6 +754,6 @@ class Equations:
 
     def latex(self) -> list[str]:
         """The equations one a line: states, memories, named quantities, power, steady state."""
-        from tractexp.model.printed import lines
+        from tractexp.model.printed import print_lines
 
-        return lines(self)
+        return print_lines(self)

@@ -13,10 +13,10 @@ import numpy as np
 import sympy
 
 from tractexp.errors import UserError
-from tractexp.kernel.arrays import values_of
-from tractexp.kernel.graph import Symbol, arguments, symbols_of
+from tractexp.kernel.arrays import evaluate_phase
+from tractexp.kernel.graph import Symbol, collect_symbols, list_arguments
 from tractexp.kernel.layout import EVENT, INPUTS
-from tractexp.kernel.lowered import Lowered, Phase, symbols
+from tractexp.kernel.lowered import Lowered, Phase, collect_phase_symbols
 from tractexp.model.equations import Equations
 from tractexp.model.graph import replace_symbols
 
@@ -51,7 +51,7 @@ class _Hoister:
         """The symbols of an expression, those of each of its parts found once."""
         if e not in self._symbols:
             own = frozenset[Symbol]((e,) if isinstance(e, Symbol) else ())
-            self._symbols[e] = own.union(*map(self.symbols, arguments(e)))
+            self._symbols[e] = own.union(*map(self.symbols, list_arguments(e)))
         return self._symbols[e]
 
     def is_constant(self, e: sympy.Expr) -> bool:
@@ -83,7 +83,7 @@ class _Hoister:
     def _rewritten(self, e: sympy.Expr) -> sympy.Expr:
         """The rewritten form of an expression that was not met before."""
         if not isinstance(e, sympy.Expr):  # pyright: ignore[reportUnnecessaryIsInstance] # a piece, or its condition
-            return e.func(*map(self, arguments(e)))
+            return e.func(*map(self, list_arguments(e)))
         if self.is_constant(e):
             return self.constant(e)
         if self.is_signal(e):
@@ -94,12 +94,12 @@ class _Hoister:
             return self(sympy.exp(e.exp * sympy.log(e.base)))
         if isinstance(e, sympy.Add | sympy.Mul):
             return self._group_arguments(e)
-        return e.func(*map(self, arguments(e)))
+        return e.func(*map(self, list_arguments(e)))
 
     def _group_arguments(self, e: sympy.Expr) -> sympy.Expr:
         """A sum or product whose constant and whose sampled arguments are one symbol each."""
         constant, signal, rest = [], [], []
-        for argument in arguments(e):
+        for argument in list_arguments(e):
             if self.is_constant(argument):
                 constant.append(argument)
             elif self.is_signal(argument):
@@ -121,25 +121,25 @@ def lower(eq: Equations) -> Lowered:
     states = tuple(symbol for symbol, _, _ in rows)
     memories = tuple(eq.memories)
     starts = tuple(eq.real_starts())
-    parameters = tuple(map(_symbol, eq.parameters))
+    parameters = tuple(map(_make_symbol, eq.parameters))
     lane = {*parameters, eq.P0, eq.Q0, *starts}
-    event = tuple(map(_symbol, EVENT))
-    inputs = tuple(map(_symbol, INPUTS))
+    event = tuple(map(_make_symbol, EVENT))
+    inputs = tuple(map(_make_symbol, INPUTS))
 
     hoist = _Hoister(lane, set(event), set(inputs))
     steps = {symbol: eq.real(e) for symbol, e in eq.steps.items()}
-    derivative = _phase(hoist, [d for _, d, _ in rows], steps)
-    renewal = _phase(hoist, [eq.real(m.renewal) for m in eq.memories.values()], steps)
+    derivative = _build_phase(hoist, [d for _, d, _ in rows], steps)
+    renewal = _build_phase(hoist, [eq.real(m.renewal) for m in eq.memories.values()], steps)
     outputs = eq.outputs()
-    output = _phase(hoist, [eq.real(e) for e in outputs.values()], steps)
+    output = _build_phase(hoist, [eq.real(e) for e in outputs.values()], steps)
     first = [i for _, _, i in rows] + [eq.real(m.initial) for m in eq.memories.values()]
     begin = dict(zip(starts, first, strict=True))
     slack = [replace_symbols(eq.expand(r.slack), begin) for r in eq.requirements]
-    start = _phase(None, first + slack)
+    start = _build_phase(None, first + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
-    balances = _phase(None, [replace_symbols(b, at_rest) for b in eq.real_balances()])
+    balances = _build_phase(None, [replace_symbols(b, at_rest) for b in eq.real_balances()])
     phases = (derivative, renewal, output)
-    read = {eq.v}.union(*map(symbols, phases))
+    read = {eq.v}.union(*map(collect_phase_symbols, phases))
     used = tuple(s for s in inputs if s in read)
     lowered = Lowered(
         parameters,
@@ -151,7 +151,7 @@ def lower(eq: Equations) -> Lowered:
         start,
         balances,
         tuple(hoist.constants.values()),
-        _phase(None, list(hoist.constants)),
+        _build_phase(None, list(hoist.constants)),
         *phases,
         tuple(outputs),
     )
@@ -173,11 +173,11 @@ def _is_steady_state_exact(
     ranges = {**{name: p.bounds for name, p in eq.parameters.items()}, **EVENTS}
     low, high = np.array([*ranges.values()]).T
     drawn = np.random.default_rng(0).uniform(low, high, (TRIES, len(ranges))).T
-    given = {_symbol(name): values for name, values in zip(ranges, drawn, strict=True)}
-    values = values_of(start, given, TRIES)
+    given = {_make_symbol(name): values for name, values in zip(ranges, drawn, strict=True)}
+    values = evaluate_phase(start, given, TRIES)
     first = values[: len(starts)]
     slacks = values[len(starts) :]
-    balances = values_of(rest, given | dict(zip(starts, first, strict=True)), TRIES)
+    balances = evaluate_phase(rest, given | dict(zip(starts, first, strict=True)), TRIES)
     finite = np.isfinite(np.array([*first, *slacks, *balances])).all(axis=0)
     admissible = finite & (np.array([np.ones(TRIES), *slacks]) >= 0).all(axis=0)
     points = np.flatnonzero(admissible)[:POINTS]
@@ -185,7 +185,7 @@ def _is_steady_state_exact(
     return len(points) == POINTS and bool((missed < BALANCE_ROUNDING).all())
 
 
-def _phase(
+def _build_phase(
     hoist: _Hoister | None,
     expressions: list[sympy.Expr],
     steps: Mapping[Symbol, sympy.Expr] | None = None,
@@ -197,7 +197,7 @@ def _phase(
     expressions = [*needed.values(), *expressions]
     if hoist is not None:
         expressions = [hoist(e) for e in expressions]
-        used = set().union(*map(symbols_of, expressions))
+        used = set().union(*map(collect_symbols, expressions))
         signals = tuple((s, e) for e, s in hoist.signals.items() if s in used)
     computed = [*zip(targets, expressions, strict=False)]
     return Phase(signals, _sort_assignments(computed), tuple(expressions[len(targets) :]))
@@ -208,10 +208,10 @@ def _select_needed_steps(
 ) -> dict[Symbol, sympy.Expr]:
     """The steps that some expressions need, and those that these need in turn."""
     needed: set[Symbol] = set()
-    new = set().union(*map(symbols_of, expressions)) & steps.keys()
+    new = set().union(*map(collect_symbols, expressions)) & steps.keys()
     while new:
         needed |= new
-        new = set().union(*(symbols_of(steps[s]) for s in new)) & steps.keys() - needed
+        new = set().union(*(collect_symbols(steps[s]) for s in new)) & steps.keys() - needed
     return {symbol: e for symbol, e in steps.items() if symbol in needed}
 
 
@@ -223,7 +223,7 @@ def _sort_assignments(
     ordered = []
     while waiting:
         open_symbols = {s for s, _ in waiting}
-        ready = [(s, e) for s, e in waiting if not symbols_of(e) & open_symbols]
+        ready = [(s, e) for s, e in waiting if not collect_symbols(e) & open_symbols]
         ordered += ready
         waiting = [(s, e) for s, e in waiting if s not in {r for r, _ in ready}]
     return tuple(ordered)
@@ -243,13 +243,13 @@ def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
         if phase is None:
             continue
         own = {*lowered.constants, *(s for s, _ in (*phase.steps, *phase.signals))}
-        if stray := symbols(phase) - defined - own:
+        if stray := collect_phase_symbols(phase) - defined - own:
             raise UserError(
                 f"the equations use {', '.join(sorted(map(str, stray)))}, which no part of the"
                 " model declares"
             )
 
 
-def _symbol(name: str) -> Symbol:
+def _make_symbol(name: str) -> Symbol:
     """A real symbol of that name."""
     return Symbol(name, real=True)

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from tractexp.errors import Unfit
-from tractexp.kernel.graph import symbols_of
+from tractexp.kernel.graph import collect_symbols
 from tractexp.model.equations import Equations
 from tractexp.model.parts import Effect, Measurement, Part
-from tractexp.model.symbols import real_symbol
+from tractexp.model.symbols import make_real_symbol
 from tractexp.text.wording import join_words
 
 # {what Python says where numbers are computed of symbols: how to mend it}
@@ -59,7 +59,7 @@ def check_size_used(eq: Equations, effect: Effect) -> None:
     """
     if isinstance(effect, Measurement):
         return
-    used = set().union(*map(symbols_of, eq.list_expressions()))
+    used = set().union(*map(collect_symbols, eq.list_expressions()))
     sizes = [p.name for p in effect.parameters if p.null is not None]
-    if not any(real_symbol(name) in used for name in sizes):
+    if not any(make_real_symbol(name) in used for name in sizes):
         raise Unfit(f"its size {join_words(sizes)} is in no equation, so that it changes nothing")

@@ -229,10 +229,10 @@ class Model:
 
     def _written(self) -> str:
         """The text of its kernel."""
-        from tractexp.kernel.emit import text
+        from tractexp.kernel.emit import write_kernel
         from tractexp.model.lowering import lower
 
-        return text(lower(self.equations), self.title, self.integration)
+        return write_kernel(lower(self.equations), self.title, self.integration)
 
     @functools.cached_property
     def kernel(self) -> Kernel:
@@ -241,14 +241,14 @@ class Model:
 
     def compile(self) -> None:
         """Have the kernel in the cache."""
-        objects.object_code(self.source)
+        objects.load_object_code(self.source)
 
     def format_listing(self) -> str:
         """The kernel for people to read: the equations as they were lowered, and the IR."""
-        from tractexp.kernel.listing import equations
+        from tractexp.kernel.listing import list_equations
         from tractexp.model.lowering import lower
 
-        return "\n".join([*equations(lower(self.equations)), "", self.source])
+        return "\n".join([*list_equations(lower(self.equations)), "", self.source])
 
     listing = format_listing  # its name in version 0.2
 

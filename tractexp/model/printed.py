@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 BEFORE_EVENT = "|_0"  # ends the LaTeX of a value before the event
 
 
-def lines(eq: "Equations") -> list[str]:
+def print_lines(eq: "Equations") -> list[str]:
     """The equations one a line: states, memories, named quantities, what is drawn, steady state."""
     moving = (*eq.states, *eq.memories)
     starts = {start_symbol(s): f"{{{eq.latex_names[s]}}}{BEFORE_EVENT}" for s in moving}

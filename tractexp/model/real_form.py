@@ -7,9 +7,9 @@ from typing import Any
 import sympy
 from sympy import I
 
-from tractexp.kernel.graph import Symbol, nodes, operations, symbols_of
-from tractexp.model.graph import halves, replace_symbols, split_real_imag
-from tractexp.model.symbols import is_real, phasor_parts, real_symbol, start_symbol
+from tractexp.kernel.graph import Symbol, collect_symbols, count_operations, walk_nodes
+from tractexp.model.graph import replace_symbols, split_halves, split_real_imag
+from tractexp.model.symbols import is_real, make_real_symbol, phasor_parts, start_symbol
 
 MOST_EXPANDED_NODES = 300  # nodes of an expression
 Halves = tuple[sympy.Expr, sympy.Expr]
@@ -23,7 +23,7 @@ def expand_definitions(
     """The expression with the defined symbols that are `named` (by default all) replaced by what
     they stand for.
     """
-    while names := {s for s in symbols_of(expression) & definitions.keys() if named(s)}:
+    while names := {s for s in collect_symbols(expression) & definitions.keys() if named(s)}:
         expression = replace_symbols(expression, {s: definitions[s] for s in names})
     return expression
 
@@ -75,9 +75,9 @@ class RealForm:
         whole = expand_definitions(expression, self.definitions, lambda s: not s.is_real)
         lowered = replace_symbols(whole, self._complex_states())
         if is_real(lowered):
-            both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
+            both = (lowered if lowered.is_real else _choose_shorter(lowered), sympy.Integer(0))
         else:
-            both = map(_shorter, split_real_imag(lowered))
+            both = map(_choose_shorter, split_real_imag(lowered))
         real, imaginary = (replace_symbols(e, self._map_real_names(e)) for e in both)
         return real, imaginary
 
@@ -85,7 +85,7 @@ class RealForm:
         """Every name, real or complex, is lowered by itself."""
         pairs = {
             s: phasor_parts(s)
-            for s in symbols_of(expression) & self.definitions.keys()
+            for s in collect_symbols(expression) & self.definitions.keys()
             if not s.is_real
         }
         lowered = replace_symbols(
@@ -95,16 +95,17 @@ class RealForm:
         for s, pair in pairs.items():
             values |= zip(pair, self.parts(self.definitions[s]), strict=True)
         real, imaginary = (
-            replace_symbols(_shorter(e), values | self._map_real_names(e)) for e in halves(lowered)
+            replace_symbols(_choose_shorter(e), values | self._map_real_names(e))
+            for e in split_halves(lowered)
         )
         return real, imaginary
 
     def _map_real_names(self, expression: sympy.Expr) -> dict[Symbol, sympy.Expr]:
         """The expressions that the real names in an expression stand for."""
-        return {s: self.real(s) for s in symbols_of(expression) & self.definitions.keys()}
+        return {s: self.real(s) for s in collect_symbols(expression) & self.definitions.keys()}
 
 
-def _shorter(expression: sympy.Expr) -> sympy.Expr:
+def _choose_shorter(expression: sympy.Expr) -> sympy.Expr:
     """The expression or its expansion, whichever has fewer operations: products of phasors cancel
     when expanded.
 
@@ -115,13 +116,15 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
         return expression
     if not any(
         isinstance(part, sympy.Mul | sympy.Pow) and any(a.is_Add for a in part.args)
-        for part in nodes(expression)
+        for part in walk_nodes(expression)
     ):
         return expression
-    extremes = [part for part in nodes(expression) if isinstance(part, sympy.Max | sympy.Min)]
-    hidden: dict[Any, Any] = {part: real_symbol(f"_extreme{k}") for k, part in enumerate(extremes)}
+    extremes = [part for part in walk_nodes(expression) if isinstance(part, sympy.Max | sympy.Min)]
+    hidden: dict[Any, Any] = {
+        part: make_real_symbol(f"_extreme{k}") for k, part in enumerate(extremes)
+    }
     # SymPy compares the arguments of a maximum for seconds
     plain: Any = expression.xreplace(hidden)
     expanded = plain.expand(power_exp=False, power_base=False, log=False, basic=False)
-    chosen: Any = min(plain, expanded, key=operations)
+    chosen: Any = min(plain, expanded, key=count_operations)
     return chosen.xreplace({symbol: part for part, symbol in hidden.items()})

@@ -15,7 +15,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.kernel.stencil import Stencil
-from tractexp.record.change import runs
+from tractexp.record.change import find_runs
 
 HIGHEST_ORDER = 16
 SMALLEST_DEVIATION = 1e-9  # pu: stands for the noise of a record that has none
@@ -88,7 +88,7 @@ class Autoregression:
         parts = [slice(0, len(valid))] if len(valid) else []
         if not valid.all():
             out[..., ~valid] = 0.0
-            parts = runs(valid)
+            parts = find_runs(valid)
         if parts:
             self._whiten(np.atleast_2d(rows), parts, np.atleast_2d(out))
         return out
@@ -230,10 +230,10 @@ def fit_autoregression(
     price = np.log(max(count, 2)) if sparing else 2 * count / np.maximum(count - orders - 2, 1)
     criterion = count * np.log(variance) + (orders + 1) * price
     order = int(np.argmin(criterion))
-    return of_orders(table[: order + 1], variance)
+    return build_from_orders(table[: order + 1], variance)
 
 
-def of_orders(
+def build_from_orders(
     table: Sequence[np.ndarray], variance: np.ndarray | Sequence[float]
 ) -> Autoregression:
     """The autoregression of tabulated predictors.
@@ -256,12 +256,12 @@ def of_orders(
     return Autoregression(coefficients, np.sqrt(variance[: len(table)]))
 
 
-def stretches(values: np.ndarray, valid: np.ndarray) -> list[np.ndarray]:
+def cut_stretches(values: np.ndarray, valid: np.ndarray) -> list[np.ndarray]:
     """The parts of `values` (N,) between gaps, where `valid` (N,) is true.
 
     Examples
     --------
-    >>> [part.tolist() for part in stretches(np.arange(4), np.array([True, False, True, True]))]
+    >>> [part.tolist() for part in cut_stretches(np.arange(4), np.array([True, False, True, True]))]
     [[0], [2, 3]]
     """
-    return [values[part] for part in runs(valid)]
+    return [values[part] for part in find_runs(valid)]

@@ -174,8 +174,8 @@ class Noise:
             return valid
         if self.channels > 2 and drive.events > 1:
             parts = [valid[:, part] for part in drive.parts]
-            return np.concatenate([_all_measured(part) for part in parts], axis=1)
-        return _all_measured(valid)
+            return np.concatenate([_find_all_measured(part) for part in parts], axis=1)
+        return _find_all_measured(valid)
 
     def draw(self, rng: np.random.Generator, count: int, lengths: Sequence[int]) -> np.ndarray:
         """Draws of the noise.
@@ -357,7 +357,7 @@ class Noise:
             return None
         if event not in self._shrunk:
             shapes = self._shapes(part, event)
-            self._shrunk[event] = _shrunk(
+            self._shrunk[event] = _decompose_shapes(
                 self._whiten_fast_noise(shapes, valid, event, np.empty_like(shapes))
             )
         return self._shrunk[event]
@@ -399,13 +399,13 @@ class Noise:
         )
 
 
-def _all_measured(valid: np.ndarray) -> np.ndarray:
+def _find_all_measured(valid: np.ndarray) -> np.ndarray:
     """The samples (C, n) at which all channels count that are measured at all."""
     measured = np.any(valid, axis=1)
     return np.all(valid[measured], axis=0) & measured[:, None]
 
 
-def _shrunk(shapes: np.ndarray) -> Shrunk:
+def _decompose_shapes(shapes: np.ndarray) -> Shrunk:
     """Right singular vectors of shapes (k, C, n) that are seen, and 1 - (1 + s²)^(-1/2) of their
     singular values s.
 

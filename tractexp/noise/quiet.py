@@ -16,7 +16,7 @@ from tractexp.noise.color import (
     white_noise,
 )
 from tractexp.noise.model import Noise
-from tractexp.noise.random_walk import RandomWalk, without_slow
+from tractexp.noise.random_walk import RandomWalk, remove_slow
 from tractexp.record import Event
 
 # Order of the autoregressions: noise behind an average over ten samples, which phasors of one cycle
@@ -34,7 +34,7 @@ LOUDER = 1e-3  # p below which the end of a record is louder than its beginning
 QUANTILES = 20_000  # that stand for a law
 
 
-def quiet_stretches(events: Sequence[Event], drive: Drive) -> list[slice]:
+def find_quiet_stretches(events: Sequence[Event], drive: Drive) -> list[slice]:
     """The samples in which little happens.
 
     Parameters
@@ -108,19 +108,19 @@ def estimate(
     mix[np.ix_(measured, measured)] = own
     slow = random_walk(mix)
     if slow is not None:
-        fast = [[without_slow(p) for p in channel] for channel in fast]
+        fast = [[remove_slow(p) for p in channel] for channel in fast]
     # Sparing, because a color that is not there changes the weight of slow differences, which every
     # effect makes.
     fitted = [fit_autoregression(channel, HIGHEST_NOISE_ORDER, sparing=True) for channel in fast]
     shocks = None
     if count >= FEWEST_EMPIRICAL_SAMPLES and measured.all():
-        shocks = tuple(map(_shocks, fitted, fast))
+        shocks = tuple(map(_collect_shocks, fitted, fast))
     colors = iter(fitted)
     pair = tuple(next(colors) if there else white_noise(1.0) for there in measured)
     return Noise((pair,), mix, shocks, slow, input_modes)
 
 
-def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray]) -> bool:
+def is_louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray]) -> bool:
     """Whether stretches of a channel are louder than calm ones by more than chance explains.
 
     An F test, with as many samples as tell of the slowest of each one's color.
@@ -139,18 +139,18 @@ def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray]) -> bool:
     --------
     >>> rng = np.random.default_rng(1)
     >>> calm, loud = rng.standard_normal(200), 3 * rng.standard_normal(200)
-    >>> louder([loud], [calm]), louder([calm], [calm])
+    >>> is_louder([loud], [calm]), is_louder([calm], [calm])
     (True, False)
     """
     from scipy.special import fdtrc
 
     if not (late and calm):
         return False
-    (a, n), (b, m) = (_variance(pieces) for pieces in (late, calm))
+    (a, n), (b, m) = (_measure_variance(pieces) for pieces in (late, calm))
     return bool(fdtrc(n, m, a / max(b, SMALLEST_DEVIATION**2)) < LOUDER)
 
 
-def _variance(pieces: Sequence[np.ndarray]) -> tuple[float, float]:
+def _measure_variance(pieces: Sequence[np.ndarray]) -> tuple[float, float]:
     """The variance [pu²] of stretches, and the number of independent samples that it is worth."""
     count = sum(map(len, pieces))
     color = fit_autoregression(
@@ -161,7 +161,7 @@ def _variance(pieces: Sequence[np.ndarray]) -> tuple[float, float]:
     )
 
 
-def _shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray:
+def _collect_shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray:
     """What the past of a channel does not predict, centered and scaled to unit variance.
 
     Of heavy tails the quiet samples show less than follows after the dip: there the quantiles of
@@ -171,11 +171,11 @@ def _shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray
         [channel.whiten(p, np.ones(len(p), dtype=bool))[channel.order :] for p in pieces]
     )
     unit = (white - white.mean()) / max(float(white.std()), 1e-300)
-    heavy = _heavy(unit)
+    heavy = _find_heavy_tails(unit)
     return unit if heavy is None else heavy
 
 
-def _heavy(unit: np.ndarray) -> np.ndarray | None:
+def _find_heavy_tails(unit: np.ndarray) -> np.ndarray | None:
     """Quantiles of unit variance of the most likely Student's t of samples (n,), where it is
     clearly likelier than the normal distribution; else None.
     """
@@ -188,11 +188,11 @@ def _heavy(unit: np.ndarray) -> np.ndarray | None:
     normal = -(np.log(2 * np.pi) + unit**2).sum() / 2
     if 2 * (likely.max() - normal) < LEAST_QUIET_GAIN:
         return None
-    return _quantiles(float(DEGREES[likely.argmax()]))
+    return _compute_quantiles(float(DEGREES[likely.argmax()]))
 
 
 @functools.cache
-def _quantiles(freedom: float) -> np.ndarray:
+def _compute_quantiles(freedom: float) -> np.ndarray:
     """Quantiles of Student's t, of unit variance; once for each of `DEGREES`, since draws estimate
     their noise anew.
     """

@@ -181,7 +181,7 @@ class RandomWalk:
             Cosines, scaled by the standard deviation of their amplitudes.
         """
         n = part.stop - part.start
-        walk = _random_walk(n, self.step, min(MODES, n // 8))
+        walk = _compute_walk_modes(n, self.step, min(MODES, n // 8))
         level, power = mix @ self.load.before[event], mix @ self.load.power[:, part]
         whole = max(abs(level[0]), LEAST_LEVEL_SHARE * float(np.linalg.norm(level)))
         together = np.sqrt(self.intensity[0]) / whole * walk[:, None] * power
@@ -241,23 +241,28 @@ def find(
     if not stretches:
         return None
     fast = [
-        fit_autoregression([without_slow(s[c]) for s in stretches], sparing=True) for c in (0, 1)
+        fit_autoregression([remove_slow(s[c]) for s in stretches], sparing=True) for c in (0, 1)
     ]
-    total = np.array([_likelihood([s[c] for s in stretches], fast[c], step) for c in (0, 1)])
+    total = np.array(
+        [_compute_likelihoods([s[c] for s in stretches], fast[c], step) for c in (0, 1)]
+    )
     total -= total[:, :1]
-    most = [_last(row) for row in total]
+    most = [_find_last(row) for row in total]
     walk = RandomWalk(GRID[most], step, load)
     if 2 * total.max() >= LEAST_WANDERING:
         return walk
     rest = np.array(
-        [sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)]
+        [
+            sum(_compute_rest_likelihoods(r, c, fast[c], step) for r in rests) * np.ones(len(GRID))
+            for c in (0, 1)
+        ]
     )
     both = total + rest - rest[:, :1]
     gained = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
     return walk if gained >= 2 * LEAST_WANDERING else None
 
 
-def walk_of_load(
+def find_load_walk(
     events: Sequence[Event],
     drive: Drive,
     load: Load,
@@ -304,27 +309,27 @@ def walk_of_load(
     return find(stretches, events[0].record.step, load, rests)
 
 
-def _last(likelihood: np.ndarray) -> int:
+def _find_last(likelihood: np.ndarray) -> int:
     """The position of the largest intensity whose log-likelihood is within `LESS` of the
     largest.
     """
     return int(np.flatnonzero(likelihood > likelihood.max() - LESS)[-1])
 
 
-def without_slow(stretch: np.ndarray) -> np.ndarray:
+def remove_slow(stretch: np.ndarray) -> np.ndarray:
     """A stretch (n,) without its mean and its three slowest cosines."""
-    basis = np.vstack([np.ones(len(stretch)), cosines(len(stretch), WANDERING_COSINES)])
+    basis = np.vstack([np.ones(len(stretch)), compute_cosines(len(stretch), WANDERING_COSINES)])
     basis /= np.linalg.norm(basis, axis=1, keepdims=True)
     return project_out(stretch, basis)
 
 
-def without_drift(stretches: Sequence[np.ndarray]) -> list[np.ndarray]:
+def remove_drift(stretches: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Stretches (n_i,) without the slope that they share: a load that drifts does so in every
     event.
 
     Examples
     --------
-    >>> [left.round(6).tolist() for left in without_drift([np.array([1.0, 2.0, 3.0])])]
+    >>> [left.round(6).tolist() for left in remove_drift([np.array([1.0, 2.0, 3.0])])]
     [[2.0, 2.0, 2.0]]
     """
     times = [np.arange(len(s)) - (len(s) - 1) / 2 for s in stretches]
@@ -332,7 +337,7 @@ def without_drift(stretches: Sequence[np.ndarray]) -> list[np.ndarray]:
     return [s - slope * t for t, s in zip(times, stretches, strict=True)]
 
 
-def cosines(samples: int, count: int) -> np.ndarray:
+def compute_cosines(samples: int, count: int) -> np.ndarray:
     """Cosines of half a wave over a stretch, a whole one, and so on.
 
     Parameters
@@ -347,7 +352,7 @@ def cosines(samples: int, count: int) -> np.ndarray:
 
     Examples
     --------
-    >>> rows = cosines(50, 3)
+    >>> rows = compute_cosines(50, 3)
     >>> np.allclose(rows @ rows.T, np.eye(3))
     True
     """
@@ -355,24 +360,32 @@ def cosines(samples: int, count: int) -> np.ndarray:
     return np.sqrt(2 / samples) * np.cos(angle)
 
 
-def _random_walk(samples: int, step: float, count: int) -> np.ndarray:
+def _compute_walk_modes(samples: int, step: float, count: int) -> np.ndarray:
     """Modes (count, samples) of a random walk that gains a variance of one in a second."""
     return (
-        np.sqrt(step) * samples / np.pi / np.arange(1, count + 1)[:, None] * cosines(samples, count)
+        np.sqrt(step)
+        * samples
+        / np.pi
+        / np.arange(1, count + 1)[:, None]
+        * compute_cosines(samples, count)
     )
 
 
-def _likelihood(stretches: Sequence[np.ndarray], fast: Autoregression, step: float) -> np.ndarray:
+def _compute_likelihoods(
+    stretches: Sequence[np.ndarray], fast: Autoregression, step: float
+) -> np.ndarray:
     """Logarithm of the likelihood of each intensity of the grid in stretches (n_i,) of
     one channel.
     """
     total = np.zeros(len(GRID))
-    for stretch in without_drift(stretches):
+    for stretch in remove_drift(stretches):
         total += _compute_log_likelihood(stretch, np.ones((1, len(stretch))), fast, step)
     return total
 
 
-def _within(rest: EventRest, channel: int, fast: Autoregression, step: float) -> np.ndarray:
+def _compute_rest_likelihoods(
+    rest: EventRest, channel: int, fast: Autoregression, step: float
+) -> np.ndarray:
     """The logarithm of the likelihood of each intensity of the grid in what is left of one event,
     without what its columns explain.
     """
@@ -393,7 +406,7 @@ def _compute_log_likelihood(
     amplitude.
     """
     n, k = len(stretch), len(columns)
-    modes = _random_walk(n, step, min(MODES, n // 8)) * profile
+    modes = _compute_walk_modes(n, step, min(MODES, n // 8)) * profile
     rows = fast.whiten(np.vstack([columns, stretch, modes]), np.ones(n, dtype=bool))
     return Walk.from_stretch(
         rows[k], compute_basis(rows[:k], LEAST_DIRECTION_SHARE), rows[k + 1 :]

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.noise.random_walk import Walk, cosines
+from tractexp.noise.random_walk import Walk, compute_cosines
 from tractexp.record import Event
-from tractexp.record.change import runs
+from tractexp.record.change import find_runs
 
 HALF_WIDTHS = (1, 2, 3, 5, 8)  # samples of the averages that must agree where the voltage is smooth
 AGREE = 2.5  # standard deviations within which they do
@@ -72,22 +72,22 @@ def smooth_voltage(event: Event) -> SmoothedEvent:
         With no errors where the voltage has less than `SILENT` [pu] of noise.
     """
     U = event.record.U
-    deviation = noise_of(event.record.U[event.steady])
+    deviation = estimate_voltage_noise(event.record.U[event.steady])
     if deviation < SILENT:
         return SmoothedEvent(event, np.empty((0, len(U))))
-    rough = _edges(U, deviation)
+    rough = _find_edges(U, deviation)
     rough[[event.start, min(event.end, len(U) - 1)]] = True
     rough = _widen_rough_stretches(rough)
     while True:
         smooth = U.copy()
         errors = []
-        for part in runs(~rough):
-            curve, own = _curve(U[part], deviation)
+        for part in find_runs(~rough):
+            curve, own = _fit_curve(U[part], deviation)
             smooth[part] = curve
             errors.append(np.zeros((len(own), len(U))))
             errors[-1][:, part] = own
         far = (
-            _distance(U - smooth, deviation)
+            _measure_distance(U - smooth, deviation)
             / np.where(_widen_rough_stretches(rough), BESIDE, BOUND)
             * ~rough
         )
@@ -104,7 +104,7 @@ def smooth_voltage(event: Event) -> SmoothedEvent:
     )
 
 
-def noise_of(U: np.ndarray) -> float:
+def estimate_voltage_noise(U: np.ndarray) -> float:
     """The standard deviation [pu] of white noise on a smooth voltage (n,), from its third
     differences.
 
@@ -112,14 +112,14 @@ def noise_of(U: np.ndarray) -> float:
     --------
     >>> t = np.linspace(0, 1, 2000)
     >>> noise = 0.001 * np.random.default_rng(1).standard_normal(len(t))
-    >>> round(noise_of(1 - 0.2 * t**2 + noise), 4)
+    >>> round(estimate_voltage_noise(1 - 0.2 * t**2 + noise), 4)
     0.001
     """
     third = np.diff(U, 3)
     return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20)) if len(third) else 0.0
 
 
-def _edges(U: np.ndarray, deviation: float) -> np.ndarray:
+def _find_edges(U: np.ndarray, deviation: float) -> np.ndarray:
     """Where the voltage (N,) moves faster than averages can follow."""
     index = np.arange(len(U))
     sums = np.concatenate(([0.0], np.cumsum(U)))
@@ -140,13 +140,13 @@ def _widen_rough_stretches(rough: np.ndarray) -> np.ndarray:
     smoothed.
     """
     wide = np.convolve(rough, np.ones(2 * EDGE_MARGIN + 1), "same") > 0.5
-    for part in runs(~wide):
+    for part in find_runs(~wide):
         if part.stop - part.start < SHORTEST_SMOOTHED_STRETCH:
             wide[part] = True
     return wide
 
 
-def _distance(left: np.ndarray, deviation: float) -> np.ndarray:
+def _measure_distance(left: np.ndarray, deviation: float) -> np.ndarray:
     """How far the worst average around each sample of what is left (N,) is from zero, in standard
     deviations.
     """
@@ -157,7 +157,7 @@ def _distance(left: np.ndarray, deviation: float) -> np.ndarray:
     return far / deviation
 
 
-def _curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
+def _fit_curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
     """The likeliest curve through a stretch (n,), and its errors (k, n) of one standard deviation
     each.
     """
@@ -165,7 +165,7 @@ def _curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
     fixed = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, n), DEGREE))[0].T
     count = min(COSINES, n // 8)
     walk = Walk.from_stretch(
-        U / deviation, fixed, cosines(n, count) / np.arange(1, count + 1)[:, None] ** 2
+        U / deviation, fixed, compute_cosines(n, count) / np.arange(1, count + 1)[:, None] ** 2
     )
     share = walk.share(float(STIFF[walk.likelihood(STIFF).argmax()]))
     curve = (U @ fixed.T) @ fixed + deviation * ((walk.along * share) @ walk.basis)

@@ -15,8 +15,8 @@ import numpy as np
 from tractexp.noise.color import (
     SMALLEST_DEVIATION,
     Autoregression,
+    build_from_orders,
     check_count,
-    of_orders,
     white_noise,
 )
 from tractexp.noise.model import Noise
@@ -31,7 +31,7 @@ FLOORS = np.geomspace(1.0, 0.01, 28)  # of the current's own noise over all that
 FINER = np.geomspace(FLOORS[1], 1 / FLOORS[1], 15)  # times the best of these
 
 
-def of_waves(
+def estimate_wave_noise(
     residuals: np.ndarray,
     valid: np.ndarray,
     quiet: Sequence[slice],
@@ -85,7 +85,7 @@ def _fit_wave_noise(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoreg
     """
     per = 2 if np.iscomplexobj(pieces[0]) else 1
     level = max(np.sqrt(np.mean(np.abs(np.concatenate(pieces)) ** 2) / per), SMALLEST_DEVIATION)
-    passed = covariances(answer, HIGHEST_WAVE_ORDER)
+    passed = compute_covariances(answer, HIGHEST_WAVE_ORDER)
     if per == 1:
         passed = np.real(passed)
     shares = SHARES if passed[0].real > (1e-3 * level) ** 2 else (0.0,)
@@ -94,7 +94,7 @@ def _fit_wave_noise(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoreg
         whole = share**2 * passed
         whole[0] += (floor * level) ** 2
         color = solve_levinson(whole)
-        price = sum(_surprise(color, piece, per) for piece in pieces) - LEAST_WAVE_GAIN * (
+        price = sum(_measure_surprise(color, piece, per) for piece in pieces) - LEAST_WAVE_GAIN * (
             share == 1.0
         )
         return price, share, floor, color
@@ -108,7 +108,7 @@ def _fit_wave_noise(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoreg
     return best[3]
 
 
-def _surprise(color: Autoregression, piece: np.ndarray, per: int) -> float:
+def _measure_surprise(color: Autoregression, piece: np.ndarray, per: int) -> float:
     """Minus twice the log-likelihood of a stretch (n,) whose samples have `per` components, up to a
     constant.
     """
@@ -117,7 +117,7 @@ def _surprise(color: Autoregression, piece: np.ndarray, per: int) -> float:
     return float(np.sum(np.abs(white) ** 2) + 2 * per * errors.sum())
 
 
-def covariances(answer: np.ndarray, highest: int) -> np.ndarray:
+def compute_covariances(answer: np.ndarray, highest: int) -> np.ndarray:
     """The covariances of noise that is the sum of answers to unit shocks.
 
     Parameters
@@ -134,7 +134,7 @@ def covariances(answer: np.ndarray, highest: int) -> np.ndarray:
 
     Examples
     --------
-    >>> covariances(np.array([1.0, 0.5]), 2).tolist()
+    >>> compute_covariances(np.array([1.0, 0.5]), 2).tolist()
     [1.25, 0.5, 0.0]
     """
     padded = np.concatenate([answer, np.zeros(highest)])
@@ -170,4 +170,4 @@ def solve_levinson(covariance: np.ndarray) -> Autoregression:
         table.append(np.concatenate([last - reflection * last[::-1].conj(), [reflection]]))
         variance.append(variance[-1] * max(1 - abs(reflection) ** 2, 1e-12))
     order = int(np.argmax(np.array(variance) <= GAINED * variance[-1]))
-    return of_orders(table[: order + 1], variance)
+    return build_from_orders(table[: order + 1], variance)

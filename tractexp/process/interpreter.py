@@ -18,7 +18,7 @@ def build_command(*arguments: str) -> list[str]:
 
 
 @contextlib.contextmanager
-def safe_path() -> Iterator[None]:
+def keep_safe_path() -> Iterator[None]:
     """Within, every Python that this process starts, by whatever package, leaves the current folder
     out.
     """

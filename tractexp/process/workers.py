@@ -141,7 +141,7 @@ class Workers:
         from joblib import parallel_config
 
         with contextlib.ExitStack() as stack:
-            stack.enter_context(interpreter.safe_path())
+            stack.enter_context(interpreter.keep_safe_path())
             if self.backend == "dask":
                 from tractexp.compat.joblib_dask import Dask
 

@@ -9,9 +9,9 @@ from tractexp.record.own_base import OwnBase as OwnBase
 from tractexp.record.own_base import rebase_events as rebase_events
 from tractexp.record.reader import Events as Events
 from tractexp.record.reader import Reader as Reader
-from tractexp.record.reader import endings as endings
+from tractexp.record.reader import find_reader as find_reader
+from tractexp.record.reader import list_endings as list_endings
 from tractexp.record.reader import read_records as read_records
-from tractexp.record.reader import reader_of as reader_of
 from tractexp.record.record import Base as Base
 from tractexp.record.record import Record as Record
 from tractexp.record.wave_event import WaveEvent as WaveEvent

@@ -7,11 +7,11 @@ import numpy as np
 from tractexp.cache.provenance import hash_record
 from tractexp.record.change import (
     CHANGED,
-    clause,
+    describe_change,
     describe_power_change,
     fill_gaps,
     load_changes,
-    smear,
+    measure_smear,
 )
 from tractexp.record.record import Record
 
@@ -31,11 +31,11 @@ def cut_at_change(record: Record, start: int, end: int, S: complex) -> Record:
     """
     if S.real <= 0:
         return record
-    cycle, least = smear(record), max(FEWEST_AFTER, round(AFTER * record.rate))
+    cycle, least = measure_smear(record), max(FEWEST_AFTER, round(AFTER * record.rate))
     for change in load_changes(record.U[start:], record.P[start:], record.Q[start:], cycle):
         if start + change.first < end + cycle or abs(change.after - S) <= abs(change.before - S):
             continue
-        what, at = clause(record, start, change), start + change.first
+        what, at = describe_change(record, start, change), start + change.first
         if at - end >= least:
             return _cut_aftermath(record, at, what)
         said = (
@@ -52,7 +52,7 @@ def _cut_where_load_goes(record: Record, first: int, S: complex, U: float) -> Re
     """
     size = np.abs(fill_gaps(record.P) + 1j * fill_gaps(record.Q))[first:]
     gone = (size < LOST * abs(S)) & (record.U[first:] > U)
-    n = max(1, round(smear(record)))
+    n = max(1, round(measure_smear(record)))
     if len(size) < 2 * n or gone[:n].any() or not gone[-n:].all():
         return record
     stop = int(np.argmax(gone))
@@ -73,7 +73,7 @@ def _cut_aftermath(record: Record, at: int, why: str) -> Record:
     )
 
 
-def loss(record: Record, end: int, S: complex) -> list[str]:
+def describe_loss(record: Record, end: int, S: complex) -> list[str]:
     """A sentence on a load that has less than half of its power `S`, P + jQ, left after a dip; []
     of any other.
     """

@@ -81,7 +81,7 @@ def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> l
     return list(_find_steps(before, after, size, answer, (CHANGED, LARGEST_USUAL_CHANGE), n))
 
 
-def voltage_changes(U: np.ndarray, cycle: float) -> list[Change]:
+def find_voltage_changes(U: np.ndarray, cycle: float) -> list[Change]:
     """The steps of a voltage (N,) of more than 1 %, where `cycle` samples are a cycle."""
     n = max(1, round(cycle))
     low, high = _average_sides(U.astype(complex), n)
@@ -124,7 +124,7 @@ def _find_steps(
     beside = np.maximum(apart[: -4 * n], apart[4 * n :])
     enough = max(least[0], least[1] * float(np.percentile(change, 25)))
     steps = (change - answer > enough) & (change > ABRUPT_CHANGE_RATIO * beside)
-    for run in runs(steps):
+    for run in find_runs(steps):
         k = run.start + int(np.argmax(np.abs(after - before)[run]))
         earlier, later = (
             before[max(k - (STAYS[0] - 1) * n, 0) : k + 1 : n],
@@ -134,7 +134,7 @@ def _find_steps(
             yield Change(k + n, k + 2 * n, complex(before[k]), complex(after[k]))
 
 
-def runs(mask: np.ndarray, least: int = 1) -> list[slice]:
+def find_runs(mask: np.ndarray, least: int = 1) -> list[slice]:
     """The unbroken stretches in which a mask is true.
 
     Parameters
@@ -150,7 +150,7 @@ def runs(mask: np.ndarray, least: int = 1) -> list[slice]:
 
     Examples
     --------
-    >>> runs(np.array([True, True, False, True]), least=2)
+    >>> find_runs(np.array([True, True, False, True]), least=2)
     [slice(0, 2, None)]
     """
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int))).tolist()
@@ -180,7 +180,7 @@ def _find_greatest(S: np.ndarray) -> float:
     return max(float(np.percentile(np.abs(S), 95)), 1e-300)
 
 
-def smear(record: Record) -> float:
+def measure_smear(record: Record) -> float:
     """The number of samples that a step is smeared over: a cycle, or the window of the phasors
     where that is longer.
     """
@@ -188,7 +188,7 @@ def smear(record: Record) -> float:
     return max(1 / record.base.frequency, length) * record.rate
 
 
-def clause(record: Record, begin: int, change: Change) -> str:
+def describe_change(record: Record, begin: int, change: Change) -> str:
     """A clause on a step of the load, whose samples count from sample `begin` of the record."""
     name = "is switched off" if change.ratio < SMALL_LOAD_SHARE else "changes"
     when = record.t[begin + (change.first + change.stop) // 2]

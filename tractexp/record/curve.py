@@ -3,7 +3,7 @@
 import numpy as np
 
 
-def slopes(y: np.ndarray) -> np.ndarray:
+def compute_slopes(y: np.ndarray) -> np.ndarray:
     """The slope at each sample of a smooth curve through them, which does not overshoot.
 
     Between samples the kernel reads the voltage off the cubics that these slopes define. A straight
@@ -26,7 +26,7 @@ def slopes(y: np.ndarray) -> np.ndarray:
 
     Examples
     --------
-    >>> slopes(np.array([0.0, 1.0, 2.0, 3.0])).round(9).tolist()
+    >>> compute_slopes(np.array([0.0, 1.0, 2.0, 3.0])).round(9).tolist()
     [1.0, 1.0, 1.0, 1.0]
     """
     if len(y) < 3:

@@ -11,7 +11,7 @@ import numpy as np
 from tractexp.cache.provenance import hash_record
 from tractexp.errors import DATA, UserError
 from tractexp.record.direction import OUTWARD, explain_negative_power
-from tractexp.record.event import Event, detect, steady
+from tractexp.record.event import Event, detect, find_steady_part
 from tractexp.record.fall import find_dips
 from tractexp.record.reader import Events
 from tractexp.record.record import GREATEST_CURRENT, SIZES, Record
@@ -159,7 +159,7 @@ def level(record: Record) -> tuple[float, float]:
     """Voltage and apparent power, in the record's units, before its first dip; of all of it where
     there is none.
     """
-    before = steady(record)
+    before = find_steady_part(record)
     P, Q = (values[before][np.isfinite(values[before])] for values in (record.P, record.Q))
     S = float(np.hypot(P.mean(), Q.mean())) if len(P) and len(Q) else 0.0
     return float(record.U[before].mean()), S
@@ -190,7 +190,7 @@ def signs(record: Record) -> list[str]:
     Raises `UserError` for a load that is counted out of itself for certain.
     """
     calm = np.zeros(record.samples, bool)
-    calm[steady(record)] = True
+    calm[find_steady_part(record)] = True
     P, Q = (
         float(np.nanmedian(x[calm])) if np.isfinite(x[calm]).any() else 0.0
         for x in (record.P, record.Q)

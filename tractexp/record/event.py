@@ -9,12 +9,12 @@ import numpy as np
 
 from tractexp.cache.provenance import hash_record
 from tractexp.errors import UserError
-from tractexp.record.aftermath import cut_at_change, loss
+from tractexp.record.aftermath import cut_at_change, describe_loss
 from tractexp.record.direction import explain_negative_power
-from tractexp.record.fall import FEWEST_BEFORE, STEADY, falls
+from tractexp.record.fall import FEWEST_BEFORE, STEADY, find_falls
 from tractexp.record.no_dip import explain_no_dip, explain_no_such_dip
 from tractexp.record.record import Record
-from tractexp.record.steadiness import is_at_rest, steady_part
+from tractexp.record.steadiness import is_at_rest, keep_steady_part
 from tractexp.record.swing import Swing, find_swing
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ class Event:
         return self.record.rate
 
 
-def noise(t: np.ndarray, values: np.ndarray) -> float:
+def estimate_noise(t: np.ndarray, values: np.ndarray) -> float:
     """The standard deviation of values about their least-squares line.
 
     Parameters
@@ -157,7 +157,7 @@ def detect(record: Record) -> Event:
         interruption, an open pole and a step are refused by their names, and so is a load that
         steps right before the dip.
     """
-    dips, swells = falls(record.t, record.U)
+    dips, swells = find_falls(record.t, record.U)
     if not dips:
         raise UserError(explain_no_dip(record))
     start, end = dips[0]
@@ -172,7 +172,7 @@ def detect(record: Record) -> Event:
     unfinished = end == record.samples
     end = min(end, record.samples - 1)
     usual = _find_steady(record, start, swells)
-    before, notes = steady_part(record, usual, _count_least_samples(record))
+    before, notes = keep_steady_part(record, usual, _count_least_samples(record))
     if before.start > usual.start:  # what was before is another state, which is not fitted
         first = before.start
         start, end, before = start - first, end - first, slice(0, before.stop - first)
@@ -189,7 +189,7 @@ def detect(record: Record) -> Event:
     swing = find_swing(record, before)
     notes += [f"before the dip {swing}, which counts as noise"] if swing else []
     notes += [_tell_unfinished(record, start)] if unfinished else []
-    if notes := [*notes, *loss(record, end, complex(P0, Q0))]:
+    if notes := [*notes, *describe_loss(record, end, complex(P0, Q0))]:
         record = replace(record, notes=tuple(dict.fromkeys([*record.notes, *notes])))
     record = cut_at_change(record, start, end, complex(P0, Q0))
     return Event(
@@ -201,9 +201,9 @@ def detect(record: Record) -> Event:
         P0=P0,
         Q0=Q0,
         f0=record.base.frequency if record.f is None else float(record.f[before].mean()),
-        noise_U=noise(t, U),
-        noise_P=noise(t, P),
-        noise_Q=noise(t, Q),
+        noise_U=estimate_noise(t, U),
+        noise_P=estimate_noise(t, P),
+        noise_Q=estimate_noise(t, Q),
         steady=before,
         dips=len(dips),
         swing=swing,
@@ -221,15 +221,17 @@ def _tell_unfinished(record: Record, start: int) -> str:
     )
 
 
-def steady(record: Record) -> slice:
+def find_steady_part(record: Record) -> slice:
     """The samples of the steady state before the first dip; all where there is none, or too little
     before it.
     """
-    dips, swells = falls(record.t, record.U)
+    dips, swells = find_falls(record.t, record.U)
     start = dips[0][0] if dips else 0
     if start < FEWEST_BEFORE:
         return slice(0, record.samples)
-    return steady_part(record, _find_steady(record, start, swells), _count_least_samples(record))[0]
+    return keep_steady_part(
+        record, _find_steady(record, start, swells), _count_least_samples(record)
+    )[0]
 
 
 def _count_least_samples(record: Record) -> int:

@@ -20,7 +20,7 @@ CERTAIN = 0.02
 NEAR_TRIGGER = 60.0  # s: a trigger that comes later says nothing of the record's first voltage
 
 
-def starting_level(
+def find_starting_level(
     t: np.ndarray, levels: np.ndarray, limits: np.ndarray, most: int, trigger: float | None = None
 ) -> np.ndarray:
     """The levels (K,) of voltages (K, N) at times t (N,) [s] from which the first event leaves, by
@@ -91,16 +91,18 @@ def find_dips(t: np.ndarray, U: np.ndarray, trigger: float | None = None) -> lis
     list of (int, int)
         First sample, and the first one after the dip: N where it never recovers.
     """
-    return falls(t, U, trigger)[0]
+    return find_falls(t, U, trigger)[0]
 
 
-def falls(
+def find_falls(
     t: np.ndarray, U: np.ndarray, trigger: float | None = None
 ) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
     """(dips, swells) of a voltage (N,), both as (start, end) sample numbers."""
-    margin = margin_of(U)
+    margin = choose_margin(U)
     block = max(FEWEST_BEFORE, round(0.1 * (len(t) - 1) / float(t[-1] - t[0])))
-    reference = float(starting_level(t, U[None], np.array([margin]), FEWEST_BEFORE, trigger)[0])
+    reference = float(
+        find_starting_level(t, U[None], np.array([margin]), FEWEST_BEFORE, trigger)[0]
+    )
     within = max(1, round(SUDDEN * (len(t) - 1) / float(t[-1] - t[0])))
     dips: list[tuple[int, int]] = []
     swells: list[tuple[int, int]] = []
@@ -214,7 +216,7 @@ def measure_growing_medians(x: np.ndarray) -> np.ndarray:
     return (ordered[:, at, at // 2] + ordered[:, at, (at + 1) // 2]) / 2
 
 
-def margin_of(U: np.ndarray) -> float:
+def choose_margin(U: np.ndarray) -> float:
     """The share of the reference by which a voltage (N,) must fall to be in a dip.
 
     A voltage that is gone has no noise to exceed.

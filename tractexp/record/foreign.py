@@ -51,7 +51,7 @@ FOREIGN = {
 }
 
 
-def sentence(path: str | Path) -> str:
+def describe_foreign_file(path: str | Path) -> str:
     """The sentence on a file of a listed foreign ending: what it is and how to convert it; "" for
     other endings.
     """

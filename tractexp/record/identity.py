@@ -114,7 +114,7 @@ class Identity:
         return "; ".join([*self.parts, *self.unknown])
 
 
-def distinct(identities: Iterable[Identity]) -> list[Identity]:
+def list_distinct(identities: Iterable[Identity]) -> list[Identity]:
     """The recordings that records are from, each once, in their order."""
     recordings: list[Identity] = []
     for one in identities:
@@ -127,7 +127,7 @@ def describe_identities(identities: Iterable[Identity]) -> list[str]:
     """The recordings in words, each once; what is unknown of several is said once, with those it
     concerns.
     """
-    recordings = distinct(identities)
+    recordings = list_distinct(identities)
     unknown = [one for one in recordings if one.unknown]
     if len(unknown) < 2:
         return [*map(str, recordings)]
@@ -140,15 +140,15 @@ def label(identities: Iterable[Identity]) -> str:
     return " and ".join(dict.fromkeys(filter(None, (one.label for one in identities))))
 
 
-def title(identities: Iterable[Identity], names: Iterable[str]) -> str:
+def compose_title(identities: Iterable[Identity], names: Iterable[str]) -> str:
     """The title of a page: station and load, where these are known, and the records' own names."""
     return ": ".join(filter(None, (label(identities), ", ".join(names))))
 
 
-def title_of(records: Iterable[Record]) -> str:
+def compose_title_of_records(records: Iterable[Record]) -> str:
     """The title of a page about records at hand, as `title` makes it."""
     records = list(records)
-    return title(map(Identity.from_record, records), (record.name for record in records))
+    return compose_title(map(Identity.from_record, records), (record.name for record in records))
 
 
 def _describe_sizes(base: Base, in_mva: bool) -> dict[str, Any]:

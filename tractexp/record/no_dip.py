@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tractexp.record.change import smear
-from tractexp.record.fall import FEWEST_BEFORE, SHALLOWEST, margin_of
+from tractexp.record.change import measure_smear
+from tractexp.record.fall import FEWEST_BEFORE, SHALLOWEST, choose_margin
 from tractexp.record.record import DEAD_VOLTAGE_SHARE, Record
 
 OPEN_POLE = 0.25  # of the voltage: negative sequence of an open pole, of a fault as well
@@ -25,7 +25,7 @@ def explain_no_such_dip(record: Record, start: int, end: int) -> str:
     before = float(U[:start].mean())
     inside = U[start:end]
     lowest, when = float(inside.min()), f"at t = {t[start]:g} s"
-    if _current_stays(record, start, end):
+    if _does_current_stay(record, start, end):
         return (
             f"the voltage falls to {lowest:.3g} {when} while the current stays as it was: a fuse of"
             " the voltage transformers, or their wiring, and no dip of the network; choose another"
@@ -61,11 +61,11 @@ def explain_no_such_dip(record: Record, start: int, end: int) -> str:
     return ""
 
 
-def _current_stays(record: Record, start: int, end: int) -> bool:
+def _does_current_stay(record: Record, start: int, end: int) -> bool:
     """Whether a voltage that is gone, or unbalanced for longer than a fault lasts, leaves the
     current as it was.
     """
-    edge = max(1, round(smear(record)))
+    edge = max(1, round(measure_smear(record)))
     inside, before = (
         slice(start + edge, end - edge * (end < record.samples)),
         slice(max(0, start - 10 * edge), start),
@@ -95,7 +95,7 @@ def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
     """
     t, U = record.t, record.U
     fall = 1 - float(np.median(U[start:])) / before
-    level = np.abs(U[start:] / float(np.median(U[start:])) - 1) <= margin_of(U)
+    level = np.abs(U[start:] / float(np.median(U[start:])) - 1) <= choose_margin(U)
     lasts = float(t[-1] - t[start])
     if fall <= LARGEST_TAP_STEP and lasts >= STEP_LASTS and level.mean() > 0.8:
         return (
@@ -115,7 +115,7 @@ def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
 def explain_no_dip(record: Record) -> str:
     """Why a record holds no dip, in a sentence with what its voltage does instead."""
     U, t = record.U, record.t
-    reference, margin = float(np.median(U[:FEWEST_BEFORE])), margin_of(U)
+    reference, margin = float(np.median(U[:FEWEST_BEFORE])), choose_margin(U)
     if reference <= 0:
         return (
             f"{record.where}: there is no dip: the voltage starts at zero; give a record of a live"

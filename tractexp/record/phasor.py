@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 TURN = np.exp(2j * np.pi / 3)  # the operator a of symmetrical components
 
 
-def sequences(phases: np.ndarray) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def compute_sequences(phases: np.ndarray) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """The positive and the negative sequence of three phases.
 
     Parameters
@@ -31,7 +31,7 @@ def sequences(phases: np.ndarray) -> tuple[NDArray[np.complex128], NDArray[np.co
     Examples
     --------
     >>> a = np.exp(-2j * np.pi / 3)
-    >>> positive, negative = sequences(np.array([[1.0], [a], [a**2]]))
+    >>> positive, negative = compute_sequences(np.array([[1.0], [a], [a**2]]))
     >>> abs(positive).round(9).tolist(), abs(negative).round(9).tolist()
     ([1.0], [0.0])
     """
@@ -39,11 +39,11 @@ def sequences(phases: np.ndarray) -> tuple[NDArray[np.complex128], NDArray[np.co
     return (a + TURN * b + TURN**2 * c) / 3, (a + TURN**2 * b + TURN * c) / 3
 
 
-def symmetrical(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def compute_symmetrical(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The positive and negative sequence (N,) of phasors (3, N); of a single phase (1, N) itself
     and zero.
     """
-    return sequences(X) if len(X) == 3 else (X[0], np.zeros_like(X[0]))
+    return compute_sequences(X) if len(X) == 3 else (X[0], np.zeros_like(X[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,22 +78,22 @@ class Phasors:
     @property
     def V1(self) -> NDArray[np.complex128]:
         """Positive-sequence voltage (M,) [kV]; of a single-phase load its voltage."""
-        return symmetrical(self.V)[0]
+        return compute_symmetrical(self.V)[0]
 
     @property
     def V2(self) -> NDArray[np.complex128]:
         """Negative-sequence voltage (M,) [kV]; zero for a single-phase load."""
-        return symmetrical(self.V)[1]
+        return compute_symmetrical(self.V)[1]
 
     @property
     def I1(self) -> NDArray[np.complex128]:
         """Positive-sequence current (M,) [kA]; of a single-phase load its current."""
-        return symmetrical(self.I)[0]
+        return compute_symmetrical(self.I)[0]
 
     @property
     def I2(self) -> NDArray[np.complex128]:
         """Negative-sequence current (M,) [kA]; zero for a single-phase load."""
-        return symmetrical(self.I)[1]
+        return compute_symmetrical(self.I)[1]
 
     @property
     def S(self) -> NDArray[np.complex128]:

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.record.phasor import Phasors, symmetrical
+from tractexp.record.phasor import Phasors, compute_symmetrical
 
 SLOWEST, FASTEST = 0.9, 1.1  # of the nominal frequency: what is tracked
 SMOOTHED = 4.0  # cycles, over which a tracked frequency is
@@ -43,7 +43,9 @@ class Averager:
     means: Means
 
 
-def cycle_means(y: np.ndarray, rate: float, frequency: np.ndarray, at: np.ndarray) -> np.ndarray:
+def compute_cycle_means(
+    y: np.ndarray, rate: float, frequency: np.ndarray, at: np.ndarray
+) -> np.ndarray:
     """Means over one cycle, to a fraction of a sample: the two end samples have
     fractional weights.
     """
@@ -63,7 +65,7 @@ def one_cycle(rate: float, nominal: float) -> Averager:
     Its reach is that of a cycle of the lowest frequency that is tracked. `rate` is that of the
     samples and `nominal` the network's frequency, both in Hz.
     """
-    return Averager(int(rate / (SLOWEST * nominal) / 2 + 0.5) + 1, cycle_means)
+    return Averager(int(rate / (SLOWEST * nominal) / 2 + 0.5) + 1, compute_cycle_means)
 
 
 def make_weighted_averager(weights: np.ndarray) -> Averager:
@@ -85,7 +87,7 @@ def make_weighted_averager(weights: np.ndarray) -> Averager:
     return Averager(reach, means)
 
 
-def frame(f: np.ndarray, rate: float) -> np.ndarray:
+def turn_frame(f: np.ndarray, rate: float) -> np.ndarray:
     """The angle of a frame that turns at given frequencies.
 
     Parameters
@@ -102,18 +104,18 @@ def frame(f: np.ndarray, rate: float) -> np.ndarray:
 
     Examples
     --------
-    >>> (frame(np.full(3, 50.0), 100.0) / np.pi).tolist()
+    >>> (turn_frame(np.full(3, 50.0), 100.0) / np.pi).tolist()
     [0.0, 1.0, 2.0]
     """
     return np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) * np.pi / rate)])
 
 
-def fundamental(
+def measure_fundamental(
     x: np.ndarray,
     rate: float,
     frequency: float | np.ndarray,
     at: np.ndarray,
-    means: Means = cycle_means,
+    means: Means = compute_cycle_means,
     harmonics: Sequence[int] = (),
 ) -> np.ndarray:
     """The RMS phasors of a waveform.
@@ -147,12 +149,12 @@ def fundamental(
     --------
     >>> t = np.arange(400) / 4000
     >>> x = 10 * np.sqrt(2) * np.cos(2 * np.pi * 48 * t + 0.5)
-    >>> X = fundamental(x, 4000, 48.0, np.array([200]))
+    >>> X = measure_fundamental(x, 4000, 48.0, np.array([200]))
     >>> np.abs(X).round(3).tolist(), np.angle(X).round(3).tolist()
     ([10.0], [0.5])
     """
     f = np.broadcast_to(np.asarray(frequency, dtype=float), x.shape[-1])
-    angle = frame(f, rate)
+    angle = turn_frame(f, rate)
     phasors = []
     for h in harmonics or (1,):
         turn = np.exp(-1j * h * angle)
@@ -200,8 +202,8 @@ def track(voltages: np.ndarray, rate: float, nominal: float, least: float = 0.0)
     at = np.arange(reach, n - reach, every)
     f = np.full(n, nominal)
     for _ in range(PASSES):
-        V1 = symmetrical(fundamental(voltages, rate, f, at))[0]
-        angle = np.unwrap(np.angle(V1)) + frame(f, rate)[at]
+        V1 = compute_symmetrical(measure_fundamental(voltages, rate, f, at))[0]
+        angle = np.unwrap(np.angle(V1)) + turn_frame(f, rate)[at]
         speed = _measure_speed(angle, np.abs(V1) < least, half) * rate / every / (2 * np.pi)
         f = np.interp(
             np.arange(n),
@@ -301,8 +303,8 @@ def measure(
         x = waves[:, first:stop]
         f = tracked[a] = tracked[a] if a in tracked else track(x[:K], rate, nominal, least=least)
         here = at[(at >= a) & (at < b)] - first
-        turned = frame(f, rate)
-        X = fundamental(x, rate, f, here, over.means, (1, *harmonics))
+        turned = turn_frame(f, rate)
+        X = measure_fundamental(x, rate, f, here, over.means, (1, *harmonics))
         X *= np.exp(1j * np.array([1, *harmonics])[:, None, None] * (turned[a - first] - angle))
         angle += turned[min(b, n - 1) - first] - turned[a - first]
         if skew is not None:

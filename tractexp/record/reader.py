@@ -109,7 +109,7 @@ def read_records(data: Mapping[str, Any]) -> Events:
         return reader.read()
 
 
-def reader_of(path: str, *join: str) -> type[Any]:
+def find_reader(path: str, *join: str) -> type[Any]:
     """The reader of a file, or of the files of one event: by the ending and, where several share
     it, by what is inside.
 
@@ -132,7 +132,7 @@ def reader_of(path: str, *join: str) -> type[Any]:
 
     Examples
     --------
-    >>> reader_of("station.cfg").name
+    >>> find_reader("station.cfg").name
     'comtrade'
     """
     ending = Path(path).suffix.lower()
@@ -143,12 +143,15 @@ def reader_of(path: str, *join: str) -> type[Any]:
             f"{path} is a folder; give a file of it, or make a table: {survey_of(path)}"
         )
     if not readers:
-        reason = foreign.sentence(path) or f"{path}: no reader takes files ending in '{ending}'"
-        raise UserError(f"{reason}; endings that can be read: {', '.join(endings())}")
+        reason = (
+            foreign.describe_foreign_file(path)
+            or f"{path}: no reader takes files ending in '{ending}'"
+        )
+        raise UserError(f"{reason}; endings that can be read: {', '.join(list_endings())}")
     return next((cls for cls in readers if cls.takes(path, *join)), readers[0])
 
 
-def endings() -> list[str]:
+def list_endings() -> list[str]:
     """The endings of the files that can be read."""
     return sorted(
         {e for cls in discover()[Reader.group].values() for e in getattr(cls, "endings", ())}

@@ -12,11 +12,11 @@ from tractexp.record.change import (
     CHANGED,
     LARGEST_USUAL_CHANGE,
     Change,
-    clause,
+    describe_change,
     fill_gaps,
+    find_voltage_changes,
     load_changes,
-    smear,
-    voltage_changes,
+    measure_smear,
 )
 from tractexp.record.record import Record
 
@@ -29,13 +29,16 @@ EARLY = 1.5, 0.5
 HISTORY = 3.0  # s before an event in which steps are looked for
 
 
-def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[str]]:
+def keep_steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[str]]:
     """The samples of `part` before an event that are steady, and notes on the others.
 
     From the last step of the load or of its voltage on. Raises `UserError` where fewer than `least`
     samples are left.
     """
-    begin, cycle = max(0, min(part.start, part.stop - round(HISTORY * record.rate))), smear(record)
+    begin, cycle = (
+        max(0, min(part.start, part.stop - round(HISTORY * record.rate))),
+        measure_smear(record),
+    )
     U, P, Q = (x[begin : part.stop] for x in (record.U, record.P, record.Q))
     notes: list[str] = []
     first = part.start
@@ -45,7 +48,7 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
         if begin + c.stop > first and not _may_step_be_dip(c, len(U), cycle)
     ]
     if last := steps[-1:]:
-        first, what = begin + last[0].stop, clause(record, begin, last[0])
+        first, what = begin + last[0].stop, describe_change(record, begin, last[0])
         lasts = (part.stop - first) * record.step
         if part.stop - first < least:
             raise UserError(
@@ -56,7 +59,7 @@ def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[st
         notes.append(
             f"{what}: the steady state before the dip is that of the {lasts:.2g} s after it"
         )
-    for change in voltage_changes(U, cycle):
+    for change in find_voltage_changes(U, cycle):
         if begin + change.stop > first and part.stop - begin - change.stop >= least:
             first, middle = begin + change.stop, begin + (change.first + change.stop) // 2
             notes.append(
@@ -86,7 +89,8 @@ def _find_part_at_rest(
     whole, course = part, _follow_course(record, part)
     while course is not None and not course.swings:
         rest = next(
-            (late for late in _list_last_parts(part, least) if _rests(record, late, course)), None
+            (late for late in _list_last_parts(part, least) if _does_rest(record, late, course)),
+            None,
         )
         if rest is None:
             break
@@ -121,7 +125,7 @@ def _list_last_parts(part: slice, least: int) -> Iterator[slice]:
             yield late
 
 
-def _rests(record: Record, late: slice, course: "UnsteadyCourse") -> bool:
+def _does_rest(record: Record, late: slice, course: "UnsteadyCourse") -> bool:
     """Whether a load moves so much less in a late part of its course that it has come to rest
     there.
     """
@@ -131,9 +135,9 @@ def _rests(record: Record, late: slice, course: "UnsteadyCourse") -> bool:
 
 def _follow_course(record: Record, part: slice, at_all: bool = False) -> "UnsteadyCourse | None":
     """How the load moves in samples before a dip, without those that may show the dip early."""
-    cycle = smear(record)
+    cycle = measure_smear(record)
     part = slice(part.start, max(part.start, part.stop - round(EARLY[0] * cycle)))
-    return course_of(record.P[part], record.Q[part], cycle, at_all)
+    return find_course(record.P[part], record.Q[part], cycle, at_all)
 
 
 @dataclass(frozen=True)
@@ -159,7 +163,7 @@ class UnsteadyCourse:
         )
 
 
-def course_of(
+def find_course(
     P: np.ndarray, Q: np.ndarray, cycle: float, at_all: bool = False
 ) -> UnsteadyCourse | None:
     """How a load moves whose P and Q (N,), without steps, leave their mean by more than noise does;
@@ -181,7 +185,7 @@ def course_of(
         return None
     change = (
         "swings"
-        if _turns(course, REVERSED * span)
+        if _does_turn(course, REVERSED * span)
         else "rises"
         if course[-1] > course[0]
         else "falls"
@@ -189,7 +193,7 @@ def course_of(
     return UnsteadyCourse(name, change, span, size, len(course))
 
 
-def _turns(x: np.ndarray, least: float) -> bool:
+def _does_turn(x: np.ndarray, least: float) -> bool:
     """Whether x (N,) turns back by so much on its way from its first to its last value."""
     way = np.sign(x[-1] - x[0]) or 1.0
     return bool((np.maximum.accumulate(way * x) - way * x).max() > least)

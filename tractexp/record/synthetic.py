@@ -6,11 +6,11 @@ import numpy as np
 
 from tractexp.record.event import Event
 from tractexp.record.record import Base, Record
-from tractexp.record.wave_event import WaveEvent, half_cycle
+from tractexp.record.wave_event import WaveEvent, average_half_cycle
 from tractexp.record.waves import Waves
 
 
-def synthetic_event(
+def build_synthetic_event(
     name: str,
     t: np.ndarray,
     v: np.ndarray,
@@ -32,7 +32,7 @@ def synthetic_event(
         np.exp(2j * np.pi * frequency * t),
         np.full(len(t), np.nan),
     )
-    U, _, U2 = half_cycle(v, v, turn, rate, frequency)
+    U, _, U2 = average_half_cycle(v, v, turn, rate, frequency)
     waves = Waves(np.empty((6, 0)), float(t[0]), float(rate))
     flat = np.full(len(t), P0), np.full(len(t), Q0)
     record = Record(name, t, U, *flat, U2=U2, base=Base(frequency=frequency), waves=waves)

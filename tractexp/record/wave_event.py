@@ -101,16 +101,16 @@ class WaveEvent(Event):
 
     def of_phases(self, currents: np.ndarray) -> np.ndarray:
         """Currents (3, N), alpha, beta and zero, as those of the phases, (K, N)."""
-        return phases_of(currents, self.phases)
+        return compute_phases(currents, self.phases)
 
 
-def phases_of(stationary: np.ndarray, phases: int) -> np.ndarray:
+def compute_phases(stationary: np.ndarray, phases: int) -> np.ndarray:
     """Alpha, beta and zero sequence (3, N) as phases (K, N), three or one."""
     vector, zero = stationary[0] + 1j * stationary[1], np.nan_to_num(stationary[2])
     return np.stack([(vector * TURN ** (-k)).real + zero for k in range(phases)])
 
 
-def stationary(
+def transform_stationary(
     phases: np.ndarray, rate: float, frequency: float
 ) -> tuple[NDArray[np.complex128], np.ndarray]:
     """Space vector (N,) complex and zero sequence (N,) of phases (K, N).
@@ -157,18 +157,22 @@ def convert_to_waves(event: Event) -> WaveEvent:
 
     V, I = (_extract_positive(part) for part in np.split(periodic.fundamentals, 2))
     turn = np.exp(1j * (2 * np.pi * frequency * (time - periodic.origin) + np.angle(V)))
-    (v, v_zero), (i, i_zero) = (stationary(part, waves.rate, frequency) for part in np.split(x, 2))
+    (v, v_zero), (i, i_zero) = (
+        transform_stationary(part, waves.rate, frequency) for part in np.split(x, 2)
+    )
     noise, noise_U = (
         periodic.rest[K:],
         np.sqrt(np.mean(periodic.rest[:K] ** 2) * (2 / 3 if K == 3 else 1)),
     )
     noise_filter = NoiseFilter.from_rate(waves.rate, frequency)
-    course, course_zero = stationary(periodic.evaluate_at(time)[:K], waves.rate, frequency)
+    course, course_zero = transform_stationary(
+        periodic.evaluate_at(time)[:K], waves.rate, frequency
+    )
     v = course + noise_filter(v - course, 2 * noise_U**2)
     v_zero = course_zero + noise_filter(v_zero - course_zero, noise_U**2 / 2)
     power = V * np.conj(I)
     start = lead + _find_onset(t, x[:K, lead:], periodic, K, before)
-    half = half_cycle(v / turn, i / turn, turn, waves.rate, frequency)
+    half = average_half_cycle(v / turn, i / turn, turn, waves.rate, frequency)
     currents = np.stack([i.real, i.imag, i_zero])
     currents[:, :lead] = np.nan
     steady = slice(lead, lead + np.count_nonzero(before))
@@ -333,7 +337,7 @@ def _find_onset(
     return int(np.argmax(beyond)) if beyond.any() else int(np.count_nonzero(before))
 
 
-def half_cycle(
+def average_half_cycle(
     v: np.ndarray, i: np.ndarray, turn: np.ndarray, rate: float, frequency: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """|V1|, P + jQ and |V2| (N,) of vectors (N,) in the frame, as the mean over the last half

@@ -106,7 +106,7 @@ def make_mean_window(length: float) -> Window:
     return Window("mean", at, np.full(MEAN_POINTS, 1 / MEAN_POINTS))
 
 
-def mean_weights(samples: float) -> np.ndarray:
+def build_mean_weights(samples: float) -> np.ndarray:
     """The weights of samples in the mean over a window.
 
     Parameters
@@ -121,7 +121,7 @@ def mean_weights(samples: float) -> np.ndarray:
 
     Examples
     --------
-    >>> mean_weights(2.0).tolist()
+    >>> build_mean_weights(2.0).tolist()
     [0.0, 0.25, 0.5, 0.25, 0.0]
     """
     whole, part = divmod(samples / 2, 1)

@@ -7,7 +7,7 @@ from pathlib import Path
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError, suggest_nearest
 from tractexp.record import Record
-from tractexp.recording.event_views import settings_of
+from tractexp.recording.event_views import find_settings
 from tractexp.recording.overview import View, view_of
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.record_files import find_records
@@ -23,10 +23,10 @@ def look_at_file(path: Path) -> View:
     cannot be read.
     """
     with time_limit.limit_time(path):
-        return view_of(str(path), settings_of(str(path)))
+        return view_of(str(path), find_settings(str(path)))
 
 
-def event_name(file: str, load: int, event: LoadEvent) -> str:
+def name_event(file: str, load: int, event: LoadEvent) -> str:
     """The name of an event within its archive: FILE#LOAD.DIP, both counted from 1."""
     return f"{file}#{load}" + ("" if event.dip is None else f".{event.dip}")
 
@@ -79,7 +79,7 @@ def _read_record(
             span=(event.what.start, event.what.end),
         )
     return Record(
-        **{**vars(record), "name": event_name(path.relative_to(folder).as_posix(), load, event)}
+        **{**vars(record), "name": name_event(path.relative_to(folder).as_posix(), load, event)}
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import UserError, name_setting
 from tractexp.record.direction import explain_negative_power
-from tractexp.record.phasor import sequences
+from tractexp.record.phasor import compute_sequences
 from tractexp.recording.channel_order import (
     OtherOrder,
     check_currents,
@@ -37,17 +37,17 @@ from tractexp.recording.live_phasors import (
     measure_live_phasors,
 )
 from tractexp.recording.recording import Recording
-from tractexp.recording.snapshot import OTHER_FREQUENCY, frequency, nearest_nominal
+from tractexp.recording.snapshot import OTHER_FREQUENCY, find_nominal_frequency, measure_frequency
 
 
 def tune_frequency(recording: Recording, numbers: Sequence[int]) -> Recording:
     """The recording with the nominal frequency that its voltages `numbers` really have, and a note
     where it differs.
     """
-    f = frequency(recording, numbers)
+    f = measure_frequency(recording, numbers)
     if (
         f is None
-        or (nominal := nearest_nominal(f)) is None
+        or (nominal := find_nominal_frequency(f)) is None
         or abs(nominal / recording.frequency - 1) < OTHER_FREQUENCY
     ):
         return recording
@@ -125,7 +125,7 @@ def _refuse_residuals(recording: Recording, feeder: Feeder) -> None:
 def _note_direction(feeder: Feeder, live: LivePhasors) -> Feeder:
     """The feeder with a sentence on negative power, where it is."""
     if len(live.V) == 3:
-        V1, I1 = sequences(live.V)[0], sequences(live.I)[0]
+        V1, I1 = compute_sequences(live.V)[0], compute_sequences(live.I)[0]
         polarity = find_answer(live)
     else:
         V1, I1, polarity = live.V[0], live.I[0], 0

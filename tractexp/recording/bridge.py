@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.record.change import runs
+from tractexp.record.change import find_runs
 from tractexp.record.gap import (
     describe_bridged,
     estimate_wave_values,
@@ -54,7 +54,7 @@ def _part_recording(recording: Recording) -> Recording:
                 stop=segment.first + part.stop,
                 start=segment.start + part.start / segment.rate,
             )
-            for part in runs(~lacking)
+            for part in find_runs(~lacking)
         ]
     if parts == recording.segments or not parts:
         return recording

@@ -5,9 +5,20 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from tractexp.record.phasor import TURN
-from tractexp.recording.label import Group, find_residuals, groups, kind, residual
+from tractexp.recording.label import (
+    Group,
+    find_kind,
+    find_label_groups,
+    find_residuals,
+    is_residual,
+)
 from tractexp.recording.recording import Recording
-from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, snapshots
+from tractexp.recording.snapshot import (
+    Snapshots,
+    find_nominal_frequency,
+    measure_frequency,
+    take_snapshots,
+)
 
 # three magnitudes this close, as a share of their mean, may be three phases
 LARGEST_PHASE_DIFFERENCE = 0.1
@@ -21,14 +32,16 @@ def select_free(
     return [
         i
         for i in numbers
-        if i not in used and not residual(recording.channels[i]) and phasors.pure(i)
+        if i not in used and not is_residual(recording.channels[i]) and phasors.pure(i)
     ]
 
 
 def list_waves(recording: Recording, quantity: str) -> list[int]:
     """The numbers of the channels that are waveforms of a quantity."""
     return [
-        i for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c) == quantity
+        i
+        for i, c in enumerate(recording.channels)
+        if c.form == "waveform" and find_kind(c) == quantity
     ]
 
 
@@ -38,10 +51,10 @@ def find_frequency(
     """(Hz to look at the channels with, what is said of voltages that have no
     network's frequency).
     """
-    f = frequency(recording, volts) or frequency(recording, amps)
-    if f is None or nearest_nominal(f) is not None:
+    f = measure_frequency(recording, volts) or measure_frequency(recording, amps)
+    if f is None or find_nominal_frequency(f) is not None:
         return f or recording.frequency, ""
-    phasors = snapshots(recording, volts, f)
+    phasors = take_snapshots(recording, volts, f)
     turns = phasors is not None and any(phasors.pure(i) for i in volts)
     return (
         recording.frequency,
@@ -53,7 +66,7 @@ def find_groups(recording: Recording, phasors: Snapshots, numbers: Sequence[int]
     """Groups among the channels of one quantity: by label, and the rest by magnitude and angle."""
     result = [
         g
-        for g in groups({i: recording.channels[i] for i in numbers})
+        for g in find_label_groups({i: recording.channels[i] for i in numbers})
         if len(g.numbers) == 3
         or g.pairs == (recording.channels[g.numbers[0]].quantity != "current")
     ]

@@ -6,7 +6,7 @@ from itertools import permutations
 import numpy as np
 
 from tractexp.errors import DATA, UserError
-from tractexp.record.phasor import sequences
+from tractexp.record.phasor import compute_sequences
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.label import name_channel, order
 from tractexp.recording.line_voltage import is_taken_to_ground
@@ -46,7 +46,7 @@ class OtherOrder(UserError):
 
 def check_voltages(recording: Recording, feeder: Feeder, live: LivePhasors) -> None:
     """Refuse voltages whose negative sequence exceeds the positive one while they are alive."""
-    V1, V2 = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.V))
+    V1, V2 = (float(np.median(np.abs(x)[live.calm])) for x in compute_sequences(live.V))
     if UNEVEN * V1 < V2 <= V1:
         names = ", ".join(name_channel(recording, i) for i in feeder.voltages)
         raise UserError(
@@ -96,7 +96,7 @@ def _find_reversed_phase(X: np.ndarray) -> int | None:
     for k in range(3):
         tried = X.copy()
         tried[k] *= -1
-        first, second = (float(np.median(np.abs(x))) for x in sequences(tried))
+        first, second = (float(np.median(np.abs(x))) for x in compute_sequences(tried))
         if max(second, float(np.median(measure_zero_sequence(tried)))) < 0.3 * first:
             return k
     return None
@@ -151,7 +151,9 @@ def _is_balanced(live: LivePhasors, permutation: tuple[int, ...]) -> bool:
     """Whether currents in an order have a positive sequence, and an angle that a load has or power
     fed back.
     """
-    first, second = (np.median(np.abs(x)[live.calm]) for x in sequences(live.I[[*permutation]]))
+    first, second = (
+        np.median(np.abs(x)[live.calm]) for x in compute_sequences(live.I[[*permutation]])
+    )
     angle = abs(measure_angle(compute_power(live, permutation)))
     return bool(second < LARGEST_SENSIBLE_UNBALANCE * first) and not SENSIBLE < angle < BACKWARD
 
@@ -165,7 +167,7 @@ def check_currents(recording: Recording, feeder: Feeder, live: LivePhasors) -> N
     """Refuse an order of the currents that is impossible, or that makes no sense where another
     does.
     """
-    I1, I2 = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.I))
+    I1, I2 = (float(np.median(np.abs(x)[live.calm])) for x in compute_sequences(live.I))
     S = compute_power(live, (0, 1, 2))
     if I2 > I1:
         _refuse_negative_sequence(recording, feeder, live, S, I2 / max(I1, 1e-12))
@@ -206,7 +208,9 @@ def _refuse_negative_sequence(
         )
     tried = []
     for p in permutations(range(3)):
-        first, second = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.I[[*p]]))
+        first, second = (
+            float(np.median(np.abs(x)[live.calm])) for x in compute_sequences(live.I[[*p]])
+        )
         if second < LARGEST_SENSIBLE_UNBALANCE * first:
             tried.append(p)
     if tried:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.record.change import runs
+from tractexp.record.change import find_runs
 from tractexp.record.no_dip import OPEN_POLE, UNCLEARED
 from tractexp.recording.excursion import DEAD_VOLTAGE_SHARE, Excursion
 from tractexp.recording.trace import Trace
@@ -163,7 +163,7 @@ def _open_runs(trace: Trace) -> list[tuple[int, int]]:
         gone = (trace.I[k] < OPEN_CURRENT * others.mean(axis=0)) & (others.min(axis=0) > carries)
         spans += [
             (run.start, run.stop)
-            for run in runs(gone, max(3, round(OPEN_CYCLES * trace.cycle / trace.step)))
+            for run in find_runs(gone, max(3, round(OPEN_CYCLES * trace.cycle / trace.step)))
             if run.start >= 4 and (trace.I[k, : run.start] > carries).any()
         ]
     return sorted(spans)
@@ -190,7 +190,9 @@ def find_inrushes(trace: Trace) -> list[tuple[str, Excursion]]:
     flows = (carries < trace.I) & find_clean_currents(trace)
     rich = (flows & (trace.second > SECOND * trace.I)).any(axis=0)
     least = max(3, round(INRUSH_CYCLES * trace.cycle / trace.step))
-    return [("inrush", build_current_span(trace, run.start, run.stop)) for run in runs(rich, least)]
+    return [
+        ("inrush", build_current_span(trace, run.start, run.stop)) for run in find_runs(rich, least)
+    ]
 
 
 def find_clean_currents(trace: Trace) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Any
 from tractexp.configuration.overrides import format_assignment
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.record import endings, reader_of
+from tractexp.record import find_reader, list_endings
 from tractexp.recording.event_files import MOST_FILES, PART, name_one_event, say_several
 from tractexp.recording.overview import View, view_of
 from tractexp.recording.proposal import propose
@@ -21,7 +21,7 @@ EMPTY = "it is empty, or its files are hidden or named as if they lay elsewhere:
 MOST_UNNAMED = 6  # files that are tried together although their names do not say so
 
 
-def settings_of(path: str, *join: str) -> dict[str, Any]:
+def find_settings(path: str, *join: str) -> dict[str, Any]:
     """The reader, and its settings, that reads all of a file, or of the files of one event, or of
     what a .zip holds.
 
@@ -32,7 +32,7 @@ def settings_of(path: str, *join: str) -> dict[str, Any]:
         return _find_settings_of_archive(Path(path))
     if files.is_called_archive(path):
         files.check_there(Path(path))
-    cls = reader_of(path, *join)
+    cls = find_reader(path, *join)
     return {"name": cls.name, **cls.build_settings(path)} | ({"join": list(join)} if join else {})
 
 
@@ -47,9 +47,9 @@ def _find_settings_of_archive(archive: Path) -> dict[str, Any]:
         held = f"it holds {join_words(names[:5])}{more}" if names else EMPTY
         raise UserError(
             f"there is no record in {archive}: {held}; endings that can be read:"
-            f" {', '.join(endings())}"
+            f" {', '.join(list_endings())}"
         )
-    together = settings_of(*inside) if len(inside) == 1 else join_event(inside)
+    together = find_settings(*inside) if len(inside) == 1 else join_event(inside)
     if together is None:
         why = f"; {_explain_apart(inside)}" if name_one_event(inside) else ""
         raise UserError(f"{say_several(str(archive), inside)}{why}")
@@ -59,7 +59,7 @@ def _find_settings_of_archive(archive: Path) -> dict[str, Any]:
 def _explain_apart(paths: Sequence[str]) -> str:
     """Why files whose names are those of one event are not read together."""
     try:
-        view_of(paths[0], settings_of(*paths))
+        view_of(paths[0], find_settings(*paths))
     except UserError as error:
         return f"they are not read as one event: {error}"
     return "together they show no load"
@@ -77,13 +77,13 @@ def join_event(paths: Sequence[str]) -> dict[str, Any] | None:
         return None
     if not named and any(_show_load(path) for path in paths):
         return None
-    return settings_of(*paths) if _show_load(*paths) else None
+    return find_settings(*paths) if _show_load(*paths) else None
 
 
 def _show_load(*paths: str) -> bool:
     """Whether files can be read together, and show a load."""
     try:
-        node = settings_of(*paths)
+        node = find_settings(*paths)
         reader = build("data", node)
         if isinstance(reader, WaveformReader):
             return any(feeder.currents for feeder in propose(reader.open_recording()))

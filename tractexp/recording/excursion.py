@@ -15,9 +15,9 @@ from tractexp.record.fall import (
     NOISE_FACTOR,
     RECOVERED,
     REFERENCE,
+    find_starting_level,
     find_sudden_change,
     sample_noise,
-    starting_level,
 )
 from tractexp.record.record import DEAD_VOLTAGE_SHARE
 from tractexp.recording.trace import Trace
@@ -75,7 +75,7 @@ def find_excursions(trace: Trace, trigger: float | None = None) -> list[Excursio
     events = _find_dead_beginning(trace, int(np.argmax(alive)))
     k = events[-1].end if events else 0
     count = max(2, round(REFERENCE / trace.step))
-    reference = starting_level(trace.t[k:], levels[:, k:], limits, count, trigger)
+    reference = find_starting_level(trace.t[k:], levels[:, k:], limits, count, trigger)
     reference = np.maximum(reference, DEAD_VOLTAGE_SHARE * levels.max(axis=1))
     while k < len(trace.t):
         inside, reference = _count_samples_inside(

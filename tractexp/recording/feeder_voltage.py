@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from tractexp.configuration.plugin import build_chosen
-from tractexp.record.phasor import TURN, sequences
+from tractexp.record.phasor import TURN, compute_sequences
 from tractexp.recording.channel_group import list_names
 from tractexp.recording.connection import choose_usual_connection
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.label import Group, words
+from tractexp.recording.label import Group, split_words
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots
 from tractexp.recording.unit import is_unit_in_doubt
@@ -193,7 +193,11 @@ def _find_named_alike(
 def _list_shared_words(recording: Recording, group: Group) -> set[str]:
     """The words that all channels of a group share, by which voltages and currents are matched."""
     channels = [recording.channels[i] for i in group.numbers]
-    shared = set.intersection(*(words(f"{c.name} {c.circuit}") for c in channels)) - {"u", "v", "i"}
+    shared = set.intersection(*(split_words(f"{c.name} {c.circuit}") for c in channels)) - {
+        "u",
+        "v",
+        "i",
+    }
     if len(channels) == 1:  # a phase is a name of its own there: "Ia" goes with "Ua"
         shared |= {f"phase {word[1:]}" for word in shared if word[0] in "uvi" and 1 < len(word) < 4}
     return shared
@@ -204,7 +208,7 @@ def _compute_positive_sequence(X: np.ndarray, pairs: bool) -> np.ndarray:
     constant factor.
     """
     if len(X) == 3:
-        return sequences(X)[0]
+        return compute_sequences(X)[0]
     return (X[0] - TURN**2 * X[1]) / 3 if pairs else X[0]
 
 
@@ -228,14 +232,14 @@ def _measure_stray_current(phasors: Snapshots, bus: Group, load: Group) -> float
 
 def are_dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:
     """Whether three voltages never turn as three phases do, in either order."""
-    return phasors.remember(("dead", *numbers), lambda: _never_turn(phasors, numbers))
+    return phasors.remember(("dead", *numbers), lambda: _do_never_turn(phasors, numbers))
 
 
-def _never_turn(phasors: Snapshots, numbers: Sequence[int]) -> bool:
+def _do_never_turn(phasors: Snapshots, numbers: Sequence[int]) -> bool:
     """Whether no part of a record shows these channels as phasors of the grid's frequency."""
     if len(numbers) < 3:
         return not any(phasors.pure(i) for i in numbers)
     X = np.nan_to_num(phasors.select_channels(numbers))
     rest = np.nan_to_num(phasors.rest[[phasors.numbers.index(i) for i in numbers]])
     size = np.sqrt((np.abs(X) ** 2 + rest**2).mean(axis=0))
-    return not (np.abs(sequences(X)).max(axis=0) > LEAST_SEQUENCE_SHARE * size).any()
+    return not (np.abs(compute_sequences(X)).max(axis=0) > LEAST_SEQUENCE_SHARE * size).any()

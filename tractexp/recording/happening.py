@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.record.change import SMALL_LOAD_SHARE, Change, load_changes, voltage_changes
+from tractexp.record.change import SMALL_LOAD_SHARE, Change, find_voltage_changes, load_changes
 from tractexp.record.fall import STEADY
 from tractexp.record.record import Record
 from tractexp.recording.event_kind import (
@@ -52,9 +52,9 @@ class Happening:
     exponents: tuple[StaticExponent, ...] = ()
 
 
-def happenings_of(record: Record) -> list[Happening]:
+def find_happenings_of_record(record: Record) -> list[Happening]:
     """The events in a record of t, U, P, Q and, where they are there, f and U2."""
-    return happenings_in(trace_record(record))
+    return find_happenings(trace_record(record))
 
 
 def _is_within(trace: Trace, e: Excursion, slips: Sequence[Excursion]) -> bool:
@@ -67,7 +67,7 @@ def _name_load_change(change: Change) -> str:
     return "load loss" if change.ratio < SMALL_LOAD_SHARE else "load step"
 
 
-def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]:
+def find_happenings(trace: Trace, trigger: float | None = None) -> list[Happening]:
     """The events in a trace, in order of time; `trigger` [s] is that of the recorder."""
     if len(trace.t) < FEWEST_HALF_CYCLES:
         return []
@@ -153,7 +153,7 @@ def _find_taps(
     taps = []
     for cycles in (1.0, LONGEST_ABRUPT_CYCLES):
         near = round((1 + cycles) * cycle)  # what levels are measured over, and a window
-        for tap in voltage_changes(trace.U, cycles * cycle):
+        for tap in find_voltage_changes(trace.U, cycles * cycle):
             if any(start - near < tap.stop and end + near > tap.first for start, end in busy):
                 continue
             busy.append((tap.first, tap.stop))

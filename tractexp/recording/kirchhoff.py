@@ -30,7 +30,7 @@ def _find_loaded(phasors: Snapshots, feeders: list[Feeder]) -> list[int]:
     return [k for k, size in sizes.items() if size > UNLOADED * level]
 
 
-def closed_sums(phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
+def note_closed_sums(phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
     """The feeders, with a note where the sum of their currents is zero, as they are or with one
     reversed.
 

@@ -20,9 +20,9 @@ from tractexp.recording.phase_mark import (
     MOST_KNOWN_NAMES,
     ORDERS,
     QUANTITY,
+    find_pairs,
+    has_quantity_before,
     normalize,
-    pairs,
-    quantity_before,
     spell_marks,
 )
 from tractexp.recording.recording import Channel, Recording
@@ -103,7 +103,7 @@ class Group:
     backward: tuple[int, ...] = ()  # of line voltages those that count down beside others: CB
 
 
-def residual(channel: Channel) -> bool:
+def is_residual(channel: Channel) -> bool:
     """Whether the name or the phase says that this is a neutral or zero-sequence quantity."""
     return bool(RESIDUAL.search(normalize(channel.name))) or normalize(channel.phase) in (
         "n",
@@ -122,7 +122,7 @@ def find_residuals(channels: Sequence[Channel]) -> list[int]:
     return [
         k
         for k, channel in enumerate(channels)
-        if residual(channel) and not _is_hour(normalize(channel.name), names)
+        if is_residual(channel) and not _is_hour(normalize(channel.name), names)
     ]
 
 
@@ -142,7 +142,7 @@ def is_to_ground(channel: Channel) -> bool:
     )
 
 
-def kind(channel: Channel) -> str:
+def find_kind(channel: Channel) -> str:
     """voltage or current, by unit, else by the letter that starts a word of its name; "" for what
     is no wave.
     """
@@ -167,7 +167,7 @@ def is_other_quantity(channel: Channel) -> bool:
     return channel.quantity not in ("", "voltage", "current") or unit in OTHER_UNITS
 
 
-def phase(channel: Channel, orders: Sequence[str] = ORDERS) -> str:
+def find_phase(channel: Channel, orders: Sequence[str] = ORDERS) -> str:
     """The phase that a channel's label gives in one of the orders: one or two of a, b, c; "" where
     it gives none.
     """
@@ -191,11 +191,11 @@ def _read_phase(label: str, orders: tuple[str, ...]) -> str:
     return ""
 
 
-def groups(channels: Mapping[int, Channel]) -> list[Group]:
+def find_label_groups(channels: Mapping[int, Channel]) -> list[Group]:
     """The groups among channels of one quantity, without residual ones, by their
     names and phases.
     """
-    free = {i: c for i, c in channels.items() if not residual(c)}
+    free = {i: c for i, c in channels.items() if not is_residual(c)}
     result: list[Group] = []
     readings = [(True, True), (False, True), (True, False), (False, False)]
     searches = [
@@ -223,7 +223,7 @@ def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
 def _order_by_phases(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
     """The order of channels by what the file calls the phases."""
     for letters in ORDERS:
-        labels = [phase(c, (letters,)) for c in channels]
+        labels = [find_phase(c, (letters,)) for c in channels]
         for two, reading in ((False, "abc".find), (True, lambda mark: PLACE.get(mark, -1))):
             places = tuple(reading(mark) for mark in labels)
             if all(len(mark) == 1 + two for mark in labels) and len(set(places)) == len(places):
@@ -237,7 +237,7 @@ def _order_by_names(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool]
     """
     names = [normalize(c.name) for c in channels]
     for texts in (names, [COUNTER.sub("", name) for name in names]):
-        read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]
+        read = [{m[:3]: m[3:] for m in _list_marks(text)} for text in texts]
         if len(channels) == 2:  # of which one may count down: AB and CB
             read = [{(k[0].removesuffix("-"), *k[1:]): v for k, v in r.items()} for r in read]
         shared = set.intersection(*(set(each) for each in read))
@@ -251,10 +251,10 @@ def _order_by_names(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool]
     return None
 
 
-def backward(channels: Sequence[Channel]) -> bool:
+def is_backward(channels: Sequence[Channel]) -> bool:
     """Whether the names of line-to-line voltages count down: U21, BA."""
     return all(
-        any(key.endswith("-") for key, *_ in _marks(normalize(f"{c.name}"))) for c in channels
+        any(key.endswith("-") for key, *_ in _list_marks(normalize(f"{c.name}"))) for c in channels
     )
 
 
@@ -262,7 +262,7 @@ def _compare_phase(channel: Channel, letters: str, place: int) -> int:
     """1 where the phase that the file tells of a channel is that of a mark, -1 where it is another
     one, 0 where it tells none or two.
     """
-    own = phase(channel, (letters,)) or phase(channel)
+    own = find_phase(channel, (letters,)) or find_phase(channel)
     if own in (("ab", "bc", "ca")[place], "abc"[place]):
         return 1
     return -1 if len(own) == 1 else 0
@@ -279,7 +279,7 @@ def _group_by_name(
     for i, channel in channels.items():
         text = normalize(channel.name)
         text = text if counters else COUNTER.sub("", text)
-        for key, letters, two, place, score in _marks(text):
+        for key, letters, two, place, score in _list_marks(text):
             label = (f"{key} {normalize(channel.circuit)}" if full else key, letters, two)
             buckets[label][place].append(i)
             agreement = _compare_phase(channel, letters, place)
@@ -294,8 +294,8 @@ def _group_by_name(
             if used & set(have):
                 continue
             used |= set(have)
-            two = label[2] or all(len(phase(channels[n])) == 2 for n in have)
-            shared = shared_name([channels[n] for n in have])
+            two = label[2] or all(len(find_phase(channels[n])) == 2 for n in have)
+            shared = find_shared_name([channels[n] for n in have])
             result.append(Group(have, two, shared, worth[label] >= SURE, BY_NAME, missing))
     return result
 
@@ -311,7 +311,7 @@ def _are_two_enough(
 
 
 @functools.lru_cache(maxsize=MOST_KNOWN_NAMES)
-def _marks(text: str) -> tuple[tuple[str, str, bool, int, float], ...]:
+def _list_marks(text: str) -> tuple[tuple[str, str, bool, int, float], ...]:
     """Every reading of a name: (the name without the mark, alphabet, whether a pair, 0 to 2, how
     likely).
     """
@@ -323,7 +323,7 @@ def _read_marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
     reading.
     """
     for letters in ORDERS:
-        for mark in pairs(text, letters):
+        for mark in find_pairs(text, letters):
             x, y = mark.places
             backward = "-" if (y - x) % 3 == 2 else ""
             key = f"{text[: mark.begin]}**{text[mark.end :]}{backward}"
@@ -342,7 +342,7 @@ def _read_single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool
     for match in re.finditer(rf"{glued}[{letters}](?!{word}(?<![ng]))", text):
         at = match.start()
         alone = digits or not text[:at][-1:].isalpha() or text[at - 1] in f"{QUANTITY}l"
-        score = 3.0 * quantity_before(text, at) + 2 * (not digits) if alone else GLUED
+        score = 3.0 * has_quantity_before(text, at) + 2 * (not digits) if alone else GLUED
         marks[letters.index(match[0])].append((at, score))
     for place, several in marks.items():
         likely = sorted(several, key=lambda mark: -mark[1])[:MOST_PLACES]
@@ -364,7 +364,7 @@ def _group_by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Gr
     buckets: dict[tuple[str, str], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
     down: dict[tuple[str, str], set[int]] = defaultdict(set)
     for i, channel in channels.items():
-        for key, letters, two, place, _ in _marks(normalize(channel.name)):
+        for key, letters, two, place, _ in _list_marks(normalize(channel.name)):
             if two:
                 label = key.removesuffix("-"), letters
                 buckets[label][place].append(i)
@@ -377,7 +377,7 @@ def _group_by_mixed_pairs(channels: Mapping[int, Channel], size: int) -> list[Gr
             backward = tuple(down[label].intersection(have))
             if len(backward) == 1 and taken.isdisjoint(have):
                 taken.update(have)
-                shared = shared_name([channels[n] for n in have])
+                shared = find_shared_name([channels[n] for n in have])
                 result.append(Group(have, True, shared, True, BY_NAME, missing, backward))
     return result
 
@@ -391,13 +391,13 @@ def _group_by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
     for letters in ORDERS:
         rows: dict[tuple[str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
         for i, channel in channels.items():
-            mark = phase(channel, (letters,))
+            mark = find_phase(channel, (letters,))
             if mark and i not in used:
                 place = "abc".index(mark) if len(mark) == 1 else PLACE[mark]
                 rows[normalize(channel.circuit), len(mark) == 2][place].append(i)
         for (_, two), places in rows.items():
             for have, missing in _match_sets(places, size):
-                shared = shared_name([channels[n] for n in have])
+                shared = find_shared_name([channels[n] for n in have])
                 result.append(Group(have, two, shared, False, "the file's phases say so", missing))
                 used |= set(have)
     return result
@@ -421,7 +421,7 @@ def _find_common_start(texts: Sequence[str]) -> str:
     return "".join(letters[0] for letters in alike)
 
 
-def shared_name(channels: list[Channel]) -> str:
+def find_shared_name(channels: list[Channel]) -> str:
     """The name of a group: its circuit where the names say no more, else what the names share."""
     names = [c.name.strip() for c in channels]
     head = _find_common_start(names)
@@ -439,7 +439,7 @@ def shared_name(channels: list[Channel]) -> str:
     return circuit if re.search(r"[^\W\d_]", circuit) else ""
 
 
-def words(text: str) -> set[str]:
+def split_words(text: str) -> set[str]:
     """The parts of a name, to be compared with another: words, numbers, single
     Chinese characters.
     """

@@ -9,10 +9,17 @@ import numpy as np
 
 from tractexp.configuration.plugin import build_chosen
 from tractexp.errors import DATA, UserError
-from tractexp.record.phasor import sequences
+from tractexp.record.phasor import compute_sequences
 from tractexp.recording.connection import choose_usual_connection
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.label import backward, groups, is_to_ground, kind, name_channel, order
+from tractexp.recording.label import (
+    find_kind,
+    find_label_groups,
+    is_backward,
+    is_to_ground,
+    name_channel,
+    order,
+)
 from tractexp.recording.live_phasors import (
     LEAST_FAULT_UNBALANCE,
     LEAST_LIVE_SEQUENCE,
@@ -21,7 +28,7 @@ from tractexp.recording.live_phasors import (
 )
 from tractexp.recording.nominal_voltage import is_between_phases
 from tractexp.recording.recording import Recording
-from tractexp.recording.snapshot import network_frequency, snapshots
+from tractexp.recording.snapshot import measure_network_frequency, take_snapshots
 
 ZERO = 0.02  # V0 over V2 of line voltages in a fault to earth, whose sum is zero whatever happens
 EARTH = 0.1  # I0 over I1 of a fault to earth
@@ -47,7 +54,7 @@ def take_lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
         f"the voltages {names} are line to line, as their labels say:"
         f" data.connection={name_line_connection(feeder)} is used"
     )
-    if backward([recording.channels[i] for i in voltages]):
+    if is_backward([recording.channels[i] for i in voltages]):
         why += ", U21 as V1 - V2 (where it is V2 - V1, the power is the opposite)"
     return replace(
         feeder, voltages=voltages, connection=name_line_connection(feeder), why=(*feeder.why, why)
@@ -93,8 +100,11 @@ def explain_lines_by_shape(recording: Recording, feeder: Feeder, live: LivePhaso
     nothing shows it.
     """
     used = f"they are line to line, and data.connection={name_line_connection(feeder)} is used"
-    V1, V2 = (np.abs(x) for x in sequences(live.V))
-    I0, I1 = measure_zero_sequence(live.I), np.median(np.abs(sequences(live.I)[0])[live.calm])
+    V1, V2 = (np.abs(x) for x in compute_sequences(live.V))
+    I0, I1 = (
+        measure_zero_sequence(live.I),
+        np.median(np.abs(compute_sequences(live.I)[0])[live.calm]),
+    )
     fault = (
         (V2 > LEAST_FAULT_UNBALANCE * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[live.calm]) < I0)
     )
@@ -124,9 +134,11 @@ def _measure_levels(recording: Recording) -> list[tuple[tuple[int, ...], float]]
     positive sequence.
     """
     if recording not in _known_levels:
-        volts = {i: c for i, c in enumerate(recording.channels) if kind(c) == "voltage"}
+        volts = {i: c for i, c in enumerate(recording.channels) if find_kind(c) == "voltage"}
         three = [
-            group.numbers for group in groups(volts) if len(group.numbers) == 3 and not group.pairs
+            group.numbers
+            for group in find_label_groups(volts)
+            if len(group.numbers) == 3 and not group.pairs
         ]
         _known_levels[recording] = [
             (numbers, _measure_level(recording, numbers)) for numbers in three
@@ -138,19 +150,19 @@ def _measure_level(recording: Recording, numbers: Sequence[int]) -> float:
     """Median positive sequence of three voltages while they are alive; 0 where they have no
     waveform.
     """
-    windows = snapshots(recording, numbers, network_frequency(recording))
+    windows = take_snapshots(recording, numbers, measure_network_frequency(recording))
     if windows is None:
         return 0.0
-    size = np.nan_to_num(np.abs(sequences(windows.select_channels(numbers))[0]))
+    size = np.nan_to_num(np.abs(compute_sequences(windows.select_channels(numbers))[0]))
     return float(np.median(size[size >= LEAST_LIVE_SEQUENCE * size.max()]))
 
 
 def _are_differences(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> bool:
     """Whether three voltages are the differences of three others."""
-    windows = snapshots(recording, [*ours, *theirs])
+    windows = take_snapshots(recording, [*ours, *theirs])
     if windows is None:
         return False
-    x, y = (sequences(windows.select_channels(numbers))[0] for numbers in (ours, theirs))
+    x, y = (compute_sequences(windows.select_channels(numbers))[0] for numbers in (ours, theirs))
     large = np.nan_to_num(np.abs(y)) > LEAST_LIVE_SEQUENCE * np.nanmax(np.abs(y), initial=0)
     if not large.any():
         return False

@@ -6,10 +6,10 @@ import numpy as np
 
 from tractexp.configuration.plugin import build_chosen
 from tractexp.record.direction import find_values_at_level
-from tractexp.record.phasor import sequences
+from tractexp.record.phasor import compute_sequences
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.recording import Recording
-from tractexp.recording.snapshot import frequency_of, snapshots
+from tractexp.recording.snapshot import choose_frequency, take_snapshots
 
 LEAST_LIVE_SEQUENCE = 0.5  # of the upper level of V1: less is a fault, or a dead line
 LOADED = 0.2  # of the upper level of I1, as well
@@ -36,7 +36,7 @@ class LivePhasors:
 def measure_live_phasors(recording: Recording, feeder: Feeder) -> LivePhasors | None:
     """The feeder's phasors while voltage and current are alive; None where they never are."""
     numbers = [*feeder.voltages, *feeder.currents]
-    windows = snapshots(recording, numbers, frequency_of(recording, feeder.voltages))
+    windows = take_snapshots(recording, numbers, choose_frequency(recording, feeder.voltages))
     if windows is None or not any(windows.pure(i) for i in feeder.voltages):
         return None  # noise has no order
     connection = build_chosen("connection", feeder.connection)
@@ -53,7 +53,7 @@ def measure_live_phasors(recording: Recording, feeder: Feeder) -> LivePhasors | 
         return None
     alive = size > LEAST_LIVE_SEQUENCE * np.percentile(size, 90)
     if len(V) == 3:
-        small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
+        small, large = np.sort(np.abs(compute_sequences(V)), axis=0)  # whatever the order is
         even = alive & (small < LEAST_FAULT_UNBALANCE * large)
         even = even if even.any() else alive
     else:
@@ -75,7 +75,7 @@ def measure_zero_sequence(x: np.ndarray) -> np.ndarray:
 
 def compute_power(live: LivePhasors, permutation: tuple[int, ...]) -> complex:
     """P + jQ [MVA] in the calm state with the currents in another order."""
-    S = 3 * sequences(live.V)[0] * sequences(live.I[[*permutation]])[0].conj()
+    S = 3 * compute_sequences(live.V)[0] * compute_sequences(live.I[[*permutation]])[0].conj()
     S = S[live.calm]
     return complex(np.median(S.real), np.median(S.imag))
 
@@ -95,8 +95,8 @@ def find_answer(live: LivePhasors, permutation: tuple[int, ...] = (0, 1, 2)) -> 
     """1 where the added I2 is what a passive load draws from the added V2, -1 where it is turned
     round, else 0.
     """
-    V2, I2 = sequences(live.V)[1], sequences(live.I[[*permutation]])[1]
-    V1 = np.abs(sequences(live.V)[0])
+    V2, I2 = compute_sequences(live.V)[1], compute_sequences(live.I[[*permutation]])[1]
+    V1 = np.abs(compute_sequences(live.V)[0])
     V2, I2 = V2 * _find_turns(live), I2 * _find_turns(live)
     dV, dI = V2 - np.median(V2[live.calm]), I2 - np.median(I2[live.calm])
     changed = np.abs(dV) > ADDED * np.median(V1)
@@ -114,5 +114,5 @@ def _find_turns(live: LivePhasors) -> np.ndarray:
     """The factors (M,) that turn phasors so that V1 has angle zero: windows far apart can then be
     compared.
     """
-    V1 = sequences(live.V)[0]
+    V1 = compute_sequences(live.V)[0]
     return V1.conj() / np.maximum(np.abs(V1), 1e-12)

@@ -13,17 +13,17 @@ from tractexp.recording.channel_group import (
 from tractexp.recording.connection import choose_usual_connection
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.feeder_voltage import add_question, find_voltages
-from tractexp.recording.label import Group, order, shared_name
+from tractexp.recording.label import Group, find_shared_name, order
 from tractexp.recording.nominal_voltage import is_to_ground
 from tractexp.recording.railway import (
-    conductor_pairs,
-    contact_first,
+    find_conductor_pairs,
+    find_opposite_pairs,
     find_other_conductor,
+    find_unnamed_conductor,
     is_between_conductors,
     is_opposite,
     is_return,
-    opposite_pairs,
-    unnamed_conductor,
+    order_contact_first,
 )
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots
@@ -49,17 +49,17 @@ def list_railway_feeders(
     volts, amps = (
         [i for i in numbers if i not in used and phasors.pure(i)] for numbers in (volts, amps)
     )
-    arms = [contact_first(recording, pair) for pair in opposite_pairs(phasors, volts)]
+    arms = [order_contact_first(recording, pair) for pair in find_opposite_pairs(phasors, volts)]
     if not arms and len(volts) == 1:
         arms = [(volts[0],)]
     if not arms or choose_usual_connection(len(arms[0]), 2) is None:
         return []
     buses = [Group(arm, False, "", False, "") for arm in arms]
     options = []
-    pairs = conductor_pairs(recording, phasors, arms[0], amps)
+    pairs = find_conductor_pairs(recording, phasors, arms[0], amps)
     for k, (contact, feeder, inward) in enumerate(pairs, 1):
         currents = contact, feeder
-        shared = shared_name([recording.channels[i] for i in currents])
+        shared = find_shared_name([recording.channels[i] for i in currents])
         load = Group(currents, False, shared or f"autotransformer feeder {k}", False, "")
         found = [
             _build_conductor_feeder(recording, load, bus, why, inward)
@@ -177,7 +177,7 @@ def _describe_half(
     """
     lacks = f"no current goes with the other voltage, {list_names(recording, volts[1:])}"
     pure = [i for i in amps if phasors.pure(i)]
-    other = unnamed_conductor(recording, phasors, current, pure)
+    other = find_unnamed_conductor(recording, phasors, current, pure)
     connection = choose_usual_connection(2, 2)
     if other is None or not isinstance(connection, str):
         return f"{HALF}: {lacks}"

@@ -97,7 +97,7 @@ class FeederWaves:
         return np.array(delays)
 
 
-def phasors_of(
+def measure_phasors(
     recording: Recording,
     feeder: Feeder,
     segment: Segment,

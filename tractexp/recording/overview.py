@@ -17,15 +17,19 @@ from tractexp.recording.arrangement import arrange_feeder
 from tractexp.recording.event_kind import find_dead_phases
 from tractexp.recording.event_number import number_events
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.happening import FEWEST_HALF_CYCLES, happenings_in, happenings_of
+from tractexp.recording.happening import (
+    FEWEST_HALF_CYCLES,
+    find_happenings,
+    find_happenings_of_record,
+)
 from tractexp.recording.infeed import describe_directions
-from tractexp.recording.measure import FeederWaves, phasors_of
-from tractexp.recording.proposal import buses_alone, propose
-from tractexp.recording.quality import Quality, measure_stamp_jitter, quality
+from tractexp.recording.measure import FeederWaves, measure_phasors
+from tractexp.recording.proposal import list_buses_alone, propose
+from tractexp.recording.quality import Quality, assess_quality, measure_stamp_jitter
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
 from tractexp.recording.sight import Sight
-from tractexp.recording.snapshot import network_frequency
+from tractexp.recording.snapshot import measure_network_frequency
 from tractexp.recording.trace import Trace, join_traces, trace_waves
 from tractexp.recording.type_test import MotorCourse, TypeTest, find_type_test
 from tractexp.recording.unit import check_doubt, is_secondary, is_unit_in_doubt
@@ -46,7 +50,7 @@ class _Bus:
 
     def measure(self, recording: Recording, feeder: Feeder, segment: Segment) -> Phasors:
         """The phasors of a load."""
-        measured = phasors_of(
+        measured = measure_phasors(
             recording, feeder, segment, tracked=self.tracked.setdefault(segment, {})
         )
         first = self.phasors.setdefault(segment, measured)
@@ -82,8 +86,10 @@ class View:
             return []
         segment = max(recording.segments, key=lambda s: s.rate)
         stamps = measure_stamp_jitter(recording, segment)
-        f = network_frequency(recording)
-        return [quality(recording, k, segment, stamps, f) for k in range(len(recording.channels))]
+        f = measure_network_frequency(recording)
+        return [
+            assess_quality(recording, k, segment, stamps, f) for k in range(len(recording.channels))
+        ]
 
     @functools.cached_property
     def operations(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -142,12 +148,14 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
             alone = reader.read_voltage()
             if alone is None:
                 raise
-            shown = sight_of(alone, [])
+            shown = overview_record(alone, [])
             return View(source, node, [replace(shown, said=(*shown.said, str(error)))])
         if table is not None:
-            return View(source, node, [sight_of(*table)])
+            return View(source, node, [overview_record(*table)])
         read = reader.read()
-        return View(source, node, [sight_of(record) for record in (*read.train, *read.validate)])
+        return View(
+            source, node, [overview_record(record) for record in (*read.train, *read.validate)]
+        )
     recording = reader.open_recording()
     if reader.voltages or reader.currents:
         return View(
@@ -178,7 +186,7 @@ def describe_loads(reader: WaveformReader, recording: Recording) -> list[Sight]:
         for feeder in propose(recording)
     ]
     if not feeders:
-        return [describe_load(reader, recording, bus) for bus in buses_alone(recording)]
+        return [describe_load(reader, recording, bus) for bus in list_buses_alone(recording)]
     loaded = any(feeder.loaded for feeder in feeders)
     sights = []
     buses = dict[str, _Bus]()
@@ -280,7 +288,7 @@ def describe_load(
         phasors += measured
         said += refusals
         if trace is not None:
-            changes += happenings_in(trace, _find_trigger(recording, trace))
+            changes += find_happenings(trace, _find_trigger(recording, trace))
             dead = dead or find_dead_phases(trace)
             brief.append(len(trace.t) < FEWEST_HALF_CYCLES)
     dips, refused = [], ""
@@ -336,7 +344,7 @@ def _explain_improbable(where: str, shown: Sight) -> list[str]:
     return []
 
 
-def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
+def overview_record(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
     """The load of a record, looked at; `dips` are those that a reader makes of it.
 
     Without them the record is what would be fitted, and its dips have no numbers.
@@ -348,7 +356,7 @@ def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
             before=(power * what.before[0], power * what.before[1]),
             after=(power * what.after[0], power * what.after[1]),
         )
-        for what in happenings_of(record)
+        for what in find_happenings_of_record(record)
     ]
     numbered = list(
         number_events(changes, _list_own_dips(record) if dips is None else dips, record.source)

@@ -86,7 +86,7 @@ def normalize(text: str) -> str:
 
 
 @functools.cache
-def pair_pattern(letters: str) -> re.Pattern[str]:
+def build_pair_pattern(letters: str) -> re.Pattern[str]:
     """Two different phases of one order as a name writes them: AB, A-B, L1-L2, L1L2, Ua-Ub, R/Y."""
     one, before = _build_beginning(letters)
     word = r"\d" if letters == DIGITS else "[a-z]"
@@ -99,22 +99,22 @@ def _build_beginning(letters: str) -> tuple[str, str]:
     return f"[{letters}]", before
 
 
-def pairs(text: str, letters: str) -> Iterator[PhaseMark]:
+def find_pairs(text: str, letters: str) -> Iterator[PhaseMark]:
     """Each reading of two phases in a plain name; of two digits only where L, a quantity or a dash
     says so.
     """
-    pattern = pair_pattern(letters)
+    pattern = build_pair_pattern(letters)
     for match in filter(None, (pattern.match(text, at) for at in range(len(text)))):
         places = letters.index(match[1]), letters.index(match[3])
         if places[0] == places[1]:
             continue
         explicit = text[: match.start()].endswith("l") and bool(match[2])
         dashed = match[0][1:2] in ("-", "/") and not re.search(r"[a-z\d.]$", text[: match.start()])
-        if letters != DIGITS or explicit or dashed or quantity_before(text, match.start()):
+        if letters != DIGITS or explicit or dashed or has_quantity_before(text, match.start()):
             yield PhaseMark(places, match.start(), match.end())
 
 
-def quantity_before(text: str, at: int) -> bool:
+def has_quantity_before(text: str, at: int) -> bool:
     """Whether a quantity, by its letter but for an L or a line below, or by its name, comes right
     before the mark.
     """
@@ -193,7 +193,7 @@ def _find_first_mark(text: str, letters: str) -> PhaseMark | None:
     by itself.
     """
     digits, alone, letters = letters == DIGITS, letters.isupper(), letters.lower()
-    two = next((mark for mark in pairs(text, letters) if _can_end(text, mark.end)), None)
+    two = next((mark for mark in find_pairs(text, letters) if _can_end(text, mark.end)), None)
     two = None if alone and two is not None and two.end - two.begin == len("uv") else two
     if two is not None:
         return two
@@ -209,7 +209,7 @@ def _find_first_mark(text: str, letters: str) -> PhaseMark | None:
         if sure and (
             not digits
             or least in text[: match.start() + 1]
-            or quantity_before(text, match.start(1))
+            or has_quantity_before(text, match.start(1))
         ):
             return PhaseMark((letters.index(match[1]),), *match.span(), ground=True)
     if digits:

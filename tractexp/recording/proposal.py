@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.record.phasor import sequences
+from tractexp.record.phasor import compute_sequences
 from tractexp.recording.channel_group import (
     find_frequency,
     find_groups,
@@ -17,12 +17,12 @@ from tractexp.recording.channel_group import (
 from tractexp.recording.connection import choose_usual_connection
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.feeder_voltage import are_dead, list_feeders
-from tractexp.recording.kirchhoff import closed_sums
-from tractexp.recording.label import Group, kind
+from tractexp.recording.kirchhoff import note_closed_sums
+from tractexp.recording.label import Group, find_kind
 from tractexp.recording.lone_feeder import list_railway_feeders, list_single_feeders
-from tractexp.recording.railway import direct_voltage
+from tractexp.recording.railway import describe_direct_voltage
 from tractexp.recording.recording import Recording
-from tractexp.recording.snapshot import UNLOADED, Snapshots, snapshots
+from tractexp.recording.snapshot import UNLOADED, Snapshots, take_snapshots
 from tractexp.recording.transformer import mark_other_sides
 
 STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
@@ -63,24 +63,26 @@ def propose(recording: Recording) -> list[Feeder]:
     """
     volts, amps = (list_waves(recording, quantity) for quantity in ("voltage", "current"))
     f, strange = find_frequency(recording, volts, amps)
-    phasors = snapshots(recording, sorted([*volts, *amps]), f)
-    if not volts or not amps or phasors is None or direct_voltage(recording):
+    phasors = take_snapshots(recording, sorted([*volts, *amps]), f)
+    if not volts or not amps or phasors is None or describe_direct_voltage(recording):
         return []
     options = _find_options(recording, phasors, volts, amps)
-    feeders = _add_excluding_feeders(closed_sums(phasors, [each[0] for each in options]), options)
+    feeders = _add_excluding_feeders(
+        note_closed_sums(phasors, [each[0] for each in options]), options
+    )
     level = max((phasors.size(f.currents) for f in feeders), default=0.0)
     marked = [_mark_unloaded(recording, phasors, feeder, level, strange) for feeder in feeders]
     return sorted(mark_other_sides(recording, phasors, marked), key=lambda f: not f.loaded)
 
 
-def buses_alone(recording: Recording) -> list[Feeder]:
+def list_buses_alone(recording: Recording) -> list[Feeder]:
     """The buses of a recording that shows no load, by their voltages; [] where none turns as a
     network does.
     """
     volts = list_waves(recording, "voltage")
     f, strange = find_frequency(recording, volts, [])
-    phasors = snapshots(recording, volts, f)
-    if not volts or phasors is None or strange or direct_voltage(recording):
+    phasors = take_snapshots(recording, volts, f)
+    if not volts or phasors is None or strange or describe_direct_voltage(recording):
         return []
     pure = {i for i in volts if phasors.pure(i)}
     grouped = [g for g in find_groups(recording, phasors, volts) if not pure.isdisjoint(g.numbers)]
@@ -97,7 +99,7 @@ def buses_alone(recording: Recording) -> list[Feeder]:
 
 def _explain_lone_voltages(recording: Recording) -> str:
     """Why voltages are shown without currents."""
-    amps = [i for i, c in enumerate(recording.channels) if kind(c) == "current"]
+    amps = [i for i, c in enumerate(recording.channels) if find_kind(c) == "current"]
     if not amps:
         return ALONE
     currents = list_names(recording, amps)
@@ -110,7 +112,8 @@ def _propose_bus(recording: Recording, phasors: Snapshots, group: Group) -> Feed
     said = [f"voltages {names}: {group.evidence}", _explain_lone_voltages(recording)]
     if len(numbers) == 3:
         first, second = (
-            float(np.nanmedian(np.abs(x))) for x in sequences(phasors.select_channels(numbers))
+            float(np.nanmedian(np.abs(x)))
+            for x in compute_sequences(phasors.select_channels(numbers))
         )
         if second > first:
             numbers = (numbers[0], numbers[2], numbers[1])

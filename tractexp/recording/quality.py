@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.record.change import runs
+from tractexp.record.change import find_runs
 from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel, Recording, Segment
-from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
+from tractexp.recording.snapshot import find_nominal_frequency, measure_frequency, take_snapshots
 from tractexp.text.wording import list_first
 
 CLIPPED = 3  # samples in a row at the greatest or least value
@@ -56,7 +56,7 @@ class Quality:
     fit: str  # what it is fit for, one sentence
 
 
-def quality(
+def assess_quality(
     recording: Recording,
     number: int,
     segment: Segment,
@@ -176,7 +176,7 @@ def _measure_clipped_share(
             channel.limits, dtype=float
         )  # not cast down to the samples' own type
         at |= (raw <= least) | (raw >= most)
-    flat = runs(at, max(CLIPPED, _count_crest_samples(x, segment.rate / f, near + step)))
+    flat = find_runs(at, max(CLIPPED, _count_crest_samples(x, segment.rate / f, near + step)))
     return sum(run.stop - run.start for run in flat) / len(x)
 
 
@@ -196,11 +196,11 @@ def _measure_frequency(
     """
     if segment.rate < FEWEST_PER_CYCLE * 16:
         return None
-    seen = snapshots(recording, [number], network) if network else None
+    seen = take_snapshots(recording, [number], network) if network else None
     if seen is not None and seen.pure(number):
         return network
-    f = frequency(recording, [number])
-    return f if f is not None and nearest_nominal(f) is not None else recording.frequency
+    f = measure_frequency(recording, [number])
+    return f if f is not None and find_nominal_frequency(f) is not None else recording.frequency
 
 
 def _measure_quiet_part(
@@ -261,12 +261,12 @@ def _select_calm_cycles(x: np.ndarray, cycle: int, at_work: float) -> slice:
     size.
     """
     blocks = x[: len(x) // cycle * cycle].reshape(-1, cycle)
-    energy, changed = _variances(blocks)
+    energy, changed = _compute_variances(blocks)
     both, whole = energy[1:] + energy[:-1], slice(0, len(x))
     with np.errstate(invalid="ignore", divide="ignore"):
         alike = changed / both < LARGEST_REPEAT_DIFFERENCE
         alike &= np.abs(np.sqrt(energy[1:] / energy[:-1]) - 1) < LARGEST_RMS_DIFFERENCE
-    spans = [(run.start, run.stop) for run in runs(alike, FEWEST_CALM - 1)]
+    spans = [(run.start, run.stop) for run in find_runs(alike, FEWEST_CALM - 1)]
     size = [float(np.sqrt(np.median(energy[a : b + 1]))) for a, b in spans]
     for (a, b), rms in zip(spans, size, strict=True):
         if rms >= at_work * max(size):
@@ -276,7 +276,7 @@ def _select_calm_cycles(x: np.ndarray, cycle: int, at_work: float) -> slice:
     return whole
 
 
-def _variances(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _compute_variances(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Variances of cycles (M, n), (M,), and of what each differs by from the one before, (M - 1,);
     some at a time.
     """
@@ -362,7 +362,7 @@ def _fit(
     return "fit for phasors and for waves"
 
 
-def spectrum(wave: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+def compute_spectrum(wave: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
     """The spectrum of a wave, by a Hann window.
 
     Parameters
@@ -382,7 +382,7 @@ def spectrum(wave: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
     Examples
     --------
     >>> wave = np.sqrt(2) * np.sin(2 * np.pi * 50 * np.arange(400) / 2000)
-    >>> f, size = spectrum(wave, 2000.0)
+    >>> f, size = compute_spectrum(wave, 2000.0)
     >>> float(f[size.argmax()]), round(float(size.max()), 6)
     (50.0, 1.0)
     """

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.recording.label import kind, normalize
+from tractexp.recording.label import find_kind, normalize
 from tractexp.recording.phase_mark import CYRILLIC
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots
@@ -50,7 +50,7 @@ LEAST_DIRECT_RIPPLE = 5e-3  # of the mean: what ripples less may as well be an R
 USUAL_RIPPLE = 0.9  # of the windows: what has more in others is a step, or alternated for a while
 
 
-def opposite_pairs(phasors: Snapshots, volts: Sequence[int]) -> list[tuple[int, int]]:
+def find_opposite_pairs(phasors: Snapshots, volts: Sequence[int]) -> list[tuple[int, int]]:
     """Voltages of 25 kV that are opposite to each other while they are alive, two by two: those of
     each arm of a substation.
     """
@@ -78,7 +78,7 @@ def is_between_conductors(phasors: Snapshots, voltage: int) -> bool:
     return BETWEEN[0] <= phasors.size([voltage]) <= BETWEEN[1]
 
 
-def conductor_pairs(
+def find_conductor_pairs(
     recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int]
 ) -> list[tuple[int, int, bool]]:
     """(contact line, negative feeder) currents that belong to `volts`, one voltage each or the one
@@ -99,13 +99,13 @@ def conductor_pairs(
         pairs = [*zip(contacts, feeds, strict=True)]
     else:
         pairs = [*zip(amps[::2], amps[1::2], strict=False)] if len(amps) % 2 == 0 else []
-    carried = [(*pair, False) for pair in pairs if _opposite_angles(phasors, pair)]
+    carried = [(*pair, False) for pair in pairs if _are_opposite_angles(phasors, pair)]
     if named:
-        carried += [(*pair, True) for pair in pairs if _opposite_angles(phasors, pair, -1.0)]
+        carried += [(*pair, True) for pair in pairs if _are_opposite_angles(phasors, pair, -1.0)]
     return carried
 
 
-def _opposite_angles(phasors: Snapshots, pair: tuple[int, int], sign: float = 1.0) -> bool:
+def _are_opposite_angles(phasors: Snapshots, pair: tuple[int, int], sign: float = 1.0) -> bool:
     """Whether two currents are opposite in angle, as those of contact line and feeder are, though
     not in size; with `sign` -1 whether they have one angle.
     """
@@ -132,12 +132,12 @@ def find_other_conductor(
             [bool(CONTACT.search(n)) for n in names],
         )
         apart = feeds[0] != feeds[1] and contacts[feeds.index(False)]
-        if other != current and apart and _opposite_angles(phasors, (current, other)):
+        if other != current and apart and _are_opposite_angles(phasors, (current, other)):
             return other
     return None
 
 
-def unnamed_conductor(
+def find_unnamed_conductor(
     recording: Recording, phasors: Snapshots, current: int, amps: Sequence[int]
 ) -> int | None:
     """The only other current, of the same angle, where no name tells their conductors; else
@@ -147,7 +147,7 @@ def unnamed_conductor(
     others = [i for i in amps if i != current]
     if len(others) != 1 or FEED.search(names) or CONTACT.search(names):
         return None
-    return others[0] if _opposite_angles(phasors, (current, others[0]), -1.0) else None
+    return others[0] if _are_opposite_angles(phasors, (current, others[0]), -1.0) else None
 
 
 def is_return(recording: Recording, number: int) -> bool:
@@ -159,24 +159,28 @@ def is_return(recording: Recording, number: int) -> bool:
     if RETURN.search(normalize(f"{channel.name} {channel.circuit}")):
         return True
     name = normalize(channel.name)
-    voltages = (normalize(c.name) for c in recording.channels if kind(c) == "voltage")
+    voltages = (normalize(c.name) for c in recording.channels if find_kind(c) == "voltage")
     return name in ("ir", "i_r", "i r") and not any(
         re.search(r"(?<![a-z])(?:[uve][_ ]?)?r(?![a-z])", one) for one in voltages
     )
 
 
-def contact_first(recording: Recording, pair: tuple[int, int]) -> tuple[int, int]:
+def order_contact_first(recording: Recording, pair: tuple[int, int]) -> tuple[int, int]:
     """Two voltages, that of the contact line first, as far as their names tell."""
     first, second = (normalize(recording.channels[i].name) for i in pair)
     swapped = FEED.search(first) and CONTACT.search(second) and not FEED.search(second)
     return (pair[1], pair[0]) if swapped else pair
 
 
-def direct_voltage(recording: Recording) -> str:
+def describe_direct_voltage(recording: Recording) -> str:
     """The mean, ripple and dip of direct voltages, one clause; "" where none are recorded."""
     said = ""
     for number, channel in enumerate(recording.channels):
-        if channel.form != "waveform" or kind(channel) != "voltage" or is_unit_in_doubt(channel):
+        if (
+            channel.form != "waveform"
+            or find_kind(channel) != "voltage"
+            or is_unit_in_doubt(channel)
+        ):
             continue
         seen, start = _measure_direct(recording, number)
         if seen is not None and seen.alternates:
@@ -192,7 +196,9 @@ def describe_direct_beside(recording: Recording, numbers: Sequence[int]) -> list
     return [
         f"{voltage.describe(recording.channels[i].name.strip(), start)}; no load is shown of it"
         for i, voltage, start in seen
-        if voltage is not None and voltage.is_direct and kind(recording.channels[i]) == "voltage"
+        if voltage is not None
+        and voltage.is_direct
+        and find_kind(recording.channels[i]) == "voltage"
     ]
 
 

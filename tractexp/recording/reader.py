@@ -29,8 +29,8 @@ from tractexp.recording.estimator import estimator_of
 from tractexp.recording.event_files import check_joined, event_paths
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.joined import join_recordings
-from tractexp.recording.label import order, shared_name
-from tractexp.recording.measure import FeederWaves, phasors_of
+from tractexp.recording.label import find_shared_name, order
+from tractexp.recording.measure import FeederWaves, measure_phasors
 from tractexp.recording.proposal import propose
 from tractexp.recording.quality import describe_clipped, measure_clipped_shares
 from tractexp.recording.recording import Recording, Segment
@@ -332,7 +332,7 @@ class WaveformReader(Reader):
             several = []
             for segment in stretch:
                 try:
-                    parts.append(phasors_of(recording, feeder, segment, *settings))
+                    parts.append(measure_phasors(recording, feeder, segment, *settings))
                 except UserError as error:
                     short.append(error)
                     continue
@@ -384,7 +384,7 @@ class WaveformReader(Reader):
 
 def _identify_load(recording: Recording, feeder: Feeder) -> dict[str, str]:
     """Which load it is, as far as the file says."""
-    load = feeder.name or shared_name([recording.channels[i] for i in feeder.currents])
+    load = feeder.name or find_shared_name([recording.channels[i] for i in feeder.currents])
     fields = {"station": recording.station, "device": recording.device, "load": load}
     for key, numbers in (("voltages", feeder.voltages), ("currents", feeder.currents)):
         fields[key] = ", ".join(recording.channels[i].name.strip() for i in numbers)

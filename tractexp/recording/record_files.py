@@ -8,7 +8,7 @@ from typing import Any
 
 from tractexp.configuration.plugin import discover
 from tractexp.errors import DATA, UserError
-from tractexp.record import Reader, endings
+from tractexp.record import Reader, list_endings
 from tractexp.record.foreign import is_record
 from tractexp.storage import files
 
@@ -33,7 +33,7 @@ def find_records(folder: Path) -> Iterator[Path]:
         raise UserError(f"{DATA.path}={folder} is a file; give the folder it lies in")
     if not folder.is_dir():
         raise UserError(f"{DATA.path}={folder} is no folder that is there")
-    readable = endings()
+    readable = list_endings()
     for place, below, names in os.walk(folder):
         # a converted file may still be opened by its own path
         if RUN in below and Path(place) != folder:
@@ -51,7 +51,7 @@ def find_packed(archive: Path) -> list[Path]:
     """The records in a .zip, in order of name. Raises `UserError` for one that cannot be read, or
     holds another archive.
     """
-    inside, readable = files.list_packed(archive), endings()
+    inside, readable = files.list_packed(archive), list_endings()
     for path in inside:
         if path.suffix.lower() == archive.suffix.lower():
             within = path.relative_to(archive)

@@ -49,7 +49,7 @@ FEWEST_PER_CYCLE = 10  # samples: a slower segment holds no waveform but magnitu
 NOTHING_BRIDGED = (np.empty(0, dtype=int), np.empty(0))
 
 
-def unit_of(text: str) -> tuple[str, float]:
+def find_unit(text: str) -> tuple[str, float]:
     """The quantity of a unit and its size in kV, kA, ...
 
     Parameters
@@ -64,7 +64,7 @@ def unit_of(text: str) -> tuple[str, float]:
 
     Examples
     --------
-    >>> unit_of("[V]"), unit_of("kA"), unit_of("MW")
+    >>> find_unit("[V]"), find_unit("kA"), find_unit("MW")
     (('voltage', 0.001), ('current', 1.0), ('', 1.0))
     """
     text = unicodedata.normalize("NFKC", text).strip(" .")
@@ -74,15 +74,15 @@ def unit_of(text: str) -> tuple[str, float]:
     return MEGA.get(latin) or UNITS.get(text.lower()) or UNITS.get(latin.lower(), ("", 1.0))
 
 
-def quantity_of(text: str) -> str:
+def find_quantity(text: str) -> str:
     """The quantity of a unit as a file writes it, also of several, where the size stays open.
 
     Examples
     --------
-    >>> quantity_of("V/kV"), quantity_of("V/A")
+    >>> find_quantity("V/kV"), find_quantity("V/A")
     ('voltage', '')
     """
-    quantities = {unit_of(part)[0] for part in re.split(r"[/|;]", text)}
+    quantities = {find_unit(part)[0] for part in re.split(r"[/|;]", text)}
     return quantities.pop() if len(quantities) == 1 else ""
 
 
@@ -222,7 +222,7 @@ class Channel:
     @property
     def factor(self) -> float:
         """From the file's unit to the one used inside; 1 where it is not known."""
-        return unit_of(self.unit)[1]
+        return find_unit(self.unit)[1]
 
 
 @dataclass(frozen=True, eq=False)

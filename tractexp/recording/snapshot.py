@@ -95,7 +95,7 @@ class Snapshots:
         return float(np.percentile(spans, 25, axis=1).max())
 
 
-def snapshots(
+def take_snapshots(
     recording: Recording, numbers: Sequence[int], frequency: float | None = None
 ) -> Snapshots | None:
     """Windows of all segments that hold two cycles or more of waveforms, one after another; None
@@ -165,7 +165,7 @@ def _build_basis(turns: float, n: int) -> tuple[np.ndarray, np.ndarray]:
     return basis, np.linalg.pinv(basis)
 
 
-def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
+def measure_frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
     """Frequency [Hz] measured on the largest of the channels while it is alive; None where none
     turns.
 
@@ -180,7 +180,7 @@ def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
     if not coarse:
         return None
     at = max(coarse)[1]
-    windows = snapshots(recording, numbers, at)
+    windows = take_snapshots(recording, numbers, at)
     if windows is None or windows.X.shape[1] < 3:
         return at
     X = np.nan_to_num(windows.X)
@@ -193,24 +193,26 @@ def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
     return at + float(np.median(turned))
 
 
-def network_frequency(recording: Recording) -> float | None:
+def measure_network_frequency(recording: Recording) -> float | None:
     """The network's frequency [Hz] as the largest of a recording's channels shows it; None where
     none does.
     """
     if recording not in _network:
         volts = [i for i, c in enumerate(recording.channels) if c.quantity == "voltage"]
-        f = frequency(recording, volts) or frequency(recording, range(len(recording.channels)))
-        _network[recording] = f if f is not None and nearest_nominal(f) is not None else None
+        f = measure_frequency(recording, volts) or measure_frequency(
+            recording, range(len(recording.channels))
+        )
+        _network[recording] = f if f is not None and find_nominal_frequency(f) is not None else None
     return _network[recording]
 
 
-def frequency_of(recording: Recording, numbers: Sequence[int]) -> float | None:
+def choose_frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
     """That of the network, where some of the channels turn with it; else as `frequency`."""
-    f = network_frequency(recording)
-    seen = snapshots(recording, numbers, f) if f is not None else None
+    f = measure_network_frequency(recording)
+    seen = take_snapshots(recording, numbers, f) if f is not None else None
     if seen is not None and any(seen.pure(number) for number in numbers):
         return f
-    return frequency(recording, numbers)
+    return measure_frequency(recording, numbers)
 
 
 def _find_strongest_line(
@@ -235,7 +237,7 @@ def _find_strongest_line(
     return float(power[best]) * n, float(lines[best])
 
 
-def nearest_nominal(f: float) -> float | None:
+def find_nominal_frequency(f: float) -> float | None:
     """The nominal frequency [Hz] that a measured one belongs to; None for none."""
     best = min(NOMINAL, key=lambda each: abs(f / each - 1))
     return best if abs(f / best - 1) <= TUNED else None

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.record.phasor import Phasors
-from tractexp.record.phasor_measurement import BLOCK, WaveSource, frame
+from tractexp.record.phasor_measurement import BLOCK, WaveSource, turn_frame
 from tractexp.record.record import Record
 
 
@@ -73,7 +73,9 @@ def trace_waves(
             waves[:, a:b],
             functools.partial(_average_windows, low=low[windows] - a, high=high[windows] - a),
         )
-        turn = np.exp(-1j * frame(np.interp(start + np.arange(a, b) / rate, phasors.t, f), rate))
+        turn = np.exp(
+            -1j * turn_frame(np.interp(start + np.arange(a, b) / rate, phasors.t, f), rate)
+        )
         pieces.append(
             (
                 mean(np.concatenate([x**2, x[K:]])),
@@ -115,7 +117,7 @@ def join_traces(traces: Sequence[Trace]) -> Trace:
     return Trace(t, **{name: join(name) for name in names}, cycle=traces[0].cycle)
 
 
-def half_cycle_rms(
+def compute_half_cycle_rms(
     waves: WaveSource, rate: float, frequency: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """RMS over one cycle, taken anew each half cycle (IEC 61000-4-30, U_rms(1/2)) of waves (K, N).

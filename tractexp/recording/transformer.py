@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tractexp.record.phasor import sequences
+from tractexp.record.phasor import compute_sequences
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.kirchhoff import CLOSED_SUM
 from tractexp.recording.nominal_voltage import measure_offset_from_nominal
@@ -148,7 +148,9 @@ def _compare_currents(
     """(share of the current of feeder b that is no multiple of that of a, angle of the multiple
     [degrees]), (F, F) each; of a feeder and itself all of it.
     """
-    X = np.array([sequences(phasors.select_channels(f.currents))[0] for f in feeders])  # (F, M)
+    X = np.array(
+        [compute_sequences(phasors.select_channels(f.currents))[0] for f in feeders]
+    )  # (F, M)
     X = X[:, np.isfinite(X).all(axis=0)]
     products = X.conj() @ X.T
     energy = np.maximum(np.real(np.diag(products)), 1e-300)
@@ -203,7 +205,10 @@ def _has_high_voltage(recording: Recording, phasors: Snapshots, high: Feeder, lo
 
 def _measure_voltage(phasors: Snapshots, feeder: Feeder) -> float:
     """Line voltage [kV] of three voltages, to ground unless they are between phases."""
-    V1, V2 = (np.abs(np.nan_to_num(v)) for v in sequences(phasors.select_channels(feeder.voltages)))
+    V1, V2 = (
+        np.abs(np.nan_to_num(v))
+        for v in compute_sequences(phasors.select_channels(feeder.voltages))
+    )
     size = float(np.median(np.maximum(V1, V2)))
     lines = str(feeder.connection).startswith("line")
     return size if lines else float(np.sqrt(3)) * size

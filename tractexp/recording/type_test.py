@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.record.change import runs
+from tractexp.record.change import find_runs
 from tractexp.record.phasor import Phasors
 from tractexp.record.phasor_measurement import FASTEST, SLOWEST
 from tractexp.record.record import Record
@@ -224,7 +224,7 @@ class _Report:
         self.current = course.I
         self.voltage = course.U
         closed = self.current > CLOSED_SHARE * self.current.max(initial=0.0)
-        spans = runs(closed, int(self.least) + 2 * self.edge)
+        spans = find_runs(closed, int(self.least) + 2 * self.edge)
         self.closed = spans[0] if len(spans) == 1 else None
 
     def find_running(self) -> slice | None:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import DATA, UserError, list_allowed
-from tractexp.recording.label import groups, kind
-from tractexp.recording.recording import Channel, Recording, quantity_of, unit_of
+from tractexp.recording.label import find_kind, find_label_groups
+from tractexp.recording.recording import Channel, Recording, find_quantity, find_unit
 
 PLAIN = {"U": ("voltage", "V", "kV"), "I": ("current", "A", "kA")}  # by letter of the setting
 # RMS in kV, kA: no network has more, so that a larger number is in V, A
@@ -29,7 +29,7 @@ SECONDARY_VALUES = "these are secondary values"  # a note on them begins so
 _AMOUNT = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*(\D.*)", re.ASCII)
 
 
-def amount(text: str) -> tuple[float, str]:
+def parse_amount(text: str) -> tuple[float, str]:
     """(number, unit) of a setting such as "89.8 kV", what one of the file's units stands for; (1,
     "kV") of "kV".
     """
@@ -51,7 +51,7 @@ def check_units(units: Mapping[str, Any], quantities: Sequence[str] = tuple(PLAI
                 f"{DATA.units} names '{letter}'{list_allowed(letter, quantities, 'Quantities')}"
             )
         if letter in PLAIN and (
-            unit_of(amount(text)[1])[0] != PLAIN[letter][0] or amount(text)[0] <= 0
+            find_unit(parse_amount(text)[1])[0] != PLAIN[letter][0] or parse_amount(text)[0] <= 0
         ):
             _, small, large = PLAIN[letter]
             raise UserError(
@@ -67,7 +67,7 @@ def _select_channels(
     """The numbers of the channels that are of a quantity, or are called so by the user and of no
     other.
     """
-    called = [i for i, c in enumerate(channels) if kind(c) == quantity or i in chosen]
+    called = [i for i, c in enumerate(channels) if find_kind(c) == quantity or i in chosen]
     return [i for i in called if channels[i].quantity in (quantity, "")]
 
 
@@ -96,7 +96,7 @@ def convert_to_units(
     for letter, (quantity, small, _) in PLAIN.items():
         ours = _select_channels(channels, quantity, chosen.get(letter, ()))
         if letter in units:
-            number, unit = amount(units[letter])
+            number, unit = parse_amount(units[letter])
             for i in ours:
                 channels[i] = _convert_channel(channels[i], quantity, unit, number)
             continue
@@ -121,11 +121,11 @@ def _have_secondary_size(channels: Sequence[Channel]) -> bool:
     volts = {
         i: c
         for i, c in enumerate(channels)
-        if c.form == "waveform" and kind(c) == "voltage" and not is_unit_in_doubt(c)
+        if c.form == "waveform" and find_kind(c) == "voltage" and not is_unit_in_doubt(c)
     }
     sizes = {i: c.factor * _measure_size(c) for i, c in volts.items()}
     alive = [i for i, size in sizes.items() if size > ALIVE * max(sizes.values())]
-    lines = {i for group in groups(volts) if group.pairs for i in group.numbers}
+    lines = {i for group in find_label_groups(volts) if group.pairs for i in group.numbers}
     limits = {i: SECONDARY_LINES if i in lines else SECONDARY_GROUND for i in alive}
     return bool(alive) and all(limits[i][0] <= sizes[i] <= limits[i][1] for i in alive)
 
@@ -213,7 +213,7 @@ def _is_plainly_volts(letter: str, size: float, stated: set[str], voltage: str) 
     """Whether numbers without a unit, of that RMS, can be nothing but volts or amperes."""
     if size > GREATEST[letter]:
         return True
-    in_volts = bool(voltage) and unit_of(voltage)[1] == unit_of("V")[1]
+    in_volts = bool(voltage) and find_unit(voltage)[1] == find_unit("V")[1]
     return letter == "I" and not stated and in_volts and size >= LEAST_AMPERES
 
 
@@ -226,7 +226,7 @@ def _measure_size(channel: Channel) -> float:
 
 def is_unit_in_doubt(channel: Channel) -> bool:
     """Whether a channel's unit is none of voltage or current that is known."""
-    return not unit_of(channel.unit)[0]
+    return not find_unit(channel.unit)[0]
 
 
 def check_doubt(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> None:
@@ -259,6 +259,6 @@ def _describe_unit(channel: Channel, letter: str) -> str:
     if not unit:
         return "no unit"
     open_question = (
-        f", which may be {PLAIN[letter][1]} or {PLAIN[letter][2]}," if quantity_of(unit) else ""
+        f", which may be {PLAIN[letter][1]} or {PLAIN[letter][2]}," if find_quantity(unit) else ""
     )
     return f"the unit '{unit}'{open_question}"

@@ -2,17 +2,17 @@
 
 from tractexp.errors import UserError
 from tractexp.recording.channel_group import list_waves
-from tractexp.recording.label import is_other_quantity, kind
-from tractexp.recording.railway import direct_voltage
+from tractexp.recording.label import find_kind, is_other_quantity
+from tractexp.recording.railway import describe_direct_voltage
 from tractexp.recording.recording import Recording
-from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
+from tractexp.recording.snapshot import find_nominal_frequency, measure_frequency, take_snapshots
 
 
 def can_be_named(recording: Recording) -> bool:
     """Whether settings that name voltages and currents can help: there are waves that may be one
     and the other.
     """
-    if direct_voltage(recording):
+    if describe_direct_voltage(recording):
         return False
     try:
         recording.waveforms()
@@ -23,8 +23,8 @@ def can_be_named(recording: Recording) -> bool:
         for i, c in enumerate(recording.channels)
         if c.form == "waveform" and not is_other_quantity(c)
     ]
-    f = frequency(recording, numbers)
-    phasors = snapshots(recording, numbers, f) if f and nearest_nominal(f) else None
+    f = measure_frequency(recording, numbers)
+    phasors = take_snapshots(recording, numbers, f) if f and find_nominal_frequency(f) else None
     waves = [recording.channels[i] for i in numbers if phasors is not None and phasors.pure(i)]
     volts, amps = (
         sum(c.quantity in (quantity, "") for c in waves) for quantity in ("voltage", "current")
@@ -39,13 +39,15 @@ def explain_unrecognized(recording: Recording) -> str:
     try:
         recording.waveforms()
     except UserError as error:
-        return direct_voltage(recording) or str(error).removeprefix(f"{recording.source}: ")
+        return describe_direct_voltage(recording) or str(error).removeprefix(
+            f"{recording.source}: "
+        )
     if 2 / recording.frequency >= seconds:
         return (
             f"it lasts {seconds:.3g} s at {longest.rate:g} Hz, less than two cycles of"
             f" {recording.frequency:g} Hz"
         )
-    if direct := direct_voltage(recording):
+    if direct := describe_direct_voltage(recording):
         return direct
     quantities = ("voltage", "current")
     if lacking := next((each for each in quantities if not list_waves(recording, each)), ""):
@@ -56,11 +58,11 @@ def explain_unrecognized(recording: Recording) -> str:
 
 def _explain_voltages(recording: Recording) -> str:
     """Why a recording with voltages and currents shows no load."""
-    volts = [i for i, c in enumerate(recording.channels) if kind(c) == "voltage"]
-    f = frequency(recording, volts)
-    if f is not None and nearest_nominal(f) is None:
+    volts = [i for i, c in enumerate(recording.channels) if find_kind(c) == "voltage"]
+    f = measure_frequency(recording, volts)
+    if f is not None and find_nominal_frequency(f) is None:
         return f"the strongest line of its voltages is at {f:.3g} Hz, which is no network's"
-    phasors = snapshots(recording, volts)
+    phasors = take_snapshots(recording, volts)
     if phasors is None or not any(phasors.size([i]) > 0 for i in volts):
         return "its voltages are zero"
     return "no three voltages and currents have names or angles of phases"

@@ -50,7 +50,7 @@ def list_candidates(findings: Findings) -> list[CandidateRow]:
     return sorted(rows, key=lambda row: (row.rank, -np.nan_to_num(row.drop, nan=-1.0), row.names))
 
 
-def chance_level(findings: Findings) -> float:
+def find_chance_level(findings: Findings) -> float:
     """The drop of the deviance from which a name is given: chance gives it to the best of all in 2
     % of cases.
     """
@@ -66,7 +66,11 @@ def explain_other_than_steepest(findings: Findings) -> str:
     otherwise.
     """
     scores = findings.first.scores
-    if not scores or scores[0].drop < chance_level(findings) or findings.names == (scores[0].name,):
+    if (
+        not scores
+        or scores[0].drop < find_chance_level(findings)
+        or findings.names == (scores[0].name,)
+    ):
         return ""
     best = scores[0]
     promise = f"{best.name} promises most in one linear step from the base model"

@@ -17,9 +17,9 @@ from tractexp.report.candidate_rows import (
     FITTED,
     ONE_STEP,
     CandidateRow,
-    chance_level,
     describe_untestable_beside,
     explain_other_than_steepest,
+    find_chance_level,
     list_candidates,
 )
 from tractexp.report.predicted import BAR, add_prediction_section
@@ -87,7 +87,7 @@ def _chart_drops(
     """Each candidate's drop of the deviance as a bar, colored by its status."""
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
     entries = [_describe_bar(row) for row in rows]
-    chance = chance_level(findings)
+    chance = find_chance_level(findings)
     chart = Chart("deviance", [""], pixels=130 + BAR * len(rows))
     chart.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, hover=entries)
     return chart.edge(chance, dash="dash").limits(
@@ -112,7 +112,7 @@ def _caption_drops(findings: Findings, rows: Sequence[CandidateRow]) -> str:
         colors.append("blue: refitted")
     if any(r.how == ONE_STEP for r in rows):
         colors.append("gray: estimated in one linear step")
-    chance = f"{chance_level(findings):.1f}, what chance gives to the most helpful of all in"
+    chance = f"{find_chance_level(findings):.1f}, what chance gives to the most helpful of all in"
     return (
         f"By how much each alone lowers the deviance of the base model ({', '.join(colors)})."
         f" Dashed: {chance} {findings.context.criteria.naming_false_alarms:.0%} of cases."

@@ -6,7 +6,7 @@ from tractexp.inference.chance import BLURRED, format_drawn_p
 from tractexp.text.wording import format_probability
 
 
-def places(page: Report, findings: Findings) -> None:
+def add_places(page: Report, findings: Findings) -> None:
     """Whether and where the base model disagrees with the records."""
     first = findings.first
     page.heading("Is there a disagreement, and where?")
@@ -42,7 +42,7 @@ def places(page: Report, findings: Findings) -> None:
     )
 
 
-def noise(page: Report, findings: Findings) -> None:
+def add_noise(page: Report, findings: Findings) -> None:
     """Add what is known of the noise, and where that comes from."""
     context, fit = findings.context, findings.last
     quiet = fit.noise.loudest_input_mode <= BLURRED

@@ -17,18 +17,24 @@ from tractexp.discrepancy.readings import read_shapes
 from tractexp.discrepancy.recommend import recommend_next
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.inference.model_error import format_percent, tell_error
-from tractexp.record.identity import Identity, describe_identities, title
+from tractexp.record.identity import Identity, compose_title, describe_identities
 from tractexp.report.candidates import add_candidates
-from tractexp.report.disagreement import noise, places
+from tractexp.report.disagreement import add_noise, add_places
 from tractexp.report.explained import answer_clicks
-from tractexp.report.extended import equations, interval, laws, parameters, value
-from tractexp.report.next_event import section
-from tractexp.report.overlay import overlaid
-from tractexp.report.proposal import add_proposal_section, headlines
+from tractexp.report.extended import (
+    add_equations,
+    add_laws,
+    add_parameters,
+    format_estimate,
+    format_interval,
+)
+from tractexp.report.next_event import add_section
+from tractexp.report.overlay import add_overlays
+from tractexp.report.proposal import add_proposal_section, list_headlines
 from tractexp.text.wording import (
     count_noun,
-    epsilon,
     finish_sentence,
+    format_epsilon,
     join_alternatives,
     join_words,
 )
@@ -50,7 +56,7 @@ CURRENTS = (
 )
 
 
-def summary(findings: "Outcome") -> Report:
+def build_summary(findings: "Outcome") -> Report:
     """The verdict first, then how large the gap is and how much of it is closed, where, and what to
     do next.
     """
@@ -64,7 +70,7 @@ def summary(findings: "Outcome") -> Report:
     report.items(
         [f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"]
     )
-    report.add(gap(content))
+    report.add(build_gap_table(content))
     report.text(*describe_where(content), *describe_nearest(content, findings.sizes_of_nearest))
     return report.text(f"noise: {content['noise']}", f"next: {findings.recommendation}")
 
@@ -97,7 +103,7 @@ def describe_nearest(content: Mapping[str, Any], sizes: Sequence[str]) -> list[s
     ]
 
 
-def gap(content: Mapping[str, Any]) -> Table:
+def build_gap_table(content: Mapping[str, Any]) -> Table:
     """How far off the base model is, and the extended one where an effect was named."""
     gaps, named, rows = content["gap"], bool(content["effects"]), []
     waves = "epsilon_i" in gaps["train"]["before"]
@@ -151,10 +157,8 @@ def report(
     lead = "; ".join(
         [*describe_identities(identities), f"{findings.context.model.title}, {fitted}"]
     )
-    page = Report(
-        f"Missing effect: {title(identities, (e.record.name for e in findings.context.events))}",
-        lead,
-    )
+    title = compose_title(identities, (e.record.name for e in findings.context.events))
+    page = Report(f"Missing effect: {title}", lead)
     spoken = [
         [findings.catalogue.label_effect(name) for name in names] for names in findings.verdict.sets
     ]
@@ -163,14 +167,14 @@ def report(
     sentences = [
         finish_sentence(findings.reason),
         *left,
-        *headlines(findings),
+        *list_headlines(findings),
         _describe_grade(findings),
     ]
     kind = (
         "plain" if findings.names and not findings.verdict.complete else KIND[findings.verdict.word]
     )
     page.verdict(head, *sentences, f"Next: {recommend_next(findings)}.", kind=kind)
-    overlaid(
+    add_overlays(
         page.heading("Measured, before, after" if findings.names else "Measured and calculated"),
         findings.graded_overlays,
         answer_clicks(findings),
@@ -182,14 +186,14 @@ def report(
         _add_remainder_section(page, findings)
     if (chosen := findings.next_event) is not None:
         page.heading("What to record next").text(finish_sentence(chosen.sentence()))
-        section(page, chosen)
-    laws(page, findings)
+        add_section(page, chosen)
+    add_laws(page, findings)
     add_candidates(page, findings)
-    parameters(page, findings)
+    add_parameters(page, findings)
     if findings.names:
-        equations(page, findings)
-    places(page, findings)
-    noise(page, findings)
+        add_equations(page, findings)
+    add_places(page, findings)
+    add_noise(page, findings)
     return page
 
 
@@ -206,7 +210,7 @@ def _describe_grade(findings: Findings) -> str:
 def _add_gap(page: Report, findings: Findings, content: Mapping[str, Any]) -> None:
     """The gap; where nothing explains it, that of the nearest candidates beside it."""
     page.heading("How large the gap is" if not findings.names else "How much smaller the gap is")
-    table, near = gap(content), findings.nearest
+    table, near = build_gap_table(content), findings.nearest
     page.add(replace(table, rows=_describe_gap_with_nearest(near)) if near else table)
     if len(steps := content["contributions"]) > 2:
         rows = [
@@ -260,7 +264,7 @@ def _describe_misfit(misfit: Mapping[str, Any], *, waves: bool) -> list[str]:
     shown = ["epsilon_p", "epsilon_q", *(["epsilon_i"] if waves else [])]
     chi2 = misfit["chi2_per_sample"]
     told = "" if chi2 is None or not np.isfinite(chi2) else f"{chi2:.3f}"
-    return [*(epsilon(misfit[name]) for name in shown), told]
+    return [*(format_epsilon(misfit[name]) for name in shown), told]
 
 
 def _add_remainder_section(page: Report, findings: Findings) -> None:
@@ -351,7 +355,17 @@ def _add_nearest(page: Report, findings: Findings, near: Nearest) -> None:
     with page.fold_blocks(f"How large {join_words(near.names)} would be"):
         page.table(
             ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],
-            [[p.name, p.about, p.unit, value(e), interval(*e.interval), e.verdict] for e, p in own],
+            [
+                [
+                    p.name,
+                    p.about,
+                    p.unit,
+                    format_estimate(e),
+                    format_interval(*e.interval),
+                    e.verdict,
+                ]
+                for e, p in own
+            ],
             "As if they were right; something else is missing, so that the intervals may miss the"
             " truth.",
             words=(1, 2, 5),

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tractexp.blocks import Report, Table
-from tractexp.report.discrepancy import describe_nearest, describe_where, gap
+from tractexp.report.discrepancy import build_gap_table, describe_nearest, describe_where
 from tractexp.report.screen import describe_load
 from tractexp.text.wording import join_alternatives, shorten
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 MOST_SIZES = 3  # parameters of the effects named that the screen has room for
 
 
-def screen(found: "Investigation") -> Report:
+def build_screen(found: "Investigation") -> Report:
     """One screen, the verdict first."""
     names = join_alternatives(found.content["name_sets"])
     page = Report().text(f"verdict: {found.verdict.upper()} {shorten(names)}".rstrip())
@@ -42,6 +42,6 @@ def _describe_grade(found: "Investigation") -> str:
 
 def _build_gap(found: "Investigation") -> Table:
     """The gap without the errors of single channels."""
-    table = gap(found.content)
+    table = build_gap_table(found.content)
     epsilons = [k for k, name in enumerate(table.columns) if name.startswith("epsilon")]
     return replace(table, detail=epsilons)

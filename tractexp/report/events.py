@@ -42,7 +42,7 @@ def _shade_places(chart: Chart, places: Sequence[Any], above: int) -> None:
             chart.shade(place.start, place.end, EXCESS, panel, said, opacity=0.25)
 
 
-def event_chart(
+def draw_event(
     event: Event,
     curves: Sequence[CalculatedCurve],
     *,

@@ -20,7 +20,7 @@ from tractexp.text.wording import format_with_error, join_alternatives, join_wor
 CURVE, TEXTBOOK = "#0072B2", "#D55E00"
 
 
-def laws(page: Report, findings: Findings) -> None:
+def add_laws(page: Report, findings: Findings) -> None:
     """Where each effect named acts, what it does there and by which law; curves that were found."""
     if not findings.names:
         return
@@ -66,7 +66,7 @@ def _chart_law(law: Mapping[str, Any]) -> Chart:
     return chart.limits(0, float(shown.min()) - room, float(shown.max()) + room)
 
 
-def parameters(page: Report, findings: Findings) -> None:
+def add_parameters(page: Report, findings: Findings) -> None:
     """The base model's parameters before and after, and those that came in."""
     page.heading(
         "Parameters before and after" if findings.names else "Parameters of the base model"
@@ -75,15 +75,15 @@ def parameters(page: Report, findings: Findings) -> None:
     rows, parameter_estimates = [], findings.graded_parameters
     for e in parameter_estimates:
         p, was = e.parameter, before.get(e.parameter.name)
-        entries = [value(was) if was else "not in it"] if findings.names else []
+        entries = [format_estimate(was) if was else "not in it"] if findings.names else []
         rows.append(
             [
                 p.name,
                 p.about,
                 p.unit,
                 *entries,
-                value(e),
-                interval(*e.interval),
+                format_estimate(e),
+                format_interval(*e.interval),
                 shorten_verdict(e.verdict),
             ]
         )
@@ -111,7 +111,7 @@ def parameters(page: Report, findings: Findings) -> None:
             page.items(why)
 
 
-def equations(page: Report, findings: Findings) -> None:
+def add_equations(page: Report, findings: Findings) -> None:
     """The equations that changed or came in, and how the extended model is used."""
     from tractexp.model.printed import list_changed_lines
 
@@ -138,12 +138,12 @@ def equations(page: Report, findings: Findings) -> None:
             page.equation(line)
 
 
-def value(estimate: ParameterEstimate) -> str:
+def format_estimate(estimate: ParameterEstimate) -> str:
     """An estimate with its error, and whether it is at its bound."""
     bound = "" if np.isfinite(estimate.error) else ", at its bound"
     return f"{format_with_error(estimate.value, estimate.error)}{bound}"
 
 
-def interval(low: float, high: float) -> str:
+def format_interval(low: float, high: float) -> str:
     """ "0.1 to 0.2"; "" where an end is open."""
     return f"{low:.4g} to {high:.4g}" if np.isfinite([low, high]).all() else ""

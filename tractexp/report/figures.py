@@ -82,7 +82,7 @@ def fit(
         return style.save(figure, path)
 
 
-def response(
+def draw_response(
     path: Path,
     t: np.ndarray,
     U: np.ndarray,

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from tractexp.text.wording import epsilon, join_words
+from tractexp.text.wording import format_epsilon, join_words
 
 if TYPE_CHECKING:
     from tractexp.api.identification import Identification
@@ -39,7 +39,9 @@ def describe_search_end(fit: "Identification") -> str:
     result, search = fit.result, fit.result.search
     if not search:
         return ""
-    errors = ", ".join(f"{name} {epsilon(search[name])}" for name in ("epsilon_p", "epsilon_q"))
+    errors = ", ".join(
+        f"{name} {format_epsilon(search[name])}" for name in ("epsilon_p", "epsilon_q")
+    )
     return (
         f"search: {result.optimizer} {search['status']}: objective {search['objective']:.4g} pu²"
         f" (the estimate's is {result.objective:.4g}), {errors}, {search['simulations']}"

@@ -6,7 +6,7 @@ from tractexp.blocks import Report
 from tractexp.identification.network_comparison import describe_poles
 from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.report.fit_sentences import describe_rivals, describe_search_end
-from tractexp.report.fit_tables import digits, errors, parameters
+from tractexp.report.fit_tables import format_digits, tabulate_model_errors, tabulate_parameters
 from tractexp.report.race import tabulate_race
 from tractexp.text.wording import describe_shown_effects, finish_sentence
 
@@ -14,27 +14,27 @@ if TYPE_CHECKING:
     from tractexp.api.identification import Identification
 
 
-def summary(fit: "Identification") -> Report:
+def build_summary(fit: "Identification") -> Report:
     """Grade, estimates, errors, why some parameters are not identified, and the next steps."""
     result = fit.result
     verdicts = select_verdicts_of_parameters(result)
     poor = [f"{name}: {verdict}" for name, verdict in name_verdicts(result).items()]
     notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
-    start = [text for event in result.events if (text := starts_at_rest(event))]
+    start = [text for event in result.events if (text := describe_rest(event))]
     report = Report()
     if fit.headline:
         report.text(finish_sentence(fit.usability_sentence))
-    report.add(parameters(fit), *tabulate_race(result.race))
-    report.text(*machine(fit), *describe_rivals(fit), *filter(None, [result.on_given_base()])).add(
-        errors(fit)
-    )
+    report.add(tabulate_parameters(fit), *tabulate_race(result.race))
+    report.text(
+        *describe_machine(fit), *describe_rivals(fit), *filter(None, [result.on_given_base()])
+    ).add(tabulate_model_errors(fit))
     return report.text(
-        *yardstick(fit),
-        *samples(fit),
-        *correlations(fit),
+        *describe_yardstick(fit),
+        *describe_samples(fit),
+        *list_correlations(fit),
         *start,
         result.acceptance,
-        *([headline(result)] if verdicts else []),
+        *([write_headline(result)] if verdicts else []),
         *(f"  {sentence}" for sentence in poor),
         *notes,
         *filter(None, [describe_search_end(fit)]),
@@ -42,14 +42,14 @@ def summary(fit: "Identification") -> Report:
     )
 
 
-def machine(fit: "Identification") -> list[str]:
+def describe_machine(fit: "Identification") -> list[str]:
     """How the load divides before the dip, in a sentence; [] where its model has no motor."""
     bound = fit.result.share_bound.get("sentence", "")
     division = [] if fit.operating_point is None else [str(fit.operating_point)]
-    return [*division, *filter(None, [bound]), *network(fit)]
+    return [*division, *filter(None, [bound]), *describe_network(fit)]
 
 
-def network(fit: "Identification") -> list[str]:
+def describe_network(fit: "Identification") -> list[str]:
     """Sentences on what the records show beside the fitted load, and on its nuisances; [] where
     nothing.
     """
@@ -57,7 +57,7 @@ def network(fit: "Identification") -> list[str]:
     if not result.shown_effects:
         return []
     values = ", ".join(
-        f"{n} {digits(v)} {result.units.get(n, '')}".rstrip(" 1")
+        f"{n} {format_digits(v)} {result.units.get(n, '')}".rstrip(" 1")
         for n, v in result.nuisances.items()
     )
     return [describe_shown_effects(result.shown_effects), f"nuisances of the fit: {values}"]
@@ -76,7 +76,7 @@ def select_verdicts_of_parameters(result: Any) -> dict[str, str]:
     }
 
 
-def yardstick(fit: "Identification") -> list[str]:
+def describe_yardstick(fit: "Identification") -> list[str]:
     """The best linear network beside it, in a sentence, with its poles where there are some; []
     where not judged.
     """
@@ -86,7 +86,7 @@ def yardstick(fit: "Identification") -> list[str]:
     return [finish_sentence(fit.yardstick) + beside] if fit.yardstick else []
 
 
-def starts_at_rest(event: dict[str, Any]) -> str:
+def describe_rest(event: dict[str, Any]) -> str:
     """How well a simulation in waveforms begins at rest, in a sentence; "" in phasors, which do so
     exactly.
     """
@@ -99,7 +99,7 @@ def starts_at_rest(event: dict[str, Any]) -> str:
     return f"periodic steady state before {event['name']}: {change}"
 
 
-def headline(result: Any) -> str:
+def write_headline(result: Any) -> str:
     """How many of the parameters are identified, and which are not, in one sentence."""
     verdicts = select_verdicts_of_parameters(result)
     poor = [
@@ -115,7 +115,7 @@ def headline(result: Any) -> str:
     )
 
 
-def samples(fit: "Identification") -> list[str]:
+def describe_samples(fit: "Identification") -> list[str]:
     """How many samples were fitted, in a sentence; [] of an early result."""
     statistics = fit.result.uncertainty
     if "samples" not in statistics:
@@ -126,7 +126,7 @@ def samples(fit: "Identification") -> list[str]:
     return [f"fitted: {said}, {statistics['freedom']} degrees of freedom"]
 
 
-def correlations(fit: "Identification") -> list[str]:
+def list_correlations(fit: "Identification") -> list[str]:
     """The correlations that a terminal has room for, the strongest first; [] where
     none is strong.
     """

@@ -8,7 +8,7 @@ from tractexp.identification.verdict import shorten_verdict
 from tractexp.inference.model_error import format_percent, tell_error
 from tractexp.record.identity import Identity
 from tractexp.report.fitted_curves import ROLES
-from tractexp.text.wording import epsilon
+from tractexp.text.wording import format_epsilon
 
 if TYPE_CHECKING:
     from tractexp.api.identification import Identification
@@ -28,12 +28,12 @@ MODEL_ERROR = (
 FIXED = "fixed"
 
 
-def digits(value: float) -> str:
+def format_digits(value: float) -> str:
     """A number with four digits."""
     return f"{value:.4g}"
 
 
-def parameters(fit: "Identification") -> Table:
+def tabulate_parameters(fit: "Identification") -> Table:
     """The estimates. Where the search ended is a detail, unless that lies outside an interval."""
     rows = [
         [
@@ -86,7 +86,7 @@ def tabulate_search_end(fit: "Identification") -> Table:
     return Table(["", "search ended at", "estimate", "unit", "they differ"], rows, words=(3, 4))
 
 
-def errors(fit: "Identification") -> Table:
+def tabulate_model_errors(fit: "Identification") -> Table:
     """The model's error on each event, and the errors of Eq. (20)."""
     return tabulate_errors(fit.result)
 
@@ -95,15 +95,17 @@ def tabulate_errors(result: Any) -> Table:
     """The errors of a result on each event."""
     unknown = {"value": None, "interval": (), "of_S": None}
     of_events = result.model_error.get("events") or [unknown] * len(result.events)
-    return error_table(result.events, of_events, result.epsilons)
+    return build_error_table(result.events, of_events, result.epsilons)
 
 
-def error_rows(result: Any) -> list[list[str]]:
+def list_error_rows(result: Any) -> list[list[str]]:
     """Name, role, model's error and its interval of each event."""
     return [[str(cell) for cell in row[:4]] for row in tabulate_errors(result).rows]
 
 
-def error_table(events: Sequence[Any], of_events: Sequence[Any], epsilons: Sequence[str]) -> Table:
+def build_error_table(
+    events: Sequence[Any], of_events: Sequence[Any], epsilons: Sequence[str]
+) -> Table:
     """Entries of `events` and of `model_error` as `result.json` has them, a row each."""
     columns = ["event", "role", "model error", "95 % interval", "of S", *epsilons]
     rows = [
@@ -113,7 +115,7 @@ def error_table(events: Sequence[Any], of_events: Sequence[Any], epsilons: Seque
             tell_error(m),
             "" if m.get("stalls") else " .. ".join(map(format_percent, m["interval"])),
             "" if m.get("stalls") else format_percent(m["of_S"]),
-            *(epsilon(e[key]) for key in epsilons),
+            *(format_epsilon(e[key]) for key in epsilons),
         ]
         for e, m in zip(events, of_events, strict=True)
     ]

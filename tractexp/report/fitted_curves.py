@@ -16,10 +16,10 @@ from tractexp.identification.fit import play
 from tractexp.identification.forecast import draw_dip
 from tractexp.identification.network_comparison import play_network
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.report.events import CAPTION, CalculatedCurve, event_chart, show_units
+from tractexp.report.events import CAPTION, CalculatedCurve, draw_event, show_units
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
-from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, spectrum_chart, wave_chart
-from tractexp.text.wording import epsilon, finish_sentence, join_words
+from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, draw_spectra, draw_waves
+from tractexp.text.wording import finish_sentence, format_epsilon, join_words
 
 if TYPE_CHECKING:
     from tractexp.api.identification import Identification
@@ -86,10 +86,10 @@ def chart_all_events(
             else nullcontext()
         ):
             others = [(name, of_all[k]) for name, of_all in beside]
-            event_curves(page, fit, noise, others if k < MOST_OPEN_EVENTS else ())
+            add_event_curves(page, fit, noise, others if k < MOST_OPEN_EVENTS else ())
 
 
-def event_curves(
+def add_event_curves(
     page: Report, fit: Any, noise: np.ndarray | None, beside: Sequence[tuple[str, Any]] = ()
 ) -> None:
     """The currents of an event in waveforms and their spectra, then P and Q; `noise` (2, N) is that
@@ -100,21 +100,23 @@ def event_curves(
     notes = [finish_sentence(note) for note in record.notes]
     if fit.waves is not None:
         page.chart(
-            wave_chart(fit.waves, [Drawn("estimate", fit.currents, style.PALETTE[0])]),
-            " ".join([f"{about}: epsilon_i {epsilon(fit.epsilon_i)}.", WAVE_CAPTION, *notes]),
+            draw_waves(fit.waves, [Drawn("estimate", fit.currents, style.PALETTE[0])]),
+            " ".join(
+                [f"{about}: epsilon_i {format_epsilon(fit.epsilon_i)}.", WAVE_CAPTION, *notes]
+            ),
         )
-        page.chart(*spectrum_chart(fit.waves, fit.currents))
+        page.chart(*draw_spectra(fit.waves, fit.currents))
         noise, notes = (
             None,
             ["Measured and calculated are phasors of the currents above, by the same estimator."],
         )
-    chart = event_chart(
+    chart = draw_event(
         fit.event,
         [CalculatedCurve("estimate", power, style.PALETTE[0]), *_draw_beside(beside)],
         deviation=noise,
         around=power,
     )
-    errors = f"epsilon_p {epsilon(fit.epsilon_p)}, epsilon_q {epsilon(fit.epsilon_q)}"
+    errors = f"epsilon_p {format_epsilon(fit.epsilon_p)}, epsilon_q {format_epsilon(fit.epsilon_q)}"
     page.chart(chart, " ".join([f"{about}: {errors}.", *notes]))
 
 

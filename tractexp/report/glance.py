@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.blocks import Report, style
 from tractexp.blocks.drawing import draw_chart
 from tractexp.identification.fit import Fit
-from tractexp.report.events import CalculatedCurve, event_chart
+from tractexp.report.events import CalculatedCurve, draw_event
 from tractexp.storage import files
 
 BESIDE = "display:flex;flex-wrap:wrap;gap:1.5rem;align-items:flex-start"
@@ -20,7 +20,7 @@ def show_beside(answer: Report, fit: Fit | None) -> str:
     if fit is None:
         return answer.fragment
     power = np.stack((fit.P, fit.Q))
-    chart = event_chart(fit.event, [CalculatedCurve("calculated", power, style.PALETTE[0])])
+    chart = draw_event(fit.event, [CalculatedCurve("calculated", power, style.PALETTE[0])])
     with tempfile.TemporaryDirectory() as folder:
         drawing = files.read_text(draw_chart(chart, Path(folder) / "event.svg"))
     figure = drawing[drawing.index("<svg") :].replace("<svg", '<svg style="max-width:100%"', 1)

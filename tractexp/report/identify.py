@@ -15,10 +15,21 @@ from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.inference.residual_tests import LAGS, REJECTED, compute_autocorrelation
-from tractexp.record.identity import describe_identities, title
+from tractexp.record.identity import compose_title, describe_identities
 from tractexp.report.fit_sentences import describe_rivals, describe_search_end
-from tractexp.report.fit_summary import headline, machine, samples, yardstick
-from tractexp.report.fit_tables import digits, errors, list_origin, parameters, tabulate_search_end
+from tractexp.report.fit_summary import (
+    describe_machine,
+    describe_samples,
+    describe_yardstick,
+    write_headline,
+)
+from tractexp.report.fit_tables import (
+    format_digits,
+    list_origin,
+    tabulate_model_errors,
+    tabulate_parameters,
+    tabulate_search_end,
+)
 from tractexp.report.fitted_curves import MOST_OPEN_EVENTS, ROLES, add_curves, add_next_dip
 from tractexp.report.race import tabulate_race
 from tractexp.report.sliders import add_sliders
@@ -42,25 +53,29 @@ def report(fit: "Identification") -> Report:
     uncertainty, together = details.uncertainty, details.agreement
     names, of = [e["name"] for e in result.events if e["role"] == "train"], result.identities
     lead = "; ".join([*describe_identities(of), f"{result.optimizer}, seed {result.seed}."])
-    page = Report(f"Identification of {title(of, names)}", lead)
+    page = Report(f"Identification of {compose_title(of, names)}", lead)
     page.verdict(
         finish_sentence(fit.usability_sentence),
-        *yardstick(fit),
+        *describe_yardstick(fit),
         f"{finish_sentence(result.acceptance)}{_describe_current_errors(result)}",
-        headline(result),
+        write_headline(result),
         kind=KIND[fit.grade],
     )
     page.heading("Measured and calculated")
     add_curves(page, details.fits, uncertainty, fit.spec.validate)
     add_next_dip(page, fit)
-    page.heading("Parameters").add(parameters(fit)).text(*map(finish_sentence, machine(fit)))
+    page.heading("Parameters").add(tabulate_parameters(fit)).text(
+        *map(finish_sentence, describe_machine(fit))
+    )
     if result.share_bound:
         page.chart(_draw_shares(result.share_bound["profile"]), SHARES_HELD)
     _add_parameters(page, fit, uncertainty)
     page.add(*tabulate_race(result.race))
     page.heading("Moved by hand")
     add_sliders(page, fit)
-    page.heading("How well it fits").add(errors(fit)).text(*map(finish_sentence, samples(fit)))
+    page.heading("How well it fits").add(tabulate_model_errors(fit)).text(
+        *map(finish_sentence, describe_samples(fit))
+    )
     page.heading("What to do next").items(fit.advice)
     if together is not None:
         _add_events(page, uncertainty, together)
@@ -128,7 +143,7 @@ def _chart_estimates(uncertainty: Uncertainty, search: dict[str, float]) -> Char
         (uncertainty.intervals - lower[:, None]) / width[:, None],
     )
     sentences = [
-        f"{n}: {digits(v)}, {digits(a)} .. {digits(b)}"
+        f"{n}: {format_digits(v)}, {format_digits(a)} .. {format_digits(b)}"
         for n, v, (a, b) in zip(
             uncertainty.names, uncertainty.values, uncertainty.intervals, strict=True
         )
@@ -151,7 +166,7 @@ def _chart_estimates(uncertainty: Uncertainty, search: dict[str, float]) -> Char
         style.PALETTE[1],
         symbol="x",
         size=8,
-        hover=[f"{n}: search ended at {digits(search[n])}" for n in uncertainty.names],
+        hover=[f"{n}: search ended at {format_digits(search[n])}" for n in uncertainty.names],
     )
     return chart.limits(None, -0.02, 1.02).limits(0, len(uncertainty.names) - 0.5, -0.5)
 
@@ -180,7 +195,7 @@ def _add_starts(page: Report, starts: Sequence[Mapping[str, Any]]) -> None:
         at = [k for k, s in enumerate(starts) if s["from"] == origin]
         sentences = [
             f"{origin}: "
-            + ", ".join(f"{n} {digits(v)}" for n, v in starts[k]["parameters"].items())
+            + ", ".join(f"{n} {format_digits(v)}" for n, v in starts[k]["parameters"].items())
             for k in at
         ]
         if at:
@@ -197,7 +212,7 @@ def _add_starts(page: Report, starts: Sequence[Mapping[str, Any]]) -> None:
         page.table(
             ["from", "above the best", *starts[0]["parameters"]],
             [
-                [s["from"], f"{s['above']:.3g}", *map(digits, s["parameters"].values())]
+                [s["from"], f"{s['above']:.3g}", *map(format_digits, s["parameters"].values())]
                 for s in starts
             ],
         )
@@ -240,7 +255,7 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
                     t["event"],
                     t["channel"],
                     t["name"],
-                    digits(t["statistic"]),
+                    format_digits(t["statistic"]),
                     format_probability(t["p"]),
                     t["says"],
                 ]
@@ -263,8 +278,8 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
                 [
                     n["event"],
                     n["channel"],
-                    digits(n["deviation"]),
-                    digits(n["before"]),
+                    format_digits(n["deviation"]),
+                    format_digits(n["before"]),
                     str(n["order"]),
                     f"{n['correlation']:.2f}",
                     f"{n['between_P_and_Q']:.2f}",

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 from tractexp.blocks import Report, Table
 from tractexp.configuration.run_command import get_command
 from tractexp.inference.model_error import format_percent
-from tractexp.record.identity import title_of
-from tractexp.report.fit_tables import error_table
+from tractexp.record.identity import compose_title_of_records
+from tractexp.report.fit_tables import build_error_table
 from tractexp.report.fitted_curves import chart_all_events
 from tractexp.text.wording import finish_sentence
 
@@ -20,7 +20,7 @@ POLES = (
 )
 
 
-def poles(fit: "NetworkFit") -> Table:
+def tabulate_poles(fit: "NetworkFit") -> Table:
     """Each pole, the slowest first."""
     rows = [
         [
@@ -38,7 +38,7 @@ def poles(fit: "NetworkFit") -> Table:
     )
 
 
-def numbers(fit: "NetworkFit") -> Table:
+def tabulate_numbers(fit: "NetworkFit") -> Table:
     """The errors that networks of fewer and of more poles leave."""
     keys = ["model_error", "held_out"] if fit.validate else ["model_error"]
     rows = [
@@ -49,34 +49,34 @@ def numbers(fit: "NetworkFit") -> Table:
     return Table(["poles", "model error, fitted", "held out"][: 1 + len(keys)], rows, "", chosen)
 
 
-def errors(fit: "NetworkFit") -> Table:
+def tabulate_network_errors(fit: "NetworkFit") -> Table:
     """The errors of the network on each event."""
     keys = [key for key in fit.content["events"][0] if key.startswith("epsilon_")]
-    return error_table(fit.content["events"], fit.content["model_error"]["events"], keys)
+    return build_error_table(fit.content["events"], fit.content["model_error"]["events"], keys)
 
 
-def summary(fit: "NetworkFit") -> Report:
+def build_summary(fit: "NetworkFit") -> Report:
     """How much it leaves, its poles, and what other numbers of poles leave."""
     return (
         Report()
         .text(finish_sentence(fit.headline))
-        .add(poles(fit))
-        .add(errors(fit))
-        .add(numbers(fit))
+        .add(tabulate_poles(fit))
+        .add(tabulate_network_errors(fit))
+        .add(tabulate_numbers(fit))
     )
 
 
 def report(fit: "NetworkFit") -> Report:
     """The page: what the summary says, and the curves."""
     page = Report(
-        f"Linear network of {title_of(event.record for event in fit.train)}",
+        f"Linear network of {compose_title_of_records(event.record for event in fit.train)}",
         "A model without physics: the yardstick of every other.",
     )
     page.verdict(finish_sentence(fit.headline))
     page.heading("Measured and calculated")
     chart_all_events(page, fit.fits)
-    page.heading("How well it fits").add(errors(fit)).add(numbers(fit))
-    page.heading("Poles").add(poles(fit))
+    page.heading("How well it fits").add(tabulate_network_errors(fit)).add(tabulate_numbers(fit))
+    page.heading("Poles").add(tabulate_poles(fit))
     page.heading("How this page was made")
     origin = [
         ["tractexp", fit.content["tractexp_version"]],

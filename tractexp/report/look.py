@@ -12,8 +12,15 @@ from tractexp.blocks import Report, Table
 from tractexp.recording.overview import View
 from tractexp.recording.sight import Sight
 from tractexp.report import unfitted
-from tractexp.report.look_charts import add_unassigned_channels, charts
-from tractexp.text.wording import change, count_noun, degrees, figure, finish_sentence, share
+from tractexp.report.look_charts import add_charts, add_unassigned_channels
+from tractexp.text.wording import (
+    change,
+    count_noun,
+    finish_sentence,
+    format_degrees,
+    format_figure,
+    share,
+)
 
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
 LATE = 60.0  # s: nobody counts more in a file; events after it have the clock's time beside
@@ -52,12 +59,12 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
         for k, (shown, feeder) in enumerate(zip(view.sights, entry["feeders"], strict=True)):
             _load(page, view, shown, feeder, folded=k >= OPEN)
         if entry["channels"]:
-            page.heading("Channels").add(channels(entry))
+            page.heading("Channels").add(tabulate_channels(entry))
             add_unassigned_channels(page, view)
     return page
 
 
-def channels(entry: Mapping[str, Any]) -> Table:
+def tabulate_channels(entry: Mapping[str, Any]) -> Table:
     """The channels of a file, with their quality in detail."""
     caption = (
         "Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise"
@@ -80,7 +87,7 @@ def channels(entry: Mapping[str, Any]) -> Table:
     return Table(columns, rows, "", caption, words=(1, 2, 3, 6, 9), detail=(5, 6, 7, 8))
 
 
-def events(entry: Mapping[str, Any]) -> Table:
+def tabulate_events(entry: Mapping[str, Any]) -> Table:
     """The events of a load, a row each."""
     _, P, Q = entry["units"]
     columns = [
@@ -99,7 +106,7 @@ def events(entry: Mapping[str, Any]) -> Table:
         "Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered"
         " as data.train and data.validate take them."
     )
-    return Table(columns, [event_row(e) for e in entry["events"]], "", caption, words=(1, 9))
+    return Table(columns, [list_event_cells(e) for e in entry["events"]], "", caption, words=(1, 9))
 
 
 def _lead(files: Sequence[Mapping[str, Any]]) -> str:
@@ -124,7 +131,7 @@ def _add_conclusion(page: Report, entry: Mapping[str, Any]) -> None:
         page.verdict(f"{finish_sentence(explain_unnamed(entry))} The channels are listed below.")
     elif not commands:
         page.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
-        page.items([finish_sentence(said) for said in unfitted.sentences([entry])])
+        page.items([finish_sentence(said) for said in unfitted.list_sentences([entry])])
     else:
         page.verdict(
             f"To fit {'what is worth it' if len(commands) > 1 else commands[0][0]}:", kind="good"
@@ -149,12 +156,12 @@ def _list_facts(entry: Mapping[str, Any]) -> list[list[str]]:
         ["starts", str(entry["start"] or "")],
         ["sampled", "; ".join(segments)],
         ["lasts", f"{entry['seconds']:.3f} s"],
-        ["frequency", frequency(entry)],
+        ["frequency", format_frequency(entry)],
     ]
     return [row for row in rows if row[1]]
 
 
-def frequency(entry: Mapping[str, Any]) -> str:
+def format_frequency(entry: Mapping[str, Any]) -> str:
     """ "50 Hz nominal, 49.98 Hz measured"."""
     measured = entry["measured_frequency"]
     return f"{entry['frequency']:g} Hz nominal" + (
@@ -162,11 +169,13 @@ def frequency(entry: Mapping[str, Any]) -> str:
     )
 
 
-def size(entry: Mapping[str, Any]) -> str:
+def format_size(entry: Mapping[str, Any]) -> str:
     """U, P and Q of a load at the beginning; "" where they are not known."""
     if entry["U"] is None:
         return ""
-    sizes = (figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True))
+    sizes = (
+        format_figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)
+    )
     return ", ".join(filter(None, sizes))
 
 
@@ -178,18 +187,20 @@ def _build_channel_row(c: Mapping[str, Any]) -> list[str]:
         c["name"],
         c["phase"],
         c["unit"],
-        figure(c["magnitude"], 4, c["primary_unit"]),
-        figure(noise, 2, "%"),
+        format_figure(c["magnitude"], 4, c["primary_unit"]),
+        format_figure(noise, 2, "%"),
         c["colour"],
-        figure(thd, 2, "%"),
-        figure(c["bits"], 3),
+        format_figure(thd, 2, "%"),
+        format_figure(c["bits"], 3),
         c["fit"],
     ]
 
 
 def _build_summary_row(entry: Mapping[str, Any]) -> list[str]:
     """A load's cells."""
-    sizes = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
+    sizes = [
+        format_figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)
+    ]
     channels = ", ".join(map(str, (*entry["voltages"], *entry["currents"])))
     worth = [e for e in entry["events"] if e["worth"]]
     return [
@@ -207,11 +218,11 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
     page.heading(entry["name"])
     page.items([*_describe_entry(entry), *entry["why"], *entry["said"]])
     if entry["events"]:
-        page.add(events(entry))
+        page.add(tabulate_events(entry))
     else:
         page.text(finish_sentence(explain_no_event(entry)))
     with page.fold_blocks(f"Charts of {entry['name']}") if folded else nullcontext():
-        charts(page, view, shown)
+        add_charts(page, view, shown)
 
 
 def _describe_entry(entry: Mapping[str, Any]) -> list[str]:
@@ -222,7 +233,7 @@ def _describe_entry(entry: Mapping[str, Any]) -> list[str]:
         named = ", ".join(f"{n} {c}" for n, c in zip(numbers, entry["channels"], strict=True))
         reverse = ", current reversed" if entry["reverse_current"] else ""
         sentences.append(f"Channels: {named}; connected as {entry['connection']}{reverse}.")
-    if text := size(entry):
+    if text := format_size(entry):
         when = "Before the dip" if any(e["worth"] for e in entry["events"]) else "At first"
         sentences.append(f"{when} {text}.")
     if entry["sum_V"] is not None:
@@ -261,7 +272,7 @@ def explain_unnamed(entry: Mapping[str, Any]) -> str:
     return UNNAMED
 
 
-def starts(event: Mapping[str, Any], unit: str = "") -> str:
+def format_start(event: Mapping[str, Any], unit: str = "") -> str:
     """When an event starts: seconds of the file, and late in a long one the clock's time too, where
     it is known.
     """
@@ -272,7 +283,7 @@ def starts(event: Mapping[str, Any], unit: str = "") -> str:
     return f"{seconds}, {moment.isoformat(' ', 'milliseconds')}"
 
 
-def event_row(event: Mapping[str, Any]) -> list[str]:
+def list_event_cells(event: Mapping[str, Any]) -> list[str]:
     """The cells of one event, in the order of the table of events: dip, kind, start, duration [ms],
     depth, phase jump, U2, P and Q before and after, and whether it is worth fitting.
     """
@@ -280,10 +291,10 @@ def event_row(event: Mapping[str, Any]) -> list[str]:
     return [
         "" if event["dip"] is None else str(event["dip"]),
         event["kind"],
-        starts(event),
+        format_start(event),
         f"{1000 * event['duration']:.0f}",
         f"{event['depth']:.1%}",
-        degrees(event["jump"]),
+        format_degrees(event["jump"]),
         share(event["U2"]),
         *powers,
         f"{'yes' if event['worth'] else 'no'}: {event['why']}",

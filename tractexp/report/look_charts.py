@@ -16,10 +16,10 @@ from tractexp.record.phasor_measurement import BLOCK
 from tractexp.recording import Channel, Feeder, Recording, Segment
 from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import View
-from tractexp.recording.quality import spectrum
-from tractexp.recording.recording import unit_of
+from tractexp.recording.quality import compute_spectrum
+from tractexp.recording.recording import find_unit
 from tractexp.recording.sight import Sight
-from tractexp.recording.trace import half_cycle_rms
+from tractexp.recording.trace import compute_half_cycle_rms
 from tractexp.text.wording import count_noun
 
 MOST_PAGE_SAMPLES = 400_000  # samples of waveforms that a page holds: a megabyte
@@ -48,7 +48,7 @@ CAPTION = (
 )
 
 
-def charts(page: Report, view: View, shown: Sight) -> None:
+def add_charts(page: Report, view: View, shown: Sight) -> None:
     """Add a load's record, or its phasors and waveforms."""
     if shown.record is not None:
         page.chart(_chart_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
@@ -74,7 +74,7 @@ def add_unassigned_channels(page: Report, view: View) -> None:
     panels: dict[str, list[Channel]] = {}
     for number in sorted({*range(len(recording.channels))} - taken):
         channel = recording.channels[number]
-        quantity = unit_of(channel.unit)[0]
+        quantity = find_unit(channel.unit)[0]
         unit = {"voltage": "u [kV]", "current": "i [kA]"}.get(quantity, channel.unit or "value")
         panels.setdefault(unit, []).append(channel)
     if panels:
@@ -242,7 +242,7 @@ def _add_waves(
             width=1.0,
             label=names[k],
         )
-    t, rms = half_cycle_rms(waves, rate, recording.frequency)
+    t, rms = compute_half_cycle_rms(waves, rate, recording.frequency)
     if len(t) > 1:
         for k, values in enumerate(rms):
             name, color = PHASES[K][k % K], colors[k % K]
@@ -291,7 +291,7 @@ def _add_phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) 
     alive = np.abs(p.f / nominal - 1) < BOUND
     lines.append(("f", np.where(alive, p.f, np.nan), FAINT, 6))
     for name, values, color, panel in lines:
-        drawn = values[part] if every == 1 else envelope(values[part], every)
+        drawn = values[part] if every == 1 else compute_envelope(values[part], every)
         chart.samples(name, float(t[0]), step * every, drawn, color, panel)
 
 
@@ -311,10 +311,10 @@ def _thin_wave(read: Callable[[int, int], np.ndarray], n: int, every: int) -> np
     """
     block = max(BLOCK // (2 * every), 1) * 2 * every
     parts = (read(a, min(a + block, n)) for a in range(0, n, block))
-    return np.concatenate([part if every == 1 else envelope(part, every) for part in parts])
+    return np.concatenate([part if every == 1 else compute_envelope(part, every) for part in parts])
 
 
-def envelope(wave: np.ndarray, every: int) -> np.ndarray:
+def compute_envelope(wave: np.ndarray, every: int) -> np.ndarray:
     """The lowest and highest (2 M,) of each 2 `every` samples of a wave (N,), in the order in which
     they came.
     """
@@ -338,7 +338,7 @@ def _chart_spectrum(recording: Recording, shown: Sight) -> Chart:
     K = len(waves) // 2
     chart = Chart("frequency [Hz]", ["of the fundamental [%]"], log_y=True, pixels=320)
     for name, wave, color in (("voltage", waves[0], REACTIVE), ("current", waves[K], ACTIVE)):
-        f, rms = spectrum(wave, segment.rate)
+        f, rms = compute_spectrum(wave, segment.rate)
         if rms.max() > 0:
             chart.line(name, f, np.maximum(100 * rms / rms.max(), 1e-3), color)
     return chart

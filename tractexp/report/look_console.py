@@ -17,18 +17,18 @@ from tractexp.report.look import (
     NO_LOAD,
     NOT_EXAMINED,
     SECONDARY,
-    channels,
     describe_dead_phases,
     describe_joint_fit,
-    events,
     explain_no_event,
     explain_unnamed,
-    frequency,
+    format_frequency,
+    format_size,
+    format_start,
     is_unexamined,
-    size,
-    starts,
+    tabulate_channels,
+    tabulate_events,
 )
-from tractexp.text.wording import count_noun, figure, join_words, shorten
+from tractexp.text.wording import count_noun, format_figure, join_words, shorten
 
 NOTES = 3  # of a file that have room
 MOST_LINE_EVENTS = 4  # events of a bus that its line has room for
@@ -38,12 +38,12 @@ ONE_LINE, TWO_LINES = 76, 150  # characters
 Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
 
 
-def screen(content: Entry) -> Report:
+def build_screen(content: Entry) -> Report:
     """The answer in 25 lines: which load and which dip to fit by which command; then of each file
     where it is from, its buses, and which loads are worth fitting.
     """
     entries = content["files"]
-    reasons = unfitted.sentences(entries)[:MOST_REASONS]
+    reasons = unfitted.list_sentences(entries)[:MOST_REASONS]
     page = _begin_with_answer(content).items([shorten(each, TWO_LINES) for each in reasons])
     for entry in entries[:MOST_FILES]:
         page.text(shorten(_describe_recorder(entry), TWO_LINES))
@@ -73,9 +73,9 @@ def _add_loads(page: Report, entry: Entry, loads: Table) -> None:
         page.text(f"  {count_noun(len(rows) - MOST_LOADS, 'load')} more")
 
 
-def summary(content: Entry) -> Report:
+def build_summary(content: Entry) -> Report:
     """Which load and dip to fit by which command, then a line for each file, bus and load."""
-    page = _begin_with_answer(content).items(unfitted.sentences(content["files"]))
+    page = _begin_with_answer(content).items(unfitted.list_sentences(content["files"]))
     for entry in content["files"]:
         _add_file(page, entry)
         buses = _group_by_bus(entry["feeders"])
@@ -117,18 +117,18 @@ def _add_remarks(page: Report, feeders: Sequence[Entry]) -> None:
 
 def build_full_report(content: Entry) -> Report:
     """Notes, channels, loads and why they are such, all events and all commands of the files."""
-    page = _begin_with_answer(content).items(unfitted.sentences(content["files"]))
+    page = _begin_with_answer(content).items(unfitted.list_sentences(content["files"]))
     for entry in content["files"]:
         page.text(_describe_recorder(entry), *(f"  note: {n}" for n in entry["notes"]))
         if entry["channels"]:
-            page.add(channels(entry))
+            page.add(tabulate_channels(entry))
         for feeder in entry["feeders"]:
             numbers = ", ".join(map(str, (*feeder["voltages"], *feeder["currents"])))
             wired = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
-            page.text(f"load {feeder['name']}{wired}: {size(feeder) or 'nothing measured'}")
+            page.text(f"load {feeder['name']}{wired}: {format_size(feeder) or 'nothing measured'}")
             page.items([*feeder["why"], *feeder["said"]])
             if feeder["events"]:
-                page.add(events(feeder))
+                page.add(tabulate_events(feeder))
             else:
                 page.items([explain_no_event(feeder)])
             if feeder["command"]:
@@ -234,7 +234,7 @@ def _describe_event(event: Entry) -> str:
     """An event in a phrase: kind, time, depth, duration, phases."""
     fallen = name_fallen_phases(event.get("phases") or ())
     size = [f"{event['depth']:.1%}", f"{1000 * event['duration']:.0f} ms", fallen]
-    return f"{_label(event)} at {starts(event, ' s')} ({', '.join(filter(None, size))})"
+    return f"{_label(event)} at {format_start(event, ' s')} ({', '.join(filter(None, size))})"
 
 
 def _take_reservation(why: str) -> str:
@@ -260,7 +260,7 @@ def _describe_recorder(entry: Entry) -> str:
         str(entry["start"] or ""),
         f"{entry['seconds']:.3f} s at {rates}",
     ]
-    return f"{entry['file']}: {'; '.join(filter(None, [*about, frequency(entry)]))}"
+    return f"{entry['file']}: {'; '.join(filter(None, [*about, format_frequency(entry)]))}"
 
 
 def _group_by_bus(feeders: Sequence[Entry]) -> list[list[Entry]]:
@@ -337,7 +337,7 @@ def _describe_bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     if not happened and any(feeder["loaded"] or not feeder["currents"] for feeder in bus):
         events = explain_no_event(bus[0])  # which tells dead phases, too
     dead = describe_dead_phases(bus[0].get("dead_phases")) if happened else ""
-    parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), dead, events])
+    parts = filter(None, [names, format_figure(bus[0]["U"], 4, bus[0]["units"][0]), dead, events])
     return f"bus {number}: {'; '.join(parts)}"
 
 
@@ -349,7 +349,7 @@ def _tabulate_loads(entry: Entry, buses: Sequence[Sequence[Entry]]) -> Table:
             feeder["name"],
             number,
             ", ".join(map(str, feeder["currents"])),
-            *(figure(feeder[key]) for key in "PQ"),
+            *(format_figure(feeder[key]) for key in "PQ"),
             _describe_own_events(feeder, _find_common_events(bus)),
             _fit(feeder),
         ]
@@ -367,7 +367,7 @@ def _describe_own_events(feeder: Entry, common: Sequence[Entry]) -> str:
     """The events of a load that its bus did not have, in words."""
     shared = {_list_shared_facts(event) for event in common}
     own = (event for event in feeder["events"] if _list_shared_facts(event) not in shared)
-    return ", ".join(f"{_label(event)} at {starts(event, ' s')}" for event in own)
+    return ", ".join(f"{_label(event)} at {format_start(event, ' s')}" for event in own)
 
 
 def _fit(feeder: Entry) -> str:

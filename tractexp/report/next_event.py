@@ -26,11 +26,11 @@ def report(choice: NextEvent, title: str) -> Report:
         finish_sentence(choice.sentence()),
         kind="good" if sure else "bad" if choice.same else "plain",
     )
-    section(page, choice)
+    add_section(page, choice)
     return page
 
 
-def section(page: Report, choice: NextEvent) -> None:
+def add_section(page: Report, choice: NextEvent) -> None:
     """The chances by dip as charts, the best events of each kind, and which pair each
     tells apart.
     """

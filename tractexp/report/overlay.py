@@ -10,10 +10,10 @@ from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.overlay import Overlay
 from tractexp.domain.playback import measure_as_phasors
 from tractexp.record import WaveEvent, describe
-from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
+from tractexp.report.events import CAPTION, CalculatedCurve, draw_event
 from tractexp.report.explained import Answer
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
-from tractexp.report.waves import Drawn, wave_chart
+from tractexp.report.waves import Drawn, draw_waves
 
 BASE, EXTENDED, NEAREST = "#D55E00", "#0072B2", "#CC79A7"
 IN_PHASORS = (
@@ -24,7 +24,7 @@ CLICK = "Click a curve: below it is said which candidates would explain what is 
 MOST_OPEN_OVERLAYS = 4  # events of each role that are not folded
 
 
-def overlaid(
+def add_overlays(
     page: Report, overlays: Sequence[Overlay], answers: Sequence[Sequence[Answer]] = ()
 ) -> Report:
     """A chart of each event, the fitted ones first; those beyond the first few are folded. Clicked,
@@ -51,17 +51,17 @@ def _add_overlay(page: Report, overlay: Overlay, role: str, answers: Sequence[An
     event = overlay.event
     page.heading(f"{event.record.name}, {role}", level=3)
     if not isinstance(event, WaveEvent):
-        page.chart(chart(overlay).answers(answers), f"{describe(event)}.")
+        page.chart(draw_overlay(overlay).answers(answers), f"{describe(event)}.")
         return
-    page.chart(currents(event, overlay).answers(answers), f"{describe(event.phasors)}.")
+    page.chart(draw_currents(event, overlay).answers(answers), f"{describe(event.phasors)}.")
     with page.fold_blocks("The same in phasors: P and Q"):
         page.chart(chart_phasors(event, overlay), IN_PHASORS)
 
 
-def chart(overlay: Overlay) -> Chart:
+def draw_overlay(overlay: Overlay) -> Chart:
     """One event with the curves of the models; the noise band is that of the best of them."""
     curves = [CalculatedCurve(*model) for model in _list_models(overlay)]
-    return event_chart(
+    return draw_event(
         overlay.event,
         curves,
         deviation=overlay.deviation,
@@ -71,10 +71,10 @@ def chart(overlay: Overlay) -> Chart:
     )
 
 
-def currents(event: WaveEvent, overlay: Overlay) -> Chart:
+def draw_currents(event: WaveEvent, overlay: Overlay) -> Chart:
     """The currents of the phases, in which the noise band is that of the best of the models."""
     curves = [Drawn(*model) for model in _list_models(overlay)]
-    return wave_chart(
+    return draw_waves(
         event,
         curves,
         deviation=overlay.deviation,
@@ -89,7 +89,7 @@ def chart_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
         (name, measure_as_phasors(event, calculated), color, dash)
         for name, calculated, color, dash in _list_models(overlay)
     ]
-    return event_chart(
+    return draw_event(
         curves[0][1][0],
         [
             CalculatedCurve(name, np.stack(power), color, dash)

@@ -50,14 +50,14 @@ class Planned:
     most: int | None  # events asked for
 
 
-def percent(relative: float) -> str:
+def format_relative(relative: float) -> str:
     """A share as a number of percent; a dash from ten times the value on."""
     if not relative < CEILING:
         return "-"
     return f"{100 * relative:.0f}" if relative >= 0.0995 else f"{100 * relative:.2g}"
 
 
-def summary(content: Mapping[str, Any]) -> Report:
+def build_summary(content: Mapping[str, Any]) -> Report:
     """The plan and its values, the forecasts, the answer, and the best events."""
     values = ", ".join(f"{name} {value:.4g}" for name, value in content["parameters"].items())
     report = Report().text(content["dip"], f"parameters, {content['origin']}: {values}")
@@ -69,7 +69,7 @@ def summary(content: Mapping[str, Any]) -> Report:
     return report.text(content["other_events"]) if content["other_events"] else report
 
 
-def screen(content: Mapping[str, Any]) -> Report:
+def build_screen(content: Mapping[str, Any]) -> Report:
     """The answer first, then the forecasts by depth, and the best events."""
     report = Report().text(f"how deep? {content['answer']}", content["dip"], "")
     report.add(scan(content, DEPTH, FEW))
@@ -86,7 +86,7 @@ def scan(content: Mapping[str, Any], label: str, rows: int = ROWS) -> Table:
     forecasts, names = content["half_intervals"][label], [*content["parameters"]]
     picked = forecasts[:: max(1, round(len(forecasts) / rows))]
     cells = [
-        [f"{f['at']:.4g}", *(percent(math.nan if f[n] is None else f[n]) for n in names)]
+        [f"{f['at']:.4g}", *(format_relative(math.nan if f[n] is None else f[n]) for n in names)]
         for f in picked
     ]
     title = (
@@ -172,10 +172,10 @@ def _chart_halves(planned: Planned, label: str, legend: bool) -> Chart:
         np.nanmin(relative, initial=100 * needed.within),
         np.nanmax(relative, initial=100 * needed.within),
     )
-    return chart.limits(0, 0.8 * low, 1.25 * high).ticks(0, marks(low, high))
+    return chart.limits(0, 0.8 * low, 1.25 * high).ticks(0, list_marks(low, high))
 
 
-def marks(low: float, high: float) -> list[float]:
+def list_marks(low: float, high: float) -> list[float]:
     """Where a logarithmic axis from low to high is marked: powers of ten, and 2 and 5 times these
     where it is short.
     """
@@ -240,7 +240,7 @@ def _add_best_events(page: Report, planned: Planned) -> None:
             str(k),
             c.name,
             "" if k == 1 else f"{c.gain:.0%}",
-            *map(percent, np.asarray(c.half) / values),
+            *map(format_relative, np.asarray(c.half) / values),
         ]
         for k, c in enumerate(planned.chosen, start=1)
     ]

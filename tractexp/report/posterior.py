@@ -9,13 +9,13 @@ from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.posterior import ENOUGH, PosteriorSample
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.record.identity import title_of
+from tractexp.record.identity import compose_title_of_records
 from tractexp.report.profile import (
     LARGEST_END_DIFFERENCE,
     SCATTER,
-    axis,
     find_declared_parameter,
-    span,
+    format_span,
+    label_axis,
 )
 from tractexp.text.wording import finish_sentence
 
@@ -30,7 +30,7 @@ CAPTION = (
 
 def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") -> Report:
     """The page. `grade` as on the page of the profiles."""
-    names = title_of(e.record for e in uncertainty.likelihood.problem.events)
+    names = compose_title_of_records(e.record for e in uncertainty.likelihood.problem.events)
     page = Report(
         f"Posterior: {names}",
         f"A flat prior within the bounds; {len(drawn.draws)} draws of {drawn.steps} steps of"
@@ -52,7 +52,7 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
     page.table(
         ["parameter", "meaning", "estimate", "unit", "95 % by the fit", "95 % by the posterior"],
         [
-            [name, p.about, f"{value:.4g}", p.unit, span(*own), span(*interval)]
+            [name, p.about, f"{value:.4g}", p.unit, format_span(*own), format_span(*interval)]
             for name, value, own, interval in zip(
                 drawn.names, uncertainty.values, uncertainty.intervals, drawn.intervals, strict=True
             )
@@ -101,7 +101,7 @@ def _chart_draws(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Ch
     draws, value, half = drawn.draws[:, j], uncertainty.values[j], uncertainty.half[j]
     low, high = drawn.intervals[j]
     density, edges = np.histogram(draws, HISTOGRAM_BINS, density=True)
-    chart = Chart(axis(uncertainty, drawn.names[j]), ["density"], pixels=250, legend=False)
+    chart = Chart(label_axis(uncertainty, drawn.names[j]), ["density"], pixels=250, legend=False)
     chart.shade(float(low), float(high), PALETTE[5], opacity=0.25)
     if np.isfinite(half):
         at, error = (
@@ -126,7 +126,9 @@ def _chart_pair(uncertainty: Uncertainty, drawn: PosteriorSample, a: int, b: int
     """Draws of two parameters."""
     some = drawn.draws[:: max(1, len(drawn.draws) // DOTS)][:DOTS]
     chart = Chart(
-        axis(uncertainty, drawn.names[a]), [axis(uncertainty, drawn.names[b])], pixels=420
+        label_axis(uncertainty, drawn.names[a]),
+        [label_axis(uncertainty, drawn.names[b])],
+        pixels=420,
     )
     chart.points("draws", some[:, a], some[:, b], PALETTE[5], size=3)
     return chart.points(

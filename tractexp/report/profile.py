@@ -13,7 +13,7 @@ from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.profile import End, LikelihoodProfile, Profiles
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, ParameterVerdict, format_half_width
-from tractexp.record.identity import title_of
+from tractexp.record.identity import compose_title_of_records
 from tractexp.text.wording import finish_sentence
 
 LARGEST_END_DIFFERENCE = 0.2  # of the half interval by curvature: closer ends are the same interval
@@ -41,12 +41,12 @@ def report(scan: Profiles, grade: str = "") -> Report:
     """
     uncertainty = scan.uncertainty
     verdicts = scan.verdicts
-    names = title_of(e.record for e in uncertainty.likelihood.problem.events)
+    names = compose_title_of_records(e.record for e in uncertainty.likelihood.problem.events)
     page = Report(
         f"Profile likelihood: {names}",
         "One parameter is held at value after value, all others are fitted again each time.",
     )
-    says = {profile.name: meaning(scan, profile) for profile in scan.profiles}
+    says = {profile.name: describe_profile(scan, profile) for profile in scan.profiles}
     sentences = [
         *([SCATTER] if not uncertainty.exact else []),
         *_explain_curvature(says),
@@ -91,19 +91,19 @@ def _build_row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[st
     """A profile's cells: value, both intervals, verdict."""
     value, half = _compute_curvature(scan, profile.name)
     about = find_declared_parameter(scan.uncertainty, profile.name)
-    by_curvature = span(value - half, value + half) if np.isfinite(half) else "none"
+    by_curvature = format_span(value - half, value + half) if np.isfinite(half) else "none"
     return [
         profile.name,
         about.about,
         f"{value:.4g}",
         about.unit,
         by_curvature,
-        span(*profile.interval),
+        format_span(*profile.interval),
         says,
     ]
 
 
-def meaning(scan: Profiles, profile: LikelihoodProfile) -> str:
+def describe_profile(scan: Profiles, profile: LikelihoodProfile) -> str:
     """The interval of a profile beside that of the curvature, in a sentence."""
     open_sides = _name_sides(profile, End.BOUND)
     short = _name_sides(profile, End.POINTS)
@@ -198,7 +198,11 @@ def _chart_profile(scan: Profiles, profile: LikelihoodProfile, title: str) -> Ch
     top = ABOVE * scan.threshold
     x, y = _smooth(profile)
     chart = Chart(
-        axis(scan.uncertainty, profile.name), ["deviance"], pixels=290, title=title, legend=False
+        label_axis(scan.uncertainty, profile.name),
+        ["deviance"],
+        pixels=290,
+        title=title,
+        legend=False,
     )
     chart.shade(*profile.interval, SHADE, opacity=0.25)
     if np.isfinite(half):
@@ -237,12 +241,12 @@ def find_declared_parameter(uncertainty: Uncertainty, name: str) -> Any:
     )
 
 
-def axis(uncertainty: Uncertainty, name: str) -> str:
+def label_axis(uncertainty: Uncertainty, name: str) -> str:
     """A parameter and its unit, as an axis says them."""
     unit = find_declared_parameter(uncertainty, name).unit
     return name if unit == "1" else f"{name} [{unit}]"
 
 
-def span(low: float, high: float) -> str:
+def format_span(low: float, high: float) -> str:
     """ "0.1 .. 0.2"."""
     return f"{low:.4g} .. {high:.4g}"

@@ -16,20 +16,20 @@ from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import describe_chance, describe_proposal
 from tractexp.inference.model_error import tell_error
-from tractexp.report.extended import interval
+from tractexp.report.extended import format_interval
 from tractexp.text.wording import (
     finish_sentence,
     format_probability,
+    format_share,
     format_with_error,
     join_words,
-    percent,
 )
 
 MISSED, TERM = "#9A9A9A", "#0072B2"
 EVENTS = 4  # whose charts are shown at once
 
 
-def headlines(findings: Findings) -> list[str]:
+def list_headlines(findings: Findings) -> list[str]:
     """The sentences on a proposal in the box at the top."""
     return [
         finish_sentence(s) for s in describe_proposal(to_dict(findings.proposed, PLUGIN), None)[:2]
@@ -78,7 +78,7 @@ def _add_numbers(page: Report, proposal: Proposal) -> None:
             p.about,
             p.unit,
             format_with_error(k.value, k.error),
-            interval(*k.interval),
+            format_interval(*k.interval),
         ]
         for k in proposal.estimates
         for p in (k.parameter,)
@@ -108,7 +108,7 @@ def _add_explanation(page: Report, proposal: Proposal) -> None:
         [
             role,
             *(tell_error(vars(c.error)) for c in (change.before, change.after)),
-            percent(judged.explained_share),
+            format_share(judged.explained_share),
         ]
         for role, change, judged in zip(
             ("fitted", "held out"),
@@ -163,7 +163,7 @@ def _add_rivals(page: Report, proposal: Proposal) -> None:
     if proposal.ties:
         page.table(
             ["also possible", "explained of the fitted events", "of the held-out events"],
-            [[t.words, percent(a), percent(b)] for t, a, b in proposal.ties],
+            [[t.words, format_share(a), format_share(b)] for t, a, b in proposal.ties],
             "These events cannot tell them from the term proposed.",
         )
     if proposal.alike:
@@ -193,7 +193,7 @@ def _add_tried_terms(page: Report, tried: Sequence[tuple[Term, TermAssessment]])
             [
                 [
                     t.words,
-                    *(percent(g.explained_share) for g in gaps),
+                    *(format_share(g.explained_share) for g in gaps),
                     *(f"{g.after.chi2_per_sample:.2f}" for g in gaps),
                     format_probability(w.p),
                 ]

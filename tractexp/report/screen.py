@@ -40,7 +40,7 @@ SHORT = {
 }
 
 
-def screen(fit: "Identification") -> Report:
+def build_screen(fit: "Identification") -> Report:
     """Which load, whether the model may be used and why, its parameters, its error, what next."""
     result = fit.result
     page = describe_judged_load(fit).add(tabulate_parameters(fit))

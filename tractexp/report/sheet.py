@@ -13,10 +13,10 @@ from tractexp.errors import UserError
 from tractexp.exchange.format import choose_format
 from tractexp.exchange.rating import SOURCE, rate_machine
 from tractexp.identification.verdict import shorten_verdict
-from tractexp.record.identity import describe_identities, title
+from tractexp.record.identity import compose_title, describe_identities
 from tractexp.report.fit_sentences import describe_rivals
 from tractexp.report.fit_summary import name_verdicts
-from tractexp.report.fit_tables import error_rows, list_origin
+from tractexp.report.fit_tables import list_error_rows, list_origin
 from tractexp.report.screen import choose_units, describe_load
 from tractexp.text.wording import count_noun, finish_sentence, format_with_error
 
@@ -41,12 +41,12 @@ USES = {
 }
 
 
-def sheet(fit: "Identification") -> Report:
+def build_sheet(fit: "Identification") -> Report:
     """The sheet, for A4: verdict, powers, parameters, errors, limits, equations, origin."""
     result = fit.result
     names = [event["name"] for event in result.events if event["role"] == "train"]
     page = Report(
-        f"Load model of {title(result.identities, names)}",
+        f"Load model of {compose_title(result.identities, names)}",
         finish_sentence(describe_load(result, names).removeprefix("load: ")),
     )
     page.verdict(
@@ -126,7 +126,7 @@ def _tabulate_errors(fit: "Identification") -> Table:
     """How far the model is off each event."""
     return Table(
         ["event", "role", "error, of the response", "95 % interval"],
-        error_rows(fit.result),
+        list_error_rows(fit.result),
         "",
         "Error: rms of what is left beyond the noise, from the dip on, over the rms of the load's"
         " response, both in apparent power.",

@@ -58,7 +58,7 @@ def _write_program(fit: "Identification") -> str:
 
         return write_program(lower(model.equations), model.integration).encode()
 
-    key = store.key("sliders", files.read_packaged_text("kernel/simulate.js"), model.source)
+    key = store.compute_key("sliders", files.read_packaged_text("kernel/simulate.js"), model.source)
     return store.TEXTS.get(key, write).decode()
 
 

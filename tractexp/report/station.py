@@ -95,7 +95,7 @@ def _format_percent(value: float | None) -> str:
     return "" if value is None else format_percent(value)
 
 
-def screen(content: Mapping[str, Any]) -> Report:
+def build_screen(content: Mapping[str, Any]) -> Report:
     """The answer in 25 lines: the loads in a table, and of the first what differs."""
     page = Report().text(_tell_extent(content))
     table = tabulate_loads(content)
@@ -109,7 +109,7 @@ def screen(content: Mapping[str, Any]) -> Report:
     return page.text(*unfitted[:1])
 
 
-def summary(content: Mapping[str, Any]) -> Report:
+def build_summary(content: Mapping[str, Any]) -> Report:
     """The loads in a table, then of each what differs, in sentences."""
     page = Report().text(_tell_extent(content)).add(tabulate_loads(content))
     return page.text(*_describe_loads(content), *_describe_unfitted(content))

@@ -38,7 +38,7 @@ COLUMNS = (  # key, heading, kind of cell, digits
 FURTHER = ("file", "station", "P_before", "P_after", "Q_before", "Q_after", "unit", "command")
 
 
-def summary(content: Mapping[str, Any]) -> Report:
+def build_summary(content: Mapping[str, Any]) -> Report:
     """How many files, what is in them, what cannot be read, and the events that tell most where
     they were asked for.
     """
@@ -46,7 +46,7 @@ def summary(content: Mapping[str, Any]) -> Report:
     report = Report().text(
         f"{content['files']} files in {content['folder']}, {content['looked_at']} new or changed"
     )
-    report.add(kinds(content))
+    report.add(tabulate_kinds(content))
     unread = [row for row in rows if row["kind"] == UNREAD]
     named = [
         row["why"] if row["file"] in row["why"] else f"{row['file']}: {row['why']}"
@@ -58,7 +58,7 @@ def summary(content: Mapping[str, Any]) -> Report:
     return _list_informative(report, content)
 
 
-def kinds(content: Mapping[str, Any]) -> Table:
+def tabulate_kinds(content: Mapping[str, Any]) -> Table:
     """How often each kind of event is there."""
     rows = content["rows"]
     names = sorted(

@@ -29,7 +29,7 @@ AMBIENT = (
 )
 
 
-def sentences(files: Sequence[Mapping[str, Any]]) -> list[str]:
+def list_sentences(files: Sequence[Mapping[str, Any]]) -> list[str]:
     """For files of `look.json`; [] where something is worth fitting, or no load was recognised."""
     feeders = [feeder for entry in files for feeder in entry["feeders"]]
     loads = [feeder for feeder in feeders if feeder["loaded"]]
@@ -52,7 +52,7 @@ def _list_exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
         exponents = {
             name: log(event[f"{power}_after"] / event[f"{power}_before"]) / log(ratio)
             for name, power in (("p_v", "P"), ("q_v", "Q"))
-            if _flows_alike(event[f"{power}_before"], event[f"{power}_after"])
+            if _does_flow_alike(event[f"{power}_before"], event[f"{power}_after"])
         }
         if "p_v" not in exponents:
             continue
@@ -66,6 +66,6 @@ def _list_exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _flows_alike(before: float | None, after: float | None) -> bool:
+def _does_flow_alike(before: float | None, after: float | None) -> bool:
     """Whether a power is known before and after, and flows the same way."""
     return before is not None and after is not None and before * after > 0

@@ -52,7 +52,7 @@ class Drawn(NamedTuple):
     dash: str = "solid"
 
 
-def wave_chart(
+def draw_waves(
     event: WaveEvent,
     curves: Sequence[Drawn],
     *,
@@ -171,7 +171,7 @@ class Spectrum(NamedTuple):
     seconds: float
 
 
-def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]:
+def compute_spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]:
     """The spectra of what calculated currents (3, N) leave, from the dip on and before it; over
     whole cycles, unweighted.
 
@@ -200,9 +200,9 @@ def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]
     return parts[0], parts[1]
 
 
-def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
+def draw_spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
     """The spectra above each other, and the caption."""
-    after, before = spectra(event, currents)
+    after, before = compute_spectra(event, currents)
     chart = Chart("frequency [Hz]", ["after [%]", "before [%]"], pixels=380)
     names = [f"phase {n}" for n in PHASES[: event.phases]] if event.phases > 1 else ["residual"]
     highest = min(HIGHEST_SHOWN_FREQUENCY, event.rate / 2)

@@ -23,7 +23,7 @@ def read_yaml(path: Path | str, largest: int = files.CONFIGURATION) -> Any:
     text = files.read_text(path, largest)
     try:
         _count_nodes(text, path)
-        return yaml.load(text, _yaml_loader())
+        return yaml.load(text, _build_loader())
     except yaml.MarkedYAMLError as error:
         line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
         raise UserError(
@@ -35,7 +35,7 @@ def read_yaml(path: Path | str, largest: int = files.CONFIGURATION) -> Any:
 
 
 @functools.cache
-def _yaml_loader() -> Any:
+def _build_loader() -> Any:
     """YAML's safe loader, for which 1e-3 is a number, as for people."""
     import yaml
 
@@ -55,7 +55,7 @@ def _count_nodes(text: str, path: Path | str) -> None:
     sizes: dict[str, int] = {}
     # collections that are open: anchor, nodes so far
     within: list[tuple[str | None, int]] = [(None, 0)]
-    for event in yaml.parse(text, _yaml_loader()):
+    for event in yaml.parse(text, _build_loader()):
         if isinstance(event, yaml.CollectionStartEvent):
             within.append((event.anchor, 1))
         elif isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent):

@@ -38,9 +38,9 @@ class SearchStore:
         stored = (
             on
             and limits.seconds is None
-            and all(map(store.is_installed, (*_parts(problem), problem.loss)))
+            and all(map(store.is_installed, (*_list_parts(problem), problem.loss)))
         )
-        self.problem = _key(problem, limits) if stored else ""
+        self.problem = _compute_key(problem, limits) if stored else ""
 
     def get(self, settings: Mapping[str, Any], seed: int) -> SearchResult | None:
         """The search of an entry; None where there is none, or it is damaged."""
@@ -71,29 +71,29 @@ class SearchStore:
         """Arrays of something else that is computed for this problem, as `what` says, or of its
         entry.
         """
-        return SEARCHES.arrays(self.problem and store.key(self.problem, what), compute)
+        return SEARCHES.arrays(self.problem and store.compute_key(self.problem, what), compute)
 
     def _key(self, settings: Mapping[str, Any], seed: int) -> str:
         """The key of a search; "" where it cannot be kept."""
         optimizer = build("optimizer", dict(settings))
         return (
-            store.key(self.problem, repr(optimizer), seed)
+            store.compute_key(self.problem, repr(optimizer), seed)
             if self.problem and store.is_installed(optimizer)
             else ""
         )
 
 
-def _parts(problem: Problem) -> tuple[Any, ...]:
+def _list_parts(problem: Problem) -> tuple[Any, ...]:
     """The plugins that a problem is made of."""
     return problem.model.motor, problem.model.static, *problem.model.effects
 
 
-def _key(problem: Problem, limits: Limits) -> str:
+def _compute_key(problem: Problem, limits: Limits) -> str:
     """The key of all that a search of this problem depends on, but for the optimizer
     and the seed.
     """
-    return store.key(
+    return store.compute_key(
         store.describe_environment(),
-        repr((_parts(problem), problem.loss, limits)),
+        repr((_list_parts(problem), problem.loss, limits)),
         problem.digest(),
     )

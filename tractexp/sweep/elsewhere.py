@@ -30,7 +30,7 @@ def pack_job(job: SweepJob) -> SweepJob:
     node = job.config["tracking"]
     config: dict[str, Any] = {**job.config}
     if node["enabled"]:
-        config["tracking"] = {**node, "uri": tracking.address(node["uri"])}
+        config["tracking"] = {**node, "uri": tracking.resolve_address(node["uri"])}
     events = None
     with contextlib.suppress(Exception):  # the job itself will say
         events = read_shared_events(config["data"], job.inputs)

@@ -15,7 +15,7 @@ from hydra.plugins.config_source import ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import OmegaConf
 
-from tractexp.cache.store import TEXTS, describe_environment, key
+from tractexp.cache.store import TEXTS, compute_key, describe_environment
 from tractexp.compat import hydra_config_store, hydra_plugins, hydra_versions
 from tractexp.configuration import plugin
 from tractexp.configuration.composition import MODEL
@@ -87,7 +87,9 @@ def register(arguments: Sequence[str] = ()) -> None:
     for group, names in _list_offered().items():
         for name in names:
             where = f"schema/{group}" if _is_configured(group, name) else group
-            hydra_config_store.store_later(where, name, functools.partial(_schema_of, group, name))
+            hydra_config_store.store_later(
+                where, name, functools.partial(_find_schema, group, name)
+            )
     hydra_versions.store_schema("hydra/sweeper", "grid", GridConfig)
     hydra_versions.store_schema("hydra/launcher", "cores", CoresConfig)
     Plugins.instance().register(PluginSearchPath)
@@ -101,8 +103,8 @@ def register(arguments: Sequence[str] = ()) -> None:
             hydra_versions.store_schema("hydra/launcher", name, schema)
             hydra_plugins.admit(cls)
     register_resolver = hydra_versions.register_resolver()
-    register_resolver("fingerprint", _fingerprint, replace=True)
-    register_resolver("folder_name", _folder_name, replace=True)
+    register_resolver("fingerprint", _compute_fingerprint, replace=True)
+    register_resolver("folder_name", _name_folder, replace=True)
 
 
 def _list_offered() -> dict[str, set[str]]:
@@ -123,12 +125,14 @@ def _list_offered() -> dict[str, set[str]]:
         for group, classes in classes_of.items():
             yield group, {name for name, cls in classes.items() if cls.chosen}
 
-    kept = json.loads(TEXTS.get(key(describe_environment(), "plugins that Hydra offers"), ask))
+    kept = json.loads(
+        TEXTS.get(compute_key(describe_environment(), "plugins that Hydra offers"), ask)
+    )
     here = dict(list_groups(plugin.list_registered()))
     return {group: {*kept.get(group, ()), *here.get(group, ())} for group in {*kept, *here}}
 
 
-def _schema_of(group: str, name: str) -> type:
+def _find_schema(group: str, name: str) -> type:
     """The dataclass that a plugin's configuration is checked against."""
     return plugin.make_schema(plugin.get(group, name))
 
@@ -149,14 +153,14 @@ def _is_configured(group: str, name: str) -> bool:
     return any((folder / group / f"{name}.yaml").is_file() for folder in folders)
 
 
-def _fingerprint(overrides: Any) -> str:
+def _compute_fingerprint(overrides: Any) -> str:
     """Eight letters that stand for a sweep's overrides: the same command writes to the
     same folder.
     """
     return hashlib.sha256("\n".join(overrides).encode()).hexdigest()[:8]
 
 
-def _folder_name(path: Any) -> str:
+def _name_folder(path: Any) -> str:
     """A folder's name, and letters that stand for its whole path: the same folder,
     the same name.
     """

@@ -19,7 +19,9 @@ def hash_configuration(config: Mapping[str, Any], choices: Mapping[str, str]) ->
     does.
     """
     settings = {key: value for key, value in config.items() if key not in ("tracking", "sweep")}
-    return _digest(json.dumps([settings, dict(choices)], sort_keys=True, default=str).encode())
+    return _compute_digest(
+        json.dumps([settings, dict(choices)], sort_keys=True, default=str).encode()
+    )
 
 
 def hash_inputs(config: Mapping[str, Any]) -> str:
@@ -27,16 +29,16 @@ def hash_inputs(config: Mapping[str, Any]) -> str:
     job names.
     """
     named = sorted(set(list_texts(config.get("data") or {})))
-    return _digest("".join([provenance.hash_code(), *map(_file, named)]).encode())
+    return _compute_digest("".join([provenance.hash_code(), *map(_read_file, named)]).encode())
 
 
-def _digest(content: bytes) -> str:
+def _compute_digest(content: bytes) -> str:
     """The SHA-256 of a content."""
     return hashlib.sha256(content).hexdigest()
 
 
 @functools.cache
-def _file(name: str) -> str:
+def _read_file(name: str) -> str:
     """The content of the file `name` and of its companions of the same stem (a sidecar, a .dat); ""
     for no file.
     """
@@ -45,6 +47,6 @@ def _file(name: str) -> str:
         if not path.is_file():
             return ""
         beside = sorted(path.parent.glob(glob.escape(path.stem) + ".*"))
-        return "".join(_digest(files.read(file)) for file in beside if file.is_file())
+        return "".join(_compute_digest(files.read(file)) for file in beside if file.is_file())
     except (OSError, ValueError, UserError):  # the job will say what is wrong with it
         return ""

@@ -21,7 +21,7 @@ from tractexp.sweep import identity, status
 from tractexp.sweep.output import redirect_prints
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status, select_returned_metrics
 from tractexp.sweep.surroundings import surround_job
-from tractexp.tracking.sweepfile import folder_of, parent_of
+from tractexp.tracking.sweepfile import find_sweep_folder, read_parent
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
 MOST_KEPT_RECORDS = 4  # choices of data that a worker keeps: the jobs of a sweep share one
@@ -222,7 +222,7 @@ def _run_task(job: SweepJob, place: RunFolder, measured: dict[str, float], logs:
     if not run_command.get_command():  # in a process that no command started
         run_command.remember_command([*job.command])
     try:
-        parent, of_many = parent_of(folder_of(job.folder)), not job.alone
+        parent, of_many = read_parent(find_sweep_folder(job.folder)), not job.alone
         about: Any = {
             "in_sweep": True,
             "of_many": of_many,

@@ -23,9 +23,9 @@ from tractexp.sweep.compose import Composer
 from tractexp.sweep.elsewhere import pack_job, unpack_job, work_elsewhere
 from tractexp.sweep.job import SweepJob, work
 from tractexp.sweep.live import LivePage, keep_live
-from tractexp.sweep.parent import parent_run
+from tractexp.sweep.parent import open_parent_run
 from tractexp.sweep.placing import await_end, is_finished, place
-from tractexp.sweep.progress import progress
+from tractexp.sweep.progress import show_progress
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import ENDED, FAILED, FINISHED, RUNNING, Status
 
@@ -95,7 +95,7 @@ class Cores(Launcher):
         page = self._show(folder, jobs, remaining)
         with (
             hold(folder),
-            parent_run(folder, [*self.launched.values()], asked, afresh=False) as recorder,
+            open_parent_run(folder, [*self.launched.values()], asked, afresh=False) as recorder,
             keep_live(page, more=True),
         ):
             for job in remaining:
@@ -127,7 +127,7 @@ class Cores(Launcher):
         results = self._results(jobs)
         waiting = {job.folder for job in jobs}  # to be logged
         try:
-            with progress(jobs) as note, contextlib.closing(results):
+            with show_progress(jobs) as note, contextlib.closing(results):
                 for job, end in results:
                     ends[job.folder] = end or self._record_kill(job)
                     note(job, ends[job.folder])

@@ -17,11 +17,11 @@ from tractexp.sweep.status import ESTIMATED, FAILED, FINISHED, INTERRUPTED, SEAR
 from tractexp.text import quoting
 from tractexp.text.progress import say
 from tractexp.tracking.runfile import save
-from tractexp.tracking.sweepfile import FILE, parent_of
+from tractexp.tracking.sweepfile import FILE, read_parent
 
 
 @contextmanager
-def parent_run(
+def open_parent_run(
     folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
 ) -> Iterator[Recorder]:
     """Open the parent run of a sweep's jobs, or open it again, and close it with the status the
@@ -38,7 +38,7 @@ def parent_run(
         yield Recorder(folder)
         return
 
-    uri, run = tracking.address(node["uri"]), _describe_sweep(folder, jobs, overrides)
+    uri, run = tracking.resolve_address(node["uri"]), _describe_sweep(folder, jobs, overrides)
     content = {"uri": uri, "jobs": len(jobs), "overrides": overrides}
     with ThreadPoolExecutor(1) as thread:
         recorder = Recorder(folder, thread.submit(_open_run, folder, run, uri, afresh, content))
@@ -52,7 +52,10 @@ def parent_run(
             raise
         finally:
             _close_parent_run(
-                folder, replace(run, status=status, metrics=metrics(jobs)), recorder.parent(), uri
+                folder,
+                replace(run, status=status, metrics=compute_metrics(jobs)),
+                recorder.parent(),
+                uri,
             )
             if status != "KILLED":
                 _send(folder, uri)
@@ -72,7 +75,7 @@ def _open_parent_run(folder: Path, run: Any, uri: str, afresh: bool) -> str | No
     cannot be used.
     """
     try:
-        run_id = parent_of(folder)
+        run_id = read_parent(folder)
         if afresh or run_id is None or not tracking.reopen_parent(run_id, uri):
             run_id = tracking.start_parent(run, uri)
     except UserError as error:
@@ -101,7 +104,7 @@ def _send(folder: Path, uri: str) -> None:
         say(f"{left} runs are not logged; they are kept in {folder}, and 'tractexp sync' logs them")
 
 
-def metrics(jobs: list[Any]) -> dict[str, float]:
+def compute_metrics(jobs: list[Any]) -> dict[str, float]:
     """Figures of a sweep as a whole."""
     ends = [s for job in jobs if (s := read(job.folder)) is not None]
     counts = {
@@ -116,7 +119,7 @@ def metrics(jobs: list[Any]) -> dict[str, float]:
     return {"jobs": len(jobs), **counts, **best}
 
 
-def shared_settings(configs: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def list_shared_settings(configs: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """The settings that all jobs of a sweep have, as `tracking.flatten` spells them."""
     settings = [tracking.flatten(config) for config in configs]
     return {
@@ -132,7 +135,7 @@ def _describe_sweep(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
     return tracking.TrackedRun(
         experiment=first.experiment,
         name=f"sweep {folder.name}",
-        parameters=shared_settings([job.config for job in jobs]),
+        parameters=list_shared_settings([job.config for job in jobs]),
         tags={
             "task": first.choices["task"],
             "sweep": " ".join(overrides),

@@ -63,13 +63,13 @@ class Tally:
 
 
 @contextmanager
-def progress(jobs: Sequence[SweepJob]) -> Iterator[Callable[[SweepJob, Status], None]]:
+def show_progress(jobs: Sequence[SweepJob]) -> Iterator[Callable[[SweepJob, Status], None]]:
     """Yield what is to be called with each job's end: a live bar on a terminal, a line now and then
     in a log file.
     """
     tally = Tally(jobs)
     if build_console().is_terminal:
-        with _live(tally) as callback:
+        with _show_bar(tally) as callback:
             yield callback
         return
     pace = Pace()
@@ -83,7 +83,7 @@ def progress(jobs: Sequence[SweepJob]) -> Iterator[Callable[[SweepJob, Status], 
 
 
 @contextmanager
-def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
+def _show_bar(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
     """Within it, a bar counts the jobs, in a terminal."""
     from rich.console import Group
     from rich.live import Live
@@ -100,7 +100,7 @@ def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
     line = bar.add_task("", total=tally.total, note="")
 
     def render_progress() -> Any:
-        return Group(bar, _table(tally))
+        return Group(bar, _build_table(tally))
 
     with Live(
         render_progress(), console=build_console(), transient=True, refresh_per_second=4
@@ -115,7 +115,7 @@ def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
         yield note
 
 
-def _table(tally: Tally) -> Any:
+def _build_table(tally: Tally) -> Any:
     """The best objective of each variant so far, best first."""
     from rich.table import Table
     from rich.text import Text

@@ -88,7 +88,7 @@ def read(folder: Path, name: str = FILE) -> Status | None:
     return state if fits else None
 
 
-def objective(folder: Path, name: str = SEARCHED) -> float | None:
+def read_objective(folder: Path, name: str = SEARCHED) -> float | None:
     """A metric of the job in `folder`, by default where its search ended; None where
     there is none.
     """

@@ -30,7 +30,7 @@ from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.live import PAGE, LivePage, keep_live
-from tractexp.sweep.parent import parent_run
+from tractexp.sweep.parent import open_parent_run
 from tractexp.sweep.placing import await_end, is_finished, list_placing_overrides, place, settle
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, INTERRUPTED
@@ -109,7 +109,7 @@ class Grid(Sweeper):
             self.page.print_address()
             self.page.add(jobs, remaining)
             with (
-                parent_run(folder, jobs, arguments, afresh=self.redo) as recorder,
+                open_parent_run(folder, jobs, arguments, afresh=self.redo) as recorder,
                 keep_live(self.page),
             ):
                 self._run(remaining, recorder)
@@ -118,7 +118,7 @@ class Grid(Sweeper):
         """The jobs of the sweep, composed and without duplicates, not yet placed."""
         compose = Composer(self.loader, self.config)
         parsed = OverridesParser.create(self.loader).parse_overrides(arguments)
-        choices = {override.get_key_element(): values_of(override) for override in parsed}
+        choices = {override.get_key_element(): list_values(override) for override in parsed}
         jobs: dict[str, SweepJob] = {}
         for number, combination in enumerate(itertools.product(*choices.values())):
             overrides = [f"{key}={value}" for key, value in zip(choices, combination, strict=True)]
@@ -186,7 +186,7 @@ class Grid(Sweeper):
                     settle(job, end, problem)
 
 
-def values_of(override: Override) -> list[str]:
+def list_values(override: Override) -> list[str]:
     """The values an override asks for: one, or those it sweeps over. Raises `UserError` where they
     cannot be listed.
     """
@@ -214,7 +214,7 @@ def is_comparable(jobs: Sequence[SweepJob]) -> bool:
     variants = {job.variant(common) for job in jobs}
     if len(variants) < 2 or len({job.config["seed"] for job in jobs}) < 2:
         return False
-    ended = (job for job in jobs if status.objective(job.folder) is not None)
+    ended = (job for job in jobs if status.read_objective(job.folder) is not None)
     return len(list(itertools.islice(ended, 2))) > 1
 
 
@@ -232,7 +232,7 @@ def print_summary(jobs: Sequence[SweepJob]) -> None:
     common = find_shared_overrides(jobs)
     objectives: dict[str, list[float]] = {}
     for job in jobs:
-        value = status.objective(job.folder)
+        value = status.read_objective(job.folder)
         if value is not None:
             objectives.setdefault(job.variant(common), []).append(value)
     if objectives:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tractexp.record.phasor_measurement import fundamental
+from tractexp.record.phasor_measurement import measure_fundamental
 from tractexp.recording import Connection, Estimator
 
 RATE, NOMINAL, F = 4000.0, 50.0, 48.7  # Hz: of the samples, of the grid, of the test
@@ -31,7 +31,7 @@ def is_exact_in_steady_state(cls: type[Estimator]) -> None:
     over = cls().averager(RATE, NOMINAL)
     count = 2 * over.reach + 200
     x = np.sqrt(2) * np.cos(2 * np.pi * F / RATE * np.arange(count) + 0.7)
-    X = fundamental(x, RATE, F, np.arange(over.reach, count - over.reach), over.means)
+    X = measure_fundamental(x, RATE, F, np.arange(over.reach, count - over.reach), over.means)
     off = np.abs(X - np.exp(0.7j)).max()
     assert off < ROUNDING_ERROR, (
         f"'{cls.name}' is {off:.2g} off a sinusoid of {F:g} Hz and magnitude 1"

@@ -36,10 +36,10 @@ def partners() -> tuple[type[Motor], type[Static]]:
 
 def _moves(cls: type[Motor]) -> bool:
     """Whether a motor has a flux and a speed that move."""
-    from tractexp.model.declaration import motor_alone
+    from tractexp.model.declaration import declare_motor_alone
 
     return {"flux", "speed"} <= {
-        s.role for s in motor_alone(cls()).states.values() if s.derivative != 0
+        s.role for s in declare_motor_alone(cls()).states.values() if s.derivative != 0
     }
 
 

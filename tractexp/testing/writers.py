@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.configuration.plugin import build
 from tractexp.errors import UserError
-from tractexp.record import Base, Record, endings, reader_of
+from tractexp.record import Base, Record, find_reader, list_endings
 from tractexp.recording import Channel, Recording, Segment, Writer
 from tractexp.recording.reader import WaveformReader
 
@@ -31,9 +31,9 @@ def writes_a_record_that_is_read_again(cls: type[Writer]) -> None:
         files = _write_files(
             cls, lambda: cls().record(RECORD, Path(folder, f"dip{cls.endings[0]}"))
         )
-        if not files or files[0].suffix not in endings():
+        if not files or files[0].suffix not in list_endings():
             return
-        reader = reader_of(str(files[0]))
+        reader = find_reader(str(files[0]))
         if issubclass(reader, WaveformReader):
             return  # a format of waveforms, which holds U, P, Q as channels
         (again,) = (
@@ -68,9 +68,9 @@ def writes_a_recording_that_is_read_again(cls: type[Writer]) -> None:
         files = _write_files(
             cls, lambda: cls().recording(whole, Path(folder, f"all{cls.endings[0]}"))
         )
-        if not files or files[0].suffix not in endings():
+        if not files or files[0].suffix not in list_endings():
             return
-        reader = reader_of(str(files[0]))
+        reader = find_reader(str(files[0]))
         assert issubclass(reader, WaveformReader), (
             f"'{cls.name}' writes a recording that '{reader.name}' takes for a table"
         )

@@ -114,7 +114,7 @@ def report_search(
     ]
     started = time.perf_counter()
     total = 1.0 if iterations or budget else None
-    with _live(columns, total, simulations=0, best="", rest="") as update:
+    with _show_bar(columns, total, simulations=0, best="", rest="") as update:
 
         def callback(iteration: int, best: float, simulations: int) -> None:
             done = share(iteration, simulations, iterations, budget)
@@ -147,7 +147,7 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
             MofNCompleteColumn(),
             TimeRemainingColumn(),
         ]
-        with _live(columns, total) as update:
+        with _show_bar(columns, total) as update:
             yield lambda: update(advance=1)
         return
     pace, done, first = Pace(), 0, 0.0
@@ -177,7 +177,7 @@ def describe_rate(spent: float, done: int, total: int) -> str:
     return f", {done / spent:.2g} a second{describe_remaining_time(spent, done / total)}"
 
 
-def counter(what: str, progress: Progress = None) -> Callable[[int], Counting]:
+def make_counter(what: str, progress: Progress = None) -> Callable[[int], Counting]:
     """`counting` of as many parts as will be said; a callable, which is told what begins, is told
     of none.
     """
@@ -196,7 +196,7 @@ def tell_stages(progress: Progress = None) -> Iterator[Callable[[str], None]]:
         yield progress or (lambda line: None)
         return
     if _can_overwrite():
-        with _live(
+        with _show_bar(
             [SpinnerColumn(), TextColumn("{task.fields[stage]}", markup=False)], None, stage=""
         ) as update:
             yield lambda line: update(stage=write_on_one_line(line))
@@ -262,7 +262,9 @@ def _can_overwrite() -> bool:
 
 
 @contextmanager
-def _live(columns: list[Any], total: float | None, **fields: Any) -> Iterator[Callable[..., None]]:
+def _show_bar(
+    columns: list[Any], total: float | None, **fields: Any
+) -> Iterator[Callable[..., None]]:
     """Yield `update(completed=..., **fields)` of one bar, which vanishes at the end."""
     from rich.progress import Progress as Bar
 

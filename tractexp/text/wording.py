@@ -50,7 +50,7 @@ def format_probability(p: float) -> str:
     """
     if p < NEGLIGIBLE:
         return "less than one in a million"
-    return f"{p:.2g}" if p >= 1e-4 else _powers(p, 2)
+    return f"{p:.2g}" if p >= 1e-4 else _shorten_powers(p, 2)
 
 
 def format_with_error(value: float, error: float) -> str:
@@ -68,26 +68,26 @@ def format_with_error(value: float, error: float) -> str:
     digits = 1 - math.floor(math.log10(error))
     if 0 <= digits <= MOST_DIGITS:
         return f"{value:.{digits}f} ± {error:.{digits}f}"
-    return f"{_powers(value, 4)} ± {_powers(error, 2)}"
+    return f"{_shorten_powers(value, 4)} ± {_shorten_powers(error, 2)}"
 
 
-def percent(share: float) -> str:
+def format_share(share: float) -> str:
     """A share of a whole that is itself estimated, in percent: never below none or above all of it.
 
     Examples
     --------
-    >>> percent(0.234), percent(1.08)
+    >>> format_share(0.234), format_share(1.08)
     ('23%', '100%')
     """
     return f"{min(max(share, 0.0), 1.0):.0%}"
 
 
-def epsilon(error: float | None) -> str:
+def format_epsilon(error: float | None) -> str:
     """A relative error of Eq. (20) in percent; "undefined" for a record without that power.
 
     Examples
     --------
-    >>> epsilon(0.0123), epsilon(None)
+    >>> format_epsilon(0.0123), format_epsilon(None)
     ('1.230%', 'undefined')
     """
     return "undefined" if error is None or not math.isfinite(error) else f"{error:.3%}"
@@ -171,17 +171,17 @@ def finish_sentence(text: str) -> str:
     return f"{text if '_' in text.split(' ')[0] else text[:1].upper() + text[1:]}."
 
 
-def _powers(value: float, digits: int) -> str:
+def _shorten_powers(value: float, digits: int) -> str:
     """'2.6e-5' where Python says '2.6e-05'."""
     return f"{value:.{digits}g}".replace("e-0", "e-").replace("e+0", "e")
 
 
-def figure(value: float | None, digits: int = 4, unit: str = "") -> str:
+def format_figure(value: float | None, digits: int = 4, unit: str = "") -> str:
     """A number with so many significant digits and its unit; "" where there is none.
 
     Examples
     --------
-    >>> figure(0.123456, 3, "pu"), figure(None)
+    >>> format_figure(0.123456, 3, "pu"), format_figure(None)
     ('0.123 pu', '')
     """
     return "" if value is None or value != value else f"{value:.{digits}g}{unit and ' '}{unit}"
@@ -195,7 +195,7 @@ def change(before: float | None, after: float | None) -> str:
     >>> change(1.0, None)
     '1 to ?'
     """
-    return f"{figure(before) or '?'} to {figure(after) or '?'}"
+    return f"{format_figure(before) or '?'} to {format_figure(after) or '?'}"
 
 
 def write_quantity(symbol: str, value: float, unit: str) -> str:
@@ -227,7 +227,7 @@ def share(value: float | None) -> str:
     return "" if value is None else f"{value:.1%}"
 
 
-def degrees(value: float | None) -> str:
+def format_degrees(value: float | None) -> str:
     """An angle to a tenth of a degree, without a minus before zero; "" where there is none."""
     return "" if value is None else f"{round(value, 1) + 0.0:.1f}"
 

@@ -11,7 +11,7 @@ import numpy as np
 from tractexp.errors import TASK, UserError, list_allowed
 from tractexp.storage import files
 from tractexp.tracking.owner import search
-from tractexp.tracking.store import open_store, sentences
+from tractexp.tracking.store import open_store, raise_sentences
 
 CURVES = ("fitness_by_simulations",)
 FILES = ("result.json", "history.csv")
@@ -47,7 +47,7 @@ def find(
     where none match.
     """
     client = open_store(uri)
-    with sentences(uri):
+    with raise_sentences(uri):
         names = {one.experiment_id: one.name for one in client.search_experiments()}
     if experiment is not None:
         chosen = [key for key, name in names.items() if name == experiment]
@@ -57,7 +57,7 @@ def find(
                 f" '{experiment}'{list_allowed(experiment, names.values())}"
             )
         names = {chosen[0]: experiment}
-    with sentences(uri):
+    with raise_sentences(uri):
         runs = _search(client, list(names), filter)
         return [
             _read_logged_run(client, run, names[run.info.experiment_id], curves) for run in runs

@@ -15,7 +15,7 @@ closed: list[str] = []  # runs that this process has closed where it opened a st
 
 
 @functools.cache
-def _machine() -> tuple[str, str, str]:
+def _identify_machine() -> tuple[str, str, str]:
     """This computer, its boot, and its namespace of processes; "-" where the system
     does not say.
     """
@@ -56,19 +56,19 @@ def _read_start(pid: int) -> str:
     return status[19] if len(status) > 19 else "-"
 
 
-def signature() -> str:
+def sign_process() -> str:
     """This process, as a tag of the runs that it writes."""
-    return " ".join([*_machine(), str(os.getpid()), _read_start(os.getpid())])
+    return " ".join([*_identify_machine(), str(os.getpid()), _read_start(os.getpid())])
 
 
 def has_ended(tag: str) -> bool | None:
     """Whether the process of a signature has ended; None where this computer cannot decide."""
     parts = tag.split()
-    if len(parts) != 5 or parts[0] != _machine()[0]:
+    if len(parts) != 5 or parts[0] != _identify_machine()[0]:
         return None
-    if parts[1] != _machine()[1]:
+    if parts[1] != _identify_machine()[1]:
         return True  # the computer has been started anew
-    if parts[2] != _machine()[2] or not parts[3].isdecimal():
+    if parts[2] != _identify_machine()[2] or not parts[3].isdecimal():
         return None
     begun = _read_start(int(parts[3]))
     return not begun or (begun != parts[4] and "-" not in (begun, parts[4]))

@@ -43,7 +43,7 @@ def _end_ahead() -> None:
         _ahead.pop().close()
 
 
-def logger(uri: str) -> "Logger":
+def open_logger(uri: str) -> "Logger":
     """The process that was started ahead or a new one, with the store at `uri` opened."""
     process = _ahead.pop() if _ahead else Logger()
     process.open(uri)
@@ -121,7 +121,7 @@ class Logger:
 
 
 @contextlib.contextmanager
-def absent(names: Iterable[str]) -> Iterator[None]:
+def hide_packages(names: Iterable[str]) -> Iterator[None]:
     """Let imports of these packages fail as where they are not installed; what was imported before
     stays.
     """
@@ -144,7 +144,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     run_id = problem = ""
     try:
-        with absent(OPTIONAL):
+        with hide_packages(OPTIONAL):
             import_mlflow()
             open_store(uri := pickle.load(sys.stdin.buffer))
         run_id = log(pickle.load(sys.stdin.buffer), uri)

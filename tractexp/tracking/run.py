@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from tractexp.cache import provenance
 from tractexp.errors import UserError, check_choice
 from tractexp.tracking import owner
-from tractexp.tracking.store import database_of, open_store, sentences
+from tractexp.tracking.store import find_database, open_store, raise_sentences
 
 if TYPE_CHECKING:
     import numpy as np
@@ -112,7 +112,7 @@ def _shorten_text(value: Any) -> str:
     return str(value)
 
 
-def metric_name(text: str) -> str:
+def name_metric(text: str) -> str:
     """Text as MLflow takes it for the name of a metric: "median issa levy=false" has a colon for
     the sign.
     """
@@ -153,7 +153,7 @@ def log(run: TrackedRun, uri: str, *, again: bool = False) -> str:
     """
     run.check()
     client = open_store(uri)
-    with sentences(uri):
+    with raise_sentences(uri):
         if again and (whole := _find_whole_run(client, run)):
             return whole
         run_id, ended = _create(client, run, uri), _count_milliseconds(run.ended)
@@ -191,7 +191,7 @@ def run_of(client: Any, uri: str, run_id: str) -> Any:
 
     if not run_id:
         return None
-    with sentences(uri):
+    with raise_sentences(uri):
         try:
             return client.get_run(run_id)
         except MlflowException as error:
@@ -208,7 +208,7 @@ def attach(run_id: str, uri: str, paths: Sequence[Path]) -> bool:
     run = run_of(client, uri, run_id)
     if run is None or run.info.lifecycle_stage == "deleted":
         return False
-    with sentences(uri):
+    with raise_sentences(uri):
         for path in paths:
             client.log_artifact(run_id, str(path))
     return True
@@ -222,7 +222,7 @@ def start_parent(run: TrackedRun, uri: str) -> str:
     """
     run.check()
     client = open_store(uri)
-    with sentences(uri):
+    with raise_sentences(uri):
         run_id = _create(client, run, uri)
         _write(client, run_id, run)
     return run_id
@@ -238,7 +238,7 @@ def reopen_parent(run_id: str, uri: str) -> bool:
     try:
         if client.get_run(run_id).info.lifecycle_stage == "deleted":
             return False
-        client.set_tag(run_id, owner.TAG, owner.signature())
+        client.set_tag(run_id, owner.TAG, owner.sign_process())
         client.update_run(run_id, status="RUNNING")
     except MlflowException:
         return False
@@ -258,7 +258,7 @@ def finish_parent(
     run = TrackedRun("sweep", run_id, metrics=metrics or {}, artifacts=artifacts, status=status)
     run.check()
     client = open_store(uri)
-    with sentences(uri):
+    with raise_sentences(uri):
         _write(client, run_id, run)
         client.set_terminated(run_id, status)
 
@@ -268,7 +268,7 @@ def tag_experiment(experiment: str, tags: Mapping[str, str], uri: str) -> str:
     experiment's id.
     """
     client = open_store(uri)
-    with sentences(uri):
+    with raise_sentences(uri):
         experiment_id = _get_experiment(client, experiment, uri)
         for key, value in tags.items():
             client.set_experiment_tag(experiment_id, key, value)
@@ -285,7 +285,7 @@ def _create(client: Any, run: TrackedRun, uri: str) -> str:
         NOTE: run.description,
         "mlflow.parentRunId": run.parent or "",
         KEY: run.key,
-        owner.TAG: owner.signature(),
+        owner.TAG: owner.sign_process(),
     }
     tags = {key: value for key, value in tags.items() if value} | {
         k: str(v) for k, v in run.tags.items()
@@ -378,7 +378,7 @@ def _get_experiment(client: Any, name: str, uri: str) -> str:
 
     experiment = client.get_experiment_by_name(name)
     if experiment is None:
-        database = database_of(uri)
+        database = find_database(uri)
         folder = re.sub(r"[^\w.-]+|^\.+", "_", name)
         location = (database.parent / "mlartifacts" / folder).as_uri() if database else None
         try:
@@ -397,10 +397,10 @@ def _get_experiment(client: Any, name: str, uri: str) -> str:
 
 def _create_experiment(client: Any, name: str, location: str | None) -> str:
     """The id of a new experiment, which opens on the columns that matter."""
-    from tractexp.tracking.view import tags_of_new
+    from tractexp.tracking.view import tag_new_experiment
 
     experiment_id = client.create_experiment(name, artifact_location=location)
-    for key, value in tags_of_new(experiment_id).items():
+    for key, value in tag_new_experiment(experiment_id).items():
         client.set_experiment_tag(experiment_id, key, value)
     return experiment_id
 

@@ -28,7 +28,7 @@ VARIABLE = "MLFLOW_TRACKING_URI"  # by which MLflow's own tools choose the store
 LONGEST_STORE_WAIT = 120.0  # s to wait for another process that makes the store or opens it
 
 
-def default_uri(folder: Path) -> str:
+def find_default_uri(folder: Path) -> str:
     """The store embedded in `folder`: an SQLite file under `outputs/`, as an absolute address."""
     return f"sqlite:///{(Path(folder).absolute() / 'outputs' / 'mlflow.db').as_posix()}"
 
@@ -38,7 +38,7 @@ def choose_uri(setting: str | None) -> str:
     return setting or os.environ.get(VARIABLE, "").strip()
 
 
-def address(setting: str | None) -> str:
+def resolve_address(setting: str | None) -> str:
     """The store that was chosen, or the default one; both from the current folder, as an absolute
     address.
 
@@ -46,13 +46,13 @@ def address(setting: str | None) -> str:
     """
     chosen = choose_uri(setting)
     if not chosen:
-        return default_uri(Path.cwd())
+        return find_default_uri(Path.cwd())
     credentials.check("the MLflow store", chosen)
-    database = database_of(chosen)
+    database = find_database(chosen)
     return f"sqlite:///{database.as_posix()}" if database else chosen
 
 
-def database_of(uri: str) -> Path | None:
+def find_database(uri: str) -> Path | None:
     """The file behind an SQLite address, None for any other store; a relative one counts from the
     current folder.
     """
@@ -74,11 +74,11 @@ def open_store(uri: str) -> Any:
             "tracking: the address of the MLflow store is empty; it is like"
             " sqlite:////folder/mlflow.db"
         )
-    database = database_of(uri)
+    database = find_database(uri)
     import_mlflow(sql=database is not None)
     from mlflow import MlflowClient
 
-    with sentences(uri):
+    with raise_sentences(uri):
         if database is None:
             _reach(uri)
             client = MlflowClient(uri, uri)
@@ -101,10 +101,10 @@ def _create_database(database: Path) -> None:
     MLflow's migrations take a second of work; what they came to is kept for the next folder.
     """
     # imports NumPy, for which the process that logs does not wait
-    from tractexp.cache.store import DATABASES, key, read_version
+    from tractexp.cache.store import DATABASES, compute_key, read_version
 
     makers = [read_version(name) for name in ("mlflow", "sqlalchemy", "alembic")]
-    files.write(database, DATABASES.get(key(makers, sqlite3.sqlite_version), _migrate))
+    files.write(database, DATABASES.get(compute_key(makers, sqlite3.sqlite_version), _migrate))
 
 
 def _migrate() -> bytes:
@@ -149,7 +149,7 @@ def import_mlflow(sql: bool = False) -> None:
     # what cannot be sent now is sent later by `sync`
     os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")
     os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", "30")
-    with light_import():
+    with import_lightly():
         import mlflow
 
         if sql:  # here, outside the lock that is held to open the database
@@ -157,7 +157,7 @@ def import_mlflow(sql: bool = False) -> None:
 
 
 @contextlib.contextmanager
-def light_import() -> Iterator[None]:
+def import_lightly() -> Iterator[None]:
     """Import large packages quietly and without looking for garbage.
 
     What they make lives for ever: looking through it costs a third of the import, and as much again
@@ -176,7 +176,7 @@ def light_import() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def sentences(uri: str) -> Iterator[None]:
+def raise_sentences(uri: str) -> Iterator[None]:
     """Turn what MLflow, the database and the file system raise into one sentence that names the
     store.
 

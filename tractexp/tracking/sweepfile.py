@@ -11,7 +11,7 @@ MULTIRUN = "multirun.yaml"  # the configuration that every sweeper leaves in a s
 PAGES = ("comparison.json", "comparison.html")  # of a sweep, written when its jobs have ended
 
 
-def folder_of(job: Path) -> Path:
+def find_sweep_folder(job: Path) -> Path:
     """The folder of the sweep that a job's folder is of: `hydra.sweep.subdir` may put it several
     levels deep.
     """
@@ -20,12 +20,12 @@ def folder_of(job: Path) -> Path:
     )
 
 
-def parent_of(folder: Path) -> str | None:
+def read_parent(folder: Path) -> str | None:
     """The run id of the sweep in `folder`; None where it is not logged."""
     return _read_content(folder).get("run")
 
 
-def waits(folder: Path) -> bool:
+def does_wait(folder: Path) -> bool:
     """Whether the run of the sweep in `folder` is still to be logged: its jobs then wait, too."""
     return "run" in (content := _read_content(folder)) and content["run"] is None
 

@@ -24,8 +24,8 @@ from tractexp.tracking.run import (
     start_parent,
 )
 from tractexp.tracking.runfile import RunFile
-from tractexp.tracking.store import address, open_store, sentences
-from tractexp.tracking.sweepfile import FILE, PAGES, folder_of, parent_of
+from tractexp.tracking.store import open_store, raise_sentences, resolve_address
+from tractexp.tracking.sweepfile import FILE, PAGES, find_sweep_folder, read_parent
 
 THERE, BROUGHT, DELETED, WORKS, NOT = (
     "already there",
@@ -66,12 +66,12 @@ def sync(
             continue
         if one is None:
             continue
-        if any(map(find_holder, (folder,) if one.sweep else (folder, folder_of(folder)))):
+        if any(map(find_holder, (folder,) if one.sweep else (folder, find_sweep_folder(folder)))):
             counts[WORKS] += 1  # which logs it itself
             continue
         where = uri or one.uri
         try:
-            where = address(where)
+            where = resolve_address(where)
             if uri is None and own not in (None, where):
                 raise UserError(
                     f"the MLflow store {where} is named in {root} alone, not by you:"
@@ -151,7 +151,7 @@ def _can_be_loaded(path: Path, tell: Callable[[str], None]) -> bool:
 def _send(one: RunFile, uri: str) -> str:
     """Send one run; what became of it."""
     client = open_store(uri)
-    parent = None if one.sweep else parent_of(folder_of(one.folder))
+    parent = None if one.sweep else read_parent(find_sweep_folder(one.folder))
     one = replace(one, run=replace(one.run, parent=parent or one.run.parent))
     run_there = run_of(client, uri, one.run_id)
     if run_there is not None and not _is_same_run(one, run_there):
@@ -206,7 +206,7 @@ def _log_sweep_run(one: RunFile, run_there: Any, uri: str) -> str:
 def _link_to_sweep(client: Any, uri: str, run_there: Any, parent: str | None) -> None:
     """Let a run that was logged point to the run of its sweep, which was not then."""
     if parent and run_there.data.tags.get("mlflow.parentRunId") != parent:
-        with sentences(uri):
+        with raise_sentences(uri):
             client.set_tag(run_there.info.run_id, "mlflow.parentRunId", parent)
 
 

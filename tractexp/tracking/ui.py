@@ -15,7 +15,7 @@ from typing import IO
 
 from tractexp.errors import UserError
 from tractexp.process import interpreter
-from tractexp.tracking.store import database_of
+from tractexp.tracking.store import find_database
 
 USUAL_START_SECONDS = 10  # s until the server answers: 5 on two free cores, 20 on busy ones
 
@@ -93,7 +93,7 @@ def check_servable(uri: str, host: str = "127.0.0.1", port: int = 5000) -> None:
     """Raise `UserError` when there is no store at `uri` yet or the port is taken;
     creates nothing.
     """
-    database = database_of(uri)
+    database = find_database(uri)
     if database is None and uri.startswith("http"):
         raise UserError(f"{uri} is a running MLflow server already: open it in a browser")
     if database is not None and not database.is_file():

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from tractexp.tracking.run import NOTE, tag_experiment
-from tractexp.tracking.store import open_store, sentences
+from tractexp.tracking.store import open_store, raise_sentences
 
 KEY = "tractexp"
 # Else MLflow's page is one for language models: in earlier versions by this tag of an experiment,
@@ -168,24 +168,23 @@ def _describe_load_table() -> dict[str, Any]:
     }
 
 
-def page(experiment_id: str, mode: str) -> str:
+def address_page(experiment_id: str, mode: str) -> str:
     """The address of the view within MLflow's page."""
     view = f"viewStateShareKey={KEY}&compareRunsMode={mode}"
     return f"#/experiments/{experiment_id}/runs?{view}&{WORKFLOW}"
 
 
-def tags_of_new(experiment_id: str) -> dict[str, str]:
+def tag_new_experiment(experiment_id: str) -> dict[str, str]:
     """The tags by which a new experiment has the view as a table, and its description leads there
     from any page.
     """
     table = STATE | {"groupBy": None, "compareRunsMode": "TABLE", "selectedColumns": COLUMNS}
-    note = (
-        f"[Errors, grades and where the searches ended, as columns]({page(experiment_id, 'TABLE')})"
-    )
+    page = address_page(experiment_id, "TABLE")
+    note = f"[Errors, grades and where the searches ended, as columns]({page})"
     return {TAG: _pack_view(table), NOTE: note, KIND: MODELS}
 
 
-def comparison_view(uri: str) -> str:
+def store_comparison_view(uri: str) -> str:
     """Store the view in the experiment that has the newest identification, and return its page for
     `serve`.
 
@@ -193,21 +192,21 @@ def comparison_view(uri: str) -> str:
     experiments.
     """
     client = open_store(uri)
-    with sentences(uri):
+    with raise_sentences(uri):
         names = {one.experiment_id: one.name for one in client.search_experiments()}
         newest, others = (
             client.search_runs(list(names), runs, max_results=1, order_by=["start_time DESC"])
             for runs in (RUNS, "")
         )
         if not newest:
-            return page(others[0].info.experiment_id, "TABLE") if others else EXPERIMENTS
+            return address_page(others[0].info.experiment_id, "TABLE") if others else EXPERIMENTS
         experiment_id = newest[0].info.experiment_id
         runs = client.search_runs(
             [experiment_id], RUNS, max_results=1000, order_by=["start_time DESC"]
         )
     state = _build_state([run.data.tags for run in runs])
     tag_experiment(names[experiment_id], {TAG: _pack_view(state)}, uri)
-    return page(experiment_id, state["compareRunsMode"])
+    return address_page(experiment_id, state["compareRunsMode"])
 
 
 def _pack_view(state: Mapping[str, Any]) -> str:

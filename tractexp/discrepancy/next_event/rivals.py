@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.discrepancy.gap import compute_curves
 from tractexp.discrepancy.next_event.choose import NextEvent, find_next_event
-from tractexp.domain import domain_of
+from tractexp.domain import find_domain
 from tractexp.errors import TASK, UserError
 from tractexp.inference.base_fit import fit_base_model
 from tractexp.inference.catalogue import Catalogue, build_catalogue
@@ -62,7 +62,7 @@ def choose_event_for(
             " or more apart; name"
             f" another one, such as '{TASK.rivals}=[stator_resistance,feeder_impedance]'"
         )
-    events = domain_of(model).events(events)
+    events = find_domain(model).events(events)
     check_events(events, ())
     named = sorted({name for names in sets for name in names})
     missing = build_catalogue(model, events, named)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tractexp.text.wording import format_probability, format_with_error, join_words, percent
+from tractexp.text.wording import format_probability, format_share, format_with_error, join_words
 
 
 def describe_proposal(proposal: Mapping[str, Any] | None, why: str | None) -> list[str]:
@@ -13,9 +13,9 @@ def describe_proposal(proposal: Mapping[str, Any] | None, why: str | None) -> li
     (term,) = proposal["terms"]
     explained = proposal["explained"]
     sentences = [
-        f"proposed: {term['words']}, which explains {percent(explained['train'])} of what exceeds"
-        " the noise on the"
-        f" fitted events and {percent(explained['validate'])} on the held-out ones;"
+        f"proposed: {term['words']}, which explains {format_share(explained['train'])} of what"
+        " exceeds the noise on the"
+        f" fitted events and {format_share(explained['validate'])} on the held-out ones;"
         f" {_format_numbers(term['parameters'])}",
     ]
     if not term["function_of_voltage"]:
@@ -26,7 +26,7 @@ def describe_proposal(proposal: Mapping[str, Any] | None, why: str | None) -> li
     if proposal["alike"]:
         sentences.append(
             "looks like it:"
-            f" {join_words([f'{n} ({percent(v)})' for n, v in proposal['alike'].items()])}"
+            f" {join_words([f'{n} ({format_share(v)})' for n, v in proposal['alike'].items()])}"
         )
     return sentences
 

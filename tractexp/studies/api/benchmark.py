@@ -44,9 +44,9 @@ class BenchmarkResult(Written):
     @property
     def sentences(self) -> list[str]:
         """Sentences to quote."""
-        from tractexp.studies.bbob.page import sentences
+        from tractexp.studies.bbob.page import list_sentences
 
-        return sentences(self.bbob)
+        return list_sentences(self.bbob)
 
     def table(self) -> Table:
         """The share of targets that each optimizer reaches, by dimension."""
@@ -85,15 +85,17 @@ class BenchmarkResult(Written):
 
     def write_results(self, folder: Path) -> list[Path]:
         """Write `benchmark.json`."""
-        from tractexp.studies.bbob.page import content
+        from tractexp.studies.bbob.page import build_content
 
-        return [files.write_json(folder / "benchmark.json", content(self.bbob, self.optimizers))]
+        return [
+            files.write_json(folder / "benchmark.json", build_content(self.bbob, self.optimizers))
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Runs and settings as plain data."""
-        from tractexp.studies.bbob.page import content
+        from tractexp.studies.bbob.page import build_content
 
-        return {**content(self.bbob, self.optimizers), "titles": self.bbob.titles}
+        return {**build_content(self.bbob, self.optimizers), "titles": self.bbob.titles}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
@@ -105,7 +107,7 @@ class BenchmarkResult(Written):
                 **{**row, "hits": tuple(np.inf if n is None else n for n in row["hits"])}
             )
 
-        plan = BbobPlan(*(_tuple(content[item.name]) for item in dataclasses.fields(BbobPlan)))
+        plan = BbobPlan(*(_make_tuple(content[item.name]) for item in dataclasses.fields(BbobPlan)))
         titles = {int(function): title for function, title in content["titles"].items()}
         bbob = BbobRuns(
             plan, tuple(content["optimizers"]), titles, [run(row) for row in content["runs"]]
@@ -163,7 +165,7 @@ def benchmark(
     -----
     Source: Hansen and others 2021, COCO: a platform for comparing continuous optimizers.
     """
-    from tractexp.studies.bbob.runs import BbobPlan, package, perform
+    from tractexp.studies.bbob.runs import BbobPlan, import_package, perform
 
     check(functions, instances, dimensions, multiplier, targets, cores)
     check_range("seed", seed, 0)
@@ -175,7 +177,7 @@ def benchmark(
                 f"optimizer {name} polishes by least squares, which need residuals that a BBOB"
                 " function does not have; set optimizer.polish=false"
             )
-    package()
+    import_package()
     ordered = tuple(sorted(targets, reverse=True))
     plan = BbobPlan(
         tuple(functions), tuple(dimensions), tuple(instances), multiplier, ordered, seed
@@ -208,7 +210,7 @@ def check(
     check_range("task.cores", cores, 1)
 
 
-def _tuple(value: Any) -> Any:
+def _make_tuple(value: Any) -> Any:
     """A list as a tuple; anything else as it is."""
     return tuple(value) if isinstance(value, list) else value
 
@@ -271,7 +273,7 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
         from tractexp import tracking
 
         metrics = {
-            tracking.metric_name(f"share {name} {d}d"): result.bbob.share(
+            tracking.name_metric(f"share {name} {d}d"): result.bbob.share(
                 name, d, result.bbob.plan.functions
             )
             for name in result.bbob.optimizers

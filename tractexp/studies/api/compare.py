@@ -197,11 +197,11 @@ def _track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
     """Add the page to the sweep's run, or log a run of its own where there is no such run."""
     from tractexp import tracking
     from tractexp.tracking.run import attach
-    from tractexp.tracking.sweepfile import parent_of, waits
+    from tractexp.tracking.sweepfile import does_wait, read_parent
 
-    if result.folder is not None and waits(result.folder):
+    if result.folder is not None and does_wait(result.folder):
         return  # the page is sent with the run of the sweep
-    parent = parent_of(result.folder) if result.folder is not None else None
+    parent = read_parent(result.folder) if result.folder is not None else None
     comparisons = result.comparisons
     data = _name_data(comparisons.values())
     try:
@@ -234,7 +234,7 @@ def _collect_medians(comparisons: "Mapping[str, Comparison]") -> dict[str, float
     from tractexp import tracking
 
     return {
-        tracking.metric_name(f"median {s.name} {label}".strip()): s.objective.median
+        tracking.name_metric(f"median {s.name} {label}".strip()): s.objective.median
         for label, comparison in comparisons.items()
         for s in comparison.summaries
         if s.runs > s.failures

@@ -244,4 +244,4 @@ def _gather_runs(
     from tractexp.tracking.find import find
 
     source = f"the filter {filter}"
-    return load.read_logged(find(tracking.address(uri), filter, experiment), source), source
+    return load.read_logged(find(tracking.resolve_address(uri), filter, experiment), source), source

@@ -65,7 +65,7 @@ class PaperResult(Written):
     @functools.cached_property
     def study(self) -> "Study":
         """The study behind the page; each part is measured at its first use."""
-        return self.measured or _study(self.setup, **self.settings)
+        return self.measured or _build_study(self.setup, **self.settings)
 
     @property
     def counts(self) -> Counter[str]:
@@ -211,15 +211,20 @@ def paper(
         [p for p in PARTS if p in parts or not parts],
     )
     with tell_stages(progress) as tell:
-        study = _study(setup, **settings, tell=tell, count=_count_searches(tell))
-        from tractexp.studies.paper.claims import claims
+        study = _build_study(setup, **settings, tell=tell, count=_count_searches(tell))
+        from tractexp.studies.paper.claims import list_claims
 
         for kind, needing in HELD_OUT.items():
             if needing & set(chosen):
                 study.select_held_out(kind)
         study.prepare(chosen)
         return PaperResult(
-            setup, settings, chosen, claims(study, chosen), study, time.perf_counter() - started
+            setup,
+            settings,
+            chosen,
+            list_claims(study, chosen),
+            study,
+            time.perf_counter() - started,
         )
 
 
@@ -231,7 +236,7 @@ def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
     check_range("task.workers", workers, 1)
 
 
-def _study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "Study":
+def _build_study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "Study":
     """The searches and fits that the parts ask for, with the printed equations beside the usual
     ones.
     """

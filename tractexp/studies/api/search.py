@@ -215,7 +215,7 @@ def _describe_run(setup: Setup, choice: Choice, seed: int, end: Any) -> "SearchR
     simulated is a record with its reason as `failure`, not an error.
     """
     from tractexp.identification.conclude import describe_search, refuse_failed
-    from tractexp.studies.comparison.load import parameters_of
+    from tractexp.studies.comparison.load import list_parameters
     from tractexp.studies.comparison.runs import SearchRun
     from tractexp.studies.searches import FailedSearch
 
@@ -240,7 +240,7 @@ def _describe_run(setup: Setup, choice: Choice, seed: int, end: Any) -> "SearchR
     return dataclasses.replace(
         run,
         **{key: float(ended[key]) for key in ("objective", "epsilon_p", "epsilon_q")},
-        parameters=parameters_of(ended),
+        parameters=list_parameters(ended),
         simulations=end.history.simulations.astype(float),
         seconds=end.history.seconds,
         history=end.history.objective,

@@ -8,7 +8,7 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.storage import files
 from tractexp.studies.bbob.runs import BbobRuns
-from tractexp.studies.comparison.charts import runtime_curves
+from tractexp.studies.comparison.charts import draw_runtime_curves
 from tractexp.text.wording import count_noun
 
 
@@ -23,7 +23,7 @@ def scale(benchmark: BbobRuns) -> str:
     )
 
 
-def sentences(benchmark: BbobRuns) -> list[str]:
+def list_sentences(benchmark: BbobRuns) -> list[str]:
     """One sentence to quote for each dimension, the best optimizer first."""
     sentences = []
     plan = benchmark.plan
@@ -42,7 +42,7 @@ def sentences(benchmark: BbobRuns) -> list[str]:
     return sentences
 
 
-def shares(benchmark: BbobRuns, dimension: int) -> tuple[list[str], list[list[str]]]:
+def tabulate_shares(benchmark: BbobRuns, dimension: int) -> tuple[list[str], list[list[str]]]:
     """Columns and rows: the share of targets met, in all and by group of functions, and the
     functions solved.
     """
@@ -58,7 +58,7 @@ def shares(benchmark: BbobRuns, dimension: int) -> tuple[list[str], list[list[st
     return ["optimizer", "all", *groups, "solved"], rows
 
 
-def running_times(benchmark: BbobRuns, dimension: int, target: int) -> list[list[str]]:
+def tabulate_running_times(benchmark: BbobRuns, dimension: int, target: int) -> list[list[str]]:
     """One row for each function: ERT in evaluations and the runs that met the target, for each
     optimizer.
     """
@@ -103,7 +103,7 @@ def answer(benchmark: BbobRuns, dimension: int) -> str:
     )
 
 
-def charts(benchmark: BbobRuns, dimension: int) -> dict[str, tuple[Chart, list[Chart]]]:
+def draw_charts(benchmark: BbobRuns, dimension: int) -> dict[str, tuple[Chart, list[Chart]]]:
     """The ECDF over all functions and over each group, {group or "all": the whole, and each where
     they are many}.
     """
@@ -114,7 +114,7 @@ def charts(benchmark: BbobRuns, dimension: int) -> dict[str, tuple[Chart, list[C
     drawn = {}
     for group, functions in chosen.items():
         hits = [benchmark.hits(name, dimension, functions) for name in benchmark.optimizers]
-        drawn[group] = runtime_curves(benchmark.optimizers, hits, "evaluations")
+        drawn[group] = draw_runtime_curves(benchmark.optimizers, hits, "evaluations")
     return drawn
 
 
@@ -130,19 +130,19 @@ def report(benchmark: BbobRuns) -> Report:
     page = Report(
         f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}."
     )
-    page.verdict(*(answer(benchmark, d) for d in plan.dimensions), *sentences(benchmark))
+    page.verdict(*(answer(benchmark, d) for d in plan.dimensions), *list_sentences(benchmark))
     for d in plan.dimensions:
         page.heading(f"Dimension {d}")
-        _shares(page, benchmark, d)
-        _times(page, benchmark, d)
-    return _reading(page)
+        _add_shares(page, benchmark, d)
+        _add_times(page, benchmark, d)
+    return _add_reading(page)
 
 
-def _shares(page: Report, benchmark: BbobRuns, d: int) -> None:
+def _add_shares(page: Report, benchmark: BbobRuns, d: int) -> None:
     """The share of targets met, in a table and by evaluations."""
-    plan, drawn = benchmark.plan, charts(benchmark, d)
+    plan, drawn = benchmark.plan, draw_charts(benchmark, d)
     page.table(
-        *shares(benchmark, d),
+        *tabulate_shares(benchmark, d),
         f"Share of the {len(plan.targets)} targets, {plan.targets[0]:g} to {plan.targets[-1]:g}"
         " from the optimum, met by all runs. Solved: functions on which every run met the last"
         " one.",
@@ -159,25 +159,31 @@ def _shares(page: Report, benchmark: BbobRuns, d: int) -> None:
                 page.chart(chart, f"{group.capitalize()}: {numbers}.")
 
 
-def _times(page: Report, benchmark: BbobRuns, d: int) -> None:
+def _add_times(page: Report, benchmark: BbobRuns, d: int) -> None:
     """The expected running times to each target, the hardest first."""
     hardest = len(benchmark.plan.targets) - 1
     columns = ["function", *benchmark.optimizers]
     page.heading(f"Expected running times in dimension {d}", 3)
-    page.table(columns, running_times(benchmark, d, hardest), _caption(benchmark.plan, hardest))
+    page.table(
+        columns,
+        tabulate_running_times(benchmark, d, hardest),
+        _write_caption(benchmark.plan, hardest),
+    )
     with page.fold_blocks("to the other targets"):
         for target in range(hardest):
             page.table(
-                columns, running_times(benchmark, d, target), _caption(benchmark.plan, target)
+                columns,
+                tabulate_running_times(benchmark, d, target),
+                _write_caption(benchmark.plan, target),
             )
 
 
-def _caption(plan: Any, target: int) -> str:
+def _write_caption(plan: Any, target: int) -> str:
     """The caption of the table of running times."""
     return f"ERT to {plan.targets[target]:g} from the optimum, in evaluations (runs that met it)."
 
 
-def _reading(page: Report) -> Report:
+def _add_reading(page: Report) -> Report:
     """Add how the page is read."""
     return page.heading("How to read this page").items(
         [
@@ -194,7 +200,7 @@ def _reading(page: Report) -> Report:
     )
 
 
-def content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
+def build_content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
     """The content of `benchmark.json`: the plan, each optimizer's settings, every run; alike for
     the same seed.
 
@@ -233,6 +239,6 @@ def content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
             "summary": summary,
             "running_times": times,
             "runs": benchmark.runs,
-            "sentences": sentences(benchmark),
+            "sentences": list_sentences(benchmark),
         }
     )

@@ -15,7 +15,7 @@ from tractexp.errors import UserError, name_setting
 from tractexp.identification.optimizer import Optimizer
 from tractexp.identification.search import Limits, search
 from tractexp.process.workers import Workers
-from tractexp.studies.comparison.statistics import expected_running_time
+from tractexp.studies.comparison.statistics import compute_expected_running_time
 
 GROUPS = {
     "separable": range(1, 6),
@@ -27,7 +27,7 @@ GROUPS = {
 FUNCTIONS = range(1, 25)
 
 
-def package() -> Any:
+def import_package() -> Any:
     """The package `ioh`; raises `UserError` where it is not installed."""
     try:
         import ioh
@@ -48,7 +48,7 @@ class Bbob:
 
     def __init__(self, function: int, dimension: int, instance: int, targets: Sequence[float]):
         """A function of BBOB in one instance, with the targets that are counted."""
-        ioh = package()
+        ioh = import_package()
         self.problem: Any = ioh.get_problem(function, instance, dimension, ioh.ProblemClass.BBOB)
         self.name: str = self.problem.meta_data.name
         self.lower, self.upper = np.array(self.problem.bounds.lb), np.array(self.problem.bounds.ub)
@@ -115,7 +115,7 @@ class BbobRun:
     hits: tuple[float, ...]  # evaluations to each target, inf where it was not met
 
 
-def seed_of(seed: int, *counts: int) -> int:
+def compute_seed(seed: int, *counts: int) -> int:
     """The seed of one search: the same for all optimizers, another for each case and restart."""
     return int(np.random.SeedSequence((seed, *counts)).generate_state(1, np.uint64)[0])
 
@@ -129,7 +129,7 @@ def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: BbobP
     budget, searches = plan.multiplier * dimension, 0
     while problem.evaluations < budget and not problem.is_solved:
         limits = Limits(simulations=budget - problem.evaluations, target=float(problem.goals.min()))
-        search(problem, optimizer, seed_of(plan.seed, *case, searches), limits)
+        search(problem, optimizer, compute_seed(plan.seed, *case, searches), limits)
         searches += 1
     distance = problem.best - problem.optimum
     return BbobRun(
@@ -222,4 +222,6 @@ class BbobRuns:
         spent = np.array([r.hits[target] for r in runs])
         reached = np.isfinite(spent)
         whole = np.array([r.evaluations for r in runs], dtype=float)
-        return expected_running_time(np.where(reached, spent, whole), reached), int(reached.sum())
+        return compute_expected_running_time(np.where(reached, spent, whole), reached), int(
+            reached.sum()
+        )

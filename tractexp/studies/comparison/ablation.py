@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from tractexp.studies.comparison.runs import Variant
-from tractexp.studies.comparison.statistics import bootstrap
+from tractexp.studies.comparison.statistics import bootstrap_interval
 
 On = frozenset[str]  # the switches that are on
 
@@ -89,7 +89,7 @@ class VariantFamily:
         }
 
 
-def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> VariantFamily | None:
+def find_family(variants: Sequence[Variant], plain: Mapping[str, str]) -> VariantFamily | None:
     """The largest family among the variants; None where there is none.
 
     `plain` says which optimizer another one is with all its switches off.
@@ -97,7 +97,7 @@ def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> VariantFami
     families = [
         members
         for optimizer, without in plain.items()
-        for members in _families(variants, optimizer, without)
+        for members in _list_families(variants, optimizer, without)
     ]
     largest = max(families, key=len, default={})
     if len(largest) < 2:
@@ -112,7 +112,7 @@ def ablate(variants: Sequence[Variant], plain: Mapping[str, str], least: float) 
 
     Objectives count from `least` upwards. Seeds that not all of the variants finished are left out.
     """
-    chosen = family(variants, plain)
+    chosen = find_family(variants, plain)
     if chosen is None:
         return None
     members = [v for v in variants if v.name in chosen.members.values()]
@@ -124,7 +124,9 @@ def ablate(variants: Sequence[Variant], plain: Mapping[str, str], least: float) 
     )
 
 
-def _families(variants: Sequence[Variant], optimizer: str, plain: str) -> list[dict[On, Variant]]:
+def _list_families(
+    variants: Sequence[Variant], optimizer: str, plain: str
+) -> list[dict[On, Variant]]:
     """Variants of `optimizer` by the switches that are on, one dictionary for each set of other
     settings.
     """
@@ -203,7 +205,7 @@ class _Contrasts:
         signs = np.array((1.0, -1.0) if simple else (1.0, -1.0, -1.0, 1.0))
         shifts = np.array([signs @ [self.logs[on] for on in row] for row in contrasts])
         logs = shifts.mean(axis=0)
-        low, high = bootstrap(logs)
+        low, high = bootstrap_interval(logs)
         names = tuple(tuple(self.names[on] for on in row) for row in contrasts)
         effect = SwitchEffect(
             switches, 10.0 ** float(logs.mean()), 10.0**low, 10.0**high, names, len(logs)
@@ -211,7 +213,7 @@ class _Contrasts:
         if not simple:
             return effect
         wins = np.mean((shifts < 0) + 0.5 * (shifts == 0), axis=0)
-        return replace(effect, better=(float(wins.mean()), *bootstrap(wins)))
+        return replace(effect, better=(float(wins.mean()), *bootstrap_interval(wins)))
 
     def _pairs(self, switch: str) -> list[tuple[On, ...]]:
         """(with, without) of a switch, all else alike."""

@@ -8,11 +8,11 @@ import numpy as np
 
 from tractexp.blocks import style
 from tractexp.blocks.chart import DECADE, Chart
-from tractexp.studies.comparison.claims import number
+from tractexp.studies.comparison.claims import format_number
 from tractexp.studies.comparison.floor import Floor, Polished
 from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.comparison.statistics import Ranks
-from tractexp.studies.comparison.summary import ECDF_TARGETS, Band, band, runtimes
+from tractexp.studies.comparison.summary import ECDF_TARGETS, Band, compute_band, list_runtimes
 
 TOGETHER = len(style.PALETTE)  # more curves than colors are not told apart in one panel
 SMALL_CHART_HEIGHT = 230  # pixels, the height of a chart beside others
@@ -26,7 +26,7 @@ Curves = Sequence[tuple[np.ndarray, np.ndarray]]
 Blank = Callable[[str, int | None], Chart]
 
 
-def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, list[Chart]]:
+def draw_fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, list[Chart]]:
     """Median and quartile band of the best objective by "iterations" or "simulations", where a run
     finished.
 
@@ -34,7 +34,7 @@ def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, 
     in gray.
     """
     variants = [variant for variant in variants if variant.finished_runs]
-    names, bands = [v.name for v in variants], [band(v, by) for v in variants]
+    names, bands = [v.name for v in variants], [compute_band(v, by) for v in variants]
     low, high = min(floor.value, *(b.lower.min() for b in bands)), max(b.top for b in bands)
     counted = by == "simulations"
     first = min(b.x[(b.lower <= high).argmax()] for b in bands)
@@ -57,19 +57,19 @@ def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, 
 
     curves = [(b.x, b.median) for b in bands]
     whole = _draw_curves_together(
-        blank("", _height(names)), names, curves, [] if len(names) > TOGETHER else bands
+        blank("", _choose_height(names)), names, curves, [] if len(names) > TOGETHER else bands
     )
     return whole, _draw_curves_apart(blank, names, curves, bands) if len(names) > TOGETHER else []
 
 
-def ecdf(variants: Sequence[Variant], floor: Floor) -> tuple[Chart, list[Chart]]:
+def draw_ecdf(variants: Sequence[Variant], floor: Floor) -> tuple[Chart, list[Chart]]:
     """The share of all targets that all runs of a variant have reached, by simulations."""
-    return runtime_curves(
-        [v.name for v in variants], [runtimes(v, floor) for v in variants], "simulations"
+    return draw_runtime_curves(
+        [v.name for v in variants], [list_runtimes(v, floor) for v in variants], "simulations"
     )
 
 
-def runtime_curves(
+def draw_runtime_curves(
     names: Sequence[str], costs: Sequence[np.ndarray], label: str
 ) -> tuple[Chart, list[Chart]]:
     """The ECDF of runtimes, sorted, inf where a target was not reached; `label` says what they are
@@ -91,19 +91,19 @@ def runtime_curves(
         )
         return chart.limits(0, 0, 1.02).limits(None, first, 1.1 * last)
 
-    curves = [_shares(cost, first, 1.1 * last) for cost in costs]
-    whole = _draw_curves_together(blank("", _height(names)), names, curves, [])
+    curves = [_step_shares(cost, first, 1.1 * last) for cost in costs]
+    whole = _draw_curves_together(blank("", _choose_height(names)), names, curves, [])
     return whole, _draw_curves_apart(blank, names, curves, []) if len(names) > TOGETHER else []
 
 
-def _shares(cost: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
+def _step_shares(cost: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
     """The steps of a distribution of costs between two ends."""
     x, counts = np.unique(cost[np.isfinite(cost)], return_counts=True)
     x, y = style.thin(x, np.cumsum(counts) / len(cost), 240)
     return np.array([first, *x, last]), np.array([0, *y, *(y[-1:] if len(y) else [0])])
 
 
-def targets_in_words() -> str:
+def describe_targets() -> str:
     """Which targets the curves count."""
     return (
         f"{len(ECDF_TARGETS)} targets from {ECDF_TARGETS[0]:.0f} to {ECDF_TARGETS[-1]:.2f} times"
@@ -124,7 +124,7 @@ def _draw_curves_together(
     return chart
 
 
-def _height(names: Sequence[str]) -> int:
+def _choose_height(names: Sequence[str]) -> int:
     """Pixels of a chart of curves: their names may take several lines of the legend."""
     letters = sum(6 + len(name) for name in names[:TOGETHER])
     return 310 + 22 * (letters // 36)
@@ -144,21 +144,24 @@ def _draw_curves_apart(
     return charts
 
 
-def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
+def draw_spread(variants: Sequence[Variant], floor: Floor) -> Chart:
     """Where every finished run ended, one row for each variant, with the median and the quartiles
     of each.
     """
     variants = [variant for variant in variants if variant.finished_runs]
-    chart = _rows("objective [pu²]", [v.name for v in variants], log=True)
+    chart = _draw_rows("objective [pu²]", [v.name for v in variants], log=True)
     dots = [(run, row + shift) for row, v in enumerate(variants) for run, shift in _spread_runs(v)]
     labels = [
-        f"{run.optimizer}, seed {run.seed}: {number(run.objective, 4)} pu²" for run, _ in dots
+        f"{run.optimizer}, seed {run.seed}: {format_number(run.objective, 4)} pu²"
+        for run, _ in dots
     ]
     ends = np.array([run.objective for run, _ in dots])
     chart.points("every run", ends, [y for _, y in dots], style.FAINT, size=4, hover=labels)
     ended = [[run.objective for run in v.finished_runs] for v in variants]
     lower, middle, upper = np.array([np.quantile(values, (0.25, 0.5, 0.75)) for values in ended]).T
-    labels = [f"{v.name}: median {number(m, 4)} pu²" for v, m in zip(variants, middle, strict=True)]
+    labels = [
+        f"{v.name}: median {format_number(m, 4)} pu²" for v, m in zip(variants, middle, strict=True)
+    ]
     chart.points(
         "median and quartiles",
         middle,
@@ -196,7 +199,7 @@ def _spread_runs(variant: Variant) -> list[tuple[SearchRun, float]]:
     return list(zip(done, DOT_JITTER * np.cos(2.4 * np.arange(len(done))), strict=True))
 
 
-def _rows(label: str, names: Sequence[str], *, log: bool = False) -> Chart:
+def _draw_rows(label: str, names: Sequence[str], *, log: bool = False) -> Chart:
     """A chart with a row for each name, the first on top."""
     chart = Chart(
         label,
@@ -208,12 +211,12 @@ def _rows(label: str, names: Sequence[str], *, log: bool = False) -> Chart:
     return chart.ticks(0, range(len(names)), names).limits(0, len(names) - 0.4, -0.6)
 
 
-def mean_ranks(ranks: Ranks, label: str = "mean rank over the seeds (1 is best)") -> Chart:
+def draw_mean_ranks(ranks: Ranks, label: str = "mean rank over the seeds (1 is best)") -> Chart:
     """Mean ranks with half of Nemenyi's critical difference to either side, the best on top."""
     order = np.argsort(ranks.mean, kind="stable")
     names, mean = [ranks.names[k] for k in order], np.array(ranks.mean)[order]
     half = ranks.critical_difference / 2
-    chart = _rows(label, names)
+    chart = _draw_rows(label, names)
     labels = [f"{name}: {rank:.2f}" for name, rank in zip(names, mean, strict=True)]
     spans = np.column_stack((mean - half, mean + half))
     chart.points("", mean, np.arange(len(names)), style.PALETTE[0], hover=labels, spans=spans)
@@ -227,7 +230,7 @@ def _choose_axis_ends(values: Sequence[float]) -> tuple[float, float]:
     return low - edge, high + edge
 
 
-def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
+def draw_parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
     """The parameters at which every run ended, a panel for each, and where the floor's lie."""
     variants = [v for v in variants if not polished.reached.keys().isdisjoint(v.finished_runs)]
     names = list(polished.parameters)

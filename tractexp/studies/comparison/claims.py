@@ -3,7 +3,7 @@
 import numpy as np
 
 from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
-from tractexp.studies.comparison.comparison import Comparison, VariantPair, seeds_needed
+from tractexp.studies.comparison.comparison import Comparison, VariantPair, count_seeds_needed
 from tractexp.studies.comparison.floor import FLOOR_SHARE
 from tractexp.studies.comparison.runs import Variant
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
@@ -13,7 +13,7 @@ from tractexp.text.wording import join_words
 LEAST_TOLD_RATIO = 1.2  # times the simulations of another variant are worth a word
 
 
-def number(value: float, digits: int = 3) -> str:
+def format_number(value: float, digits: int = 3) -> str:
     """0.0000081 as 8.1e-06, 15000 as 15,000, inf as never."""
     if np.isnan(value):
         return "-"
@@ -24,7 +24,7 @@ def number(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}"
 
 
-def p_value(p: float) -> str:
+def format_p_value(p: float) -> str:
     """A probability with two digits."""
     return f"{p:.2g}" if p >= 1e-4 else f"{p:.1e}"
 
@@ -34,7 +34,7 @@ def answer(comparison: Comparison) -> str:
     best, *others = comparison.leaders
     if len(comparison.summaries) < 2:
         return f"There is one variant only, {best}: nothing to choose from."
-    if max((pair.seeds for pair in comparison.pairs), default=0) < seeds_needed(
+    if max((pair.seeds for pair in comparison.pairs), default=0) < count_seeds_needed(
         len(comparison.pairs)
     ):
         lowest = f"{_list_names([best, *others])} have" if others else f"{best} has"
@@ -43,12 +43,12 @@ def answer(comparison: Comparison) -> str:
             " far."
         )
     if (tested := _find_best_tested(comparison)) != best:
-        advice = _advice(comparison, tested, [])
+        advice = _advise_variant(comparison, tested, [])
         return (
             f"{best} has the lowest median objective, but too few seeds to test. Of the others:"
             f" {advice}"
         )
-    return _advice(comparison, best, others)
+    return _advise_variant(comparison, best, others)
 
 
 def _find_best_tested(comparison: Comparison) -> str:
@@ -62,11 +62,11 @@ def _find_best_tested(comparison: Comparison) -> str:
     )
 
 
-def _advice(comparison: Comparison, best: str, others: list[str]) -> str:
+def _advise_variant(comparison: Comparison, best: str, others: list[str]) -> str:
     """Whether to take the variant whose median is lowest, or as low as those of others and reached
     sooner.
     """
-    beaten, worse, alike = _verdicts(comparison, best)
+    beaten, worse, alike = _list_verdicts(comparison, best)
     if worse:
         return (
             f"Not settled: {best} has the lowest median objective, but {_list_names(worse)} did"
@@ -76,14 +76,14 @@ def _advice(comparison: Comparison, best: str, others: list[str]) -> str:
     if rivals:
         return (
             f"Take {best}, or as well {_list_names(rivals)}: these runs do not tell them"
-            f" apart.{_spent(comparison, best)}"
+            f" apart.{_describe_spent(comparison, best)}"
         )
     why = [f"it ends as low as {_list_names(others)}, sooner"] if others else []
     why += [f"it ends lower than {_list_names(beaten)}"] if beaten else []
-    return f"Take {best}: {', and '.join(why)}.{_spent(comparison, best)}"
+    return f"Take {best}: {', and '.join(why)}.{_describe_spent(comparison, best)}"
 
 
-def _spent(comparison: Comparison, best: str) -> str:
+def _describe_spent(comparison: Comparison, best: str) -> str:
     """The clause on the simulations of the best variant, where they are more than another's; ""
     else.
     """
@@ -91,11 +91,13 @@ def _spent(comparison: Comparison, best: str) -> str:
     least = min(comparison.summaries, key=lambda summary: summary.simulations.median)
     if not first.simulations.median > LEAST_TOLD_RATIO * least.simulations.median:
         return ""
-    spent = (f"{number(float(round(s.simulations.median)))} simulations" for s in (first, least))
+    spent = (
+        f"{format_number(float(round(s.simulations.median)))} simulations" for s in (first, least)
+    )
     return f" It spent {next(spent)}, where {least.name} spent {next(spent)}."
 
 
-def _verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], list[str]]:
+def _list_verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], list[str]]:
     """The variants that one is significantly better than, those it is worse than, and those it is
     not told from.
     """
@@ -111,7 +113,7 @@ def _verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], 
     return beaten, worse, alike
 
 
-def headline(comparison: Comparison) -> str:
+def write_headline(comparison: Comparison) -> str:
     """Which variants lead, in a sentence."""
     if not comparison.pairs:
         return "No difference between variants was tested."
@@ -124,7 +126,7 @@ def headline(comparison: Comparison) -> str:
         )
     else:
         said = f"{best} has the lowest median objective; it"
-    beaten, worse, alike = _verdicts(comparison, best)
+    beaten, worse, alike = _list_verdicts(comparison, best)
     verdicts = [f"is significantly better than {_list_names(beaten)}"] if beaten else []
     verdicts += (
         [f"is significantly worse than {_list_names(worse)} over paired seeds"] if worse else []
@@ -152,25 +154,26 @@ def quote_pair(comparison: Comparison, pair: VariantPair) -> str:
     one, two = (comparison.gathered[name] for name in (pair.first, pair.second))
     spent = [_spent_simulations(variant) for variant in (one, two)]
     first, second = (
-        f"{number(median)} pu²" if np.isfinite(median) else "no result" for median in pair.medians
+        f"{format_number(median)} pu²" if np.isfinite(median) else "no result"
+        for median in pair.medians
     )
     if len({x for s in spent for x in (s.best, s.worst)}) == 1:
-        start = f"On {pair.seeds} seeds and {number(spent[0].median)} simulations, "
+        start = f"On {pair.seeds} seeds and {format_number(spent[0].median)} simulations, "
         reached = (
             f"{pair.first} reaches a median objective of {first} against {second} for {pair.second}"
         )
     else:
         start = f"On {pair.seeds} seeds, "
         reached = (
-            f"{pair.first} reaches a median objective of {first} with {number(spent[0].median)}"
-            f" simulations (median) against {second} with {number(spent[1].median)} for"
-            f" {pair.second}"
+            f"{pair.first} reaches a median objective of {first} with"
+            f" {format_number(spent[0].median)} simulations (median) against {second} with"
+            f" {format_number(spent[1].median)} for {pair.second}"
         )
     verdict = "is significant" if pair.significant else "is not significant"
     tests = len(comparison.pairs)
     return (
         f"{start}{reached}; the difference {verdict} (Wilcoxon signed-rank, Holm-corrected over"
-        f" {tests} {'pair' if tests == 1 else 'pairs'}, p = {p_value(pair.corrected)};"
+        f" {tests} {'pair' if tests == 1 else 'pairs'}, p = {format_p_value(pair.corrected)};"
         f" Vargha-Delaney A = {pair.effect:.2f})."
     )
 
@@ -191,7 +194,7 @@ def describe_friedman_test(comparison: Comparison) -> str:
     differ = "differ" if ranks.p < SIGNIFICANCE_LEVEL else "do not differ significantly"
     text = (
         f"Over {ranks.seeds} seeds the mean ranks {differ} (Friedman chi-square = {ranks.chi2:.2f},"
-        f" {len(order) - 1} degrees of freedom, p = {p_value(ranks.p)}): {listed}{more}"
+        f" {len(order) - 1} degrees of freedom, p = {format_p_value(ranks.p)}): {listed}{more}"
     )
     if ranks.p < SIGNIFICANCE_LEVEL:
         text += (
@@ -206,11 +209,13 @@ def describe_speed(comparison: Comparison) -> str:
     """Who needs fewest simulations to the hardest target."""
     target, index = min((target, i) for i, target in enumerate(comparison.targets))
     rows = sorted((s.ert["simulations"][index], s.name) for s in comparison.summaries)
-    goal = f"{target:g} times the floor of {number(comparison.floor.value)} pu²"
+    goal = f"{target:g} times the floor of {format_number(comparison.floor.value)} pu²"
     if np.isinf(rows[0][0]):
         return f"No variant ever reached {goal}."
     said = [
-        f"{name} needs {number(float(round(ert)))}" for ert, name in rows[:4] if np.isfinite(ert)
+        f"{name} needs {format_number(float(round(ert)))}"
+        for ert, name in rows[:4]
+        if np.isfinite(ert)
     ]
     text = f"To reach {goal}, {', '.join(said)} simulations in expectation (ERT)"
     never = [name for ert, name in rows if np.isinf(ert)]
@@ -220,7 +225,7 @@ def describe_speed(comparison: Comparison) -> str:
 def describe_floor(comparison: Comparison) -> str:
     """How many runs of each variant reach the floor, in a sentence."""
     shares = _describe_shares([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
-    value = number(comparison.floor.value, 5)
+    value = format_number(comparison.floor.value, 5)
     source = comparison.floor.source
     return f"Runs within {FLOOR_SHARE:.0%} of the floor of {value} pu² ({source}): {shares}."
 
@@ -260,13 +265,14 @@ def describe_effect(effect: SwitchEffect) -> str:
         else "it harms"
     )
     return (
-        f"Switching on {switch} multiplies the objective by {number(effect.factor)} (geometric mean"
-        f" over {effect.seeds} seeds, 95 % bootstrap interval {number(effect.low)} to"
-        f" {number(effect.high)}, from {_listed_contrasts(effect)}): {verdict}."
+        f"Switching on {switch} multiplies the objective by {format_number(effect.factor)}"
+        f" (geometric mean over {effect.seeds} seeds, 95 % bootstrap interval"
+        f" {format_number(effect.low)} to"
+        f" {format_number(effect.high)}, from {_list_contrasts(effect)}): {verdict}."
     )
 
 
-def _listed_contrasts(effect: SwitchEffect) -> str:
+def _list_contrasts(effect: SwitchEffect) -> str:
     """The pairs of variants that a switch was judged by, or how many."""
     pairs = [f"{with_} against {without}" for with_, without in effect.contrasts]
     return (
@@ -290,10 +296,10 @@ def describe_untold_effects(ablation: Ablation) -> str:
     )
 
 
-def sentences(comparison: Comparison) -> list[str]:
+def list_claims(comparison: Comparison) -> list[str]:
     """All claims, the most general first."""
     claims = [
-        headline(comparison),
+        write_headline(comparison),
         describe_floor(comparison),
         describe_valley(comparison),
         describe_speed(comparison),

@@ -9,16 +9,16 @@ from itertools import combinations
 import numpy as np
 
 from tractexp.studies.comparison.ablation import Ablation, ablate
-from tractexp.studies.comparison.floor import Floor, Polished, floor_of
+from tractexp.studies.comparison.floor import Floor, Polished, find_floor
 from tractexp.studies.comparison.runs import Gathered, Variant
 from tractexp.studies.comparison.statistics import (
     LEAST_SEEDS,
     SIGNIFICANCE_LEVEL,
     Ranks,
-    friedman,
-    holm,
-    vargha_delaney,
-    wilcoxon,
+    compute_vargha_delaney,
+    correct_by_holm,
+    rank_by_friedman,
+    run_wilcoxon_test,
 )
 from tractexp.studies.comparison.summary import Summary, summarize
 
@@ -91,7 +91,7 @@ def compare(
     """
     if reference is not None:
         reference = gathered[reference].name
-    low = floor_of(
+    low = find_floor(
         [run for variant in gathered.variants for run in variant.runs], floor, polished, why_not
     )
     least = (1 + ties) * low.value
@@ -104,8 +104,8 @@ def compare(
             s.name,
         )
     )
-    pairs, notes = _pairs(gathered.variants, least, reference)
-    ranks, more = _ranks(gathered.variants, least)
+    pairs, notes = _test_pairs(gathered.variants, least, reference)
+    ranks, more = _rank_variants(gathered.variants, least)
     ablation = ablate(gathered.variants, plain or {}, least)
     if floor is not None and polished is not None and polished.objective < (1 - ties) * floor:
         notes.append(
@@ -128,7 +128,7 @@ def compare(
     )
 
 
-def seeds_needed(pairs: int) -> int:
+def count_seeds_needed(pairs: int) -> int:
     """The fewest seeds by which a difference can pass Wilcoxon's test where so many pairs are
     corrected for.
     """
@@ -140,7 +140,7 @@ def _measure_standing(median: float, least: float) -> tuple[bool, float]:
     return bool(np.isnan(median)), max(median, least)
 
 
-def _pairs(
+def _test_pairs(
     variants: Sequence[Variant], least: float, reference: str | None
 ) -> tuple[tuple[VariantPair, ...], list[str]]:
     """Every pair with enough seeds in common, and a sentence on what the tests cannot do."""
@@ -151,11 +151,11 @@ def _pairs(
 
     notes = _describe_untested(chosen, common)
     tested = [
-        _pair(a, b, seeds, least)
+        _test_pair(a, b, seeds, least)
         for (a, b), seeds in zip(chosen, common, strict=True)
         if len(seeds) >= LEAST_SEEDS
     ]
-    corrected = holm([pair.p for pair in tested])
+    corrected = correct_by_holm([pair.p for pair in tested])
     pairs = [
         VariantPair(**{**vars(pair), "corrected": float(p)})
         for pair, p in zip(tested, corrected, strict=True)
@@ -184,7 +184,7 @@ def _describe_lack_of_seeds(tested: Sequence[VariantPair]) -> list[str]:
     """A sentence on pairs that are too many to be told apart by so few seeds; [] where they are
     not.
     """
-    needed = seeds_needed(len(tested))
+    needed = count_seeds_needed(len(tested))
     if max((pair.seeds for pair in tested), default=needed) >= needed:
         return []
     return [
@@ -194,26 +194,26 @@ def _describe_lack_of_seeds(tested: Sequence[VariantPair]) -> list[str]:
     ]
 
 
-def _pair(a: Variant, b: Variant, seeds: Sequence[int], least: float) -> VariantPair:
+def _test_pair(a: Variant, b: Variant, seeds: Sequence[int], least: float) -> VariantPair:
     """The test of two variants by seed, the better one first."""
     x, y = (np.maximum([v.objectives[seed] for seed in seeds], least) for v in (a, b))
-    p, lower = wilcoxon(x, y)
-    effect = vargha_delaney(x, y)
+    p, lower = run_wilcoxon_test(x, y)
+    effect = compute_vargha_delaney(x, y)
     if (lower, effect) < (0.0, 0.5):
         a, b, x, y, effect = b, a, y, x, 1 - effect
     return VariantPair(
-        a.name, b.name, len(seeds), (_median(a, seeds), _median(b, seeds)), p, p, effect
+        a.name, b.name, len(seeds), (_find_median(a, seeds), _find_median(b, seeds)), p, p, effect
     )
 
 
-def _median(variant: Variant, seeds: Sequence[int]) -> float:
+def _find_median(variant: Variant, seeds: Sequence[int]) -> float:
     """The median objective of a variant; of an even number the mean of the two in the middle."""
     values = np.sort([variant.objectives[seed] for seed in seeds])
     middle = values[(len(values) - 1) // 2], values[len(values) // 2]
     return float(middle[0] if middle[0] == middle[1] else np.mean(middle))
 
 
-def _ranks(variants: Sequence[Variant], least: float) -> tuple[Ranks | None, list[str]]:
+def _rank_variants(variants: Sequence[Variant], least: float) -> tuple[Ranks | None, list[str]]:
     """Friedman's test over the seeds that all variants have."""
     if len(variants) < 3:
         return None, []
@@ -225,4 +225,4 @@ def _ranks(variants: Sequence[Variant], least: float) -> tuple[Ranks | None, lis
             f" critical difference needs at least {LEAST_SEEDS}."
         ]
     table = np.array([[max(v.objectives[seed], least) for v in variants] for seed in seeds])
-    return friedman([v.name for v in variants], table), []
+    return rank_by_friedman([v.name for v in variants], table), []

@@ -73,7 +73,7 @@ def polish(
     )
     if not problem.per_event and not _is_same_problem(problem, ends, complete):
         return None
-    units = np.concatenate([space.to_unit(ends), _spread(problem)])
+    units = np.concatenate([space.to_unit(ends), _spread_points(problem)])
     best = max(min(run.objective for run in runs if run.is_finished), TINY)
     groups = np.array_split(units, -(-len(units) // _count_parallel_descents(problem)))
     ended, values, count = [], [], counting(len(groups))
@@ -100,7 +100,7 @@ def polish(
     )
 
 
-def floor_of(
+def find_floor(
     runs: Sequence[SearchRun], value: float | None, polished: Polished | None, why_not: str = ""
 ) -> Floor:
     """The floor as `value`, or what polishing found, or the best of all runs where there was no
@@ -131,7 +131,7 @@ def _is_same_problem(problem: Problem, ends: np.ndarray, runs: Sequence[SearchRu
     )
 
 
-def _spread(problem: Problem) -> np.ndarray:
+def _spread_points(problem: Problem) -> np.ndarray:
     """The best (k, d) of points that fill the unit cube evenly, but denser near its bounds, where
     times are short.
     """

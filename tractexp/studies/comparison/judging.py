@@ -15,7 +15,7 @@ from tractexp.inference.problem import Problem
 from tractexp.record import detect, read_records
 from tractexp.storage import files
 from tractexp.studies.api.benchmark import BenchmarkResult, benchmark
-from tractexp.studies.comparison.ablation import family
+from tractexp.studies.comparison.ablation import find_family
 from tractexp.studies.comparison.comparison import Comparison, compare
 from tractexp.studies.comparison.floor import Polished, polish
 from tractexp.studies.comparison.load import nest_keys
@@ -125,7 +125,7 @@ def _run_on_bbob(
         result = unwrap(benchmark)(optimizers, **chosen, cores=cores, progress=progress)
         if folder:
             files.write_json(folder / BBOB, {"of": settings, "made": result.to_dict()})
-    return rank_on_functions(result.bbob, family(variants, list_plain_optimizers()))
+    return rank_on_functions(result.bbob, find_family(variants, list_plain_optimizers()))
 
 
 def _load_stored_runs(folder: Path, settings: Mapping[str, Any]) -> BenchmarkResult | None:
@@ -145,7 +145,7 @@ def _polish_described_problem(
     """
     runs = [run for variant in gathered.variants for run in variant.runs]
     try:
-        problem = problem or _problem(next(run for run in runs if run.is_finished))
+        problem = problem or _build_problem(next(run for run in runs if run.is_finished))
     except UserError as error:
         return None, f"the problem cannot be put again ({str(error).rstrip('.')})"
     except (KeyError, TypeError, ValueError) as error:
@@ -164,7 +164,7 @@ def _polish_described_problem(
     return polished, "" if polished else why
 
 
-def _problem(run: SearchRun) -> Problem:
+def _build_problem(run: SearchRun) -> Problem:
     """The problem that a run's configuration describes. Raises `UserError` where its records are
     not there any more.
     """

@@ -14,7 +14,7 @@ from tractexp.errors import TASK, UserError
 from tractexp.identification.result import name_by_event, parse_history
 from tractexp.storage import files, yaml_files
 from tractexp.studies.comparison.runs import SearchRun
-from tractexp.tracking.sweepfile import folder_of
+from tractexp.tracking.sweepfile import find_sweep_folder
 
 FITTING = "identify"  # the task whose runs are compared
 # what a job's status.json says
@@ -27,14 +27,14 @@ ENDED = ("objective", "epsilon_p", "epsilon_q")
 
 def find_newest_sweep(folder: Path) -> Path:
     """The sweep under `folder` begun last. Raises `UserError` where there is none."""
-    sweeps = [path for path in folder.iterdir() if _jobs(path)] if folder.is_dir() else []
+    sweeps = [path for path in folder.iterdir() if _list_jobs(path)] if folder.is_dir() else []
     if not sweeps:
         raise UserError(
             f"there is no sweep under {folder} to compare; make one, such as tractexp -m"
             f" optimizer=issa,ssa,pso 'seed=range(0,30)', or name one by {TASK.sweep}=FOLDER"
         )
     return max(
-        sweeps, key=lambda path: (max(job.stat().st_mtime for job in _jobs(path)), path.name)
+        sweeps, key=lambda path: (max(job.stat().st_mtime for job in _list_jobs(path)), path.name)
     )
 
 
@@ -44,12 +44,12 @@ def read_sweep(folder: Path) -> list[SearchRun]:
         raise UserError(
             f"{TASK.sweep}={folder} is not a folder; a sweep writes one under outputs/sweeps"
         )
-    jobs = _jobs(folder)
+    jobs = _list_jobs(folder)
     if not jobs:
         raise UserError(
             f"the sweep {folder} is empty: none of its folders holds a job (.hydra/config.yaml)"
         )
-    runs = [run for run in map(_job, jobs) if run is not None]
+    runs = [run for run in map(_load_job, jobs) if run is not None]
     if not runs:
         raise UserError(
             f"the sweep {folder} has no job of task={FITTING}, the only one whose runs can be"
@@ -58,12 +58,12 @@ def read_sweep(folder: Path) -> list[SearchRun]:
     return runs
 
 
-def _jobs(folder: Path) -> list[Path]:
+def _list_jobs(folder: Path) -> list[Path]:
     """The folders of a sweep's own jobs, at any depth: `hydra.sweep.subdir` names them. Numbers are
     in order.
     """
     found = (config.parents[1] for config in folder.rglob(".hydra/config.yaml"))
-    own = [job for job in found if job != folder and folder_of(job) == folder]
+    own = [job for job in found if job != folder and find_sweep_folder(job) == folder]
     seen = [job for job in own if not _is_hidden(job, folder)]
     return sorted(seen, key=lambda job: [*map(_order_name, job.relative_to(folder).parts)])
 
@@ -78,9 +78,9 @@ def _order_name(name: str) -> tuple[float, str]:
     return (int(name) if name.isdigit() else np.inf, name)
 
 
-def _job(folder: Path) -> SearchRun | None:
+def _load_job(folder: Path) -> SearchRun | None:
     """The run of a sweep's folder; None for what is no search."""
-    with _readable(folder):
+    with _refuse_unreadable(folder):
         return _read_job(folder)
 
 
@@ -88,51 +88,51 @@ def _read_job(folder: Path) -> SearchRun | None:
     """The run of one job's folder in a sweep; None if its task is no search. Exceptions of reading
     are the caller's.
     """
-    config = _yaml(folder / ".hydra" / "config.yaml")
+    config = _read_yaml(folder / ".hydra" / "config.yaml")
     if config["task"]["name"] != FITTING:
         return None
-    status = _status(folder)
+    status = _read_status(folder)
     unfinished = _explain_missing_result(folder, status)
     of_hydra = folder / ".hydra" / "hydra.yaml"
     runtime: Mapping[str, Any]
     if unfinished and status.get("choices") and not of_hydra.is_file():
         runtime = {"choices": status["choices"]}  # a job that ended at once left its status only
     else:
-        runtime = _yaml(of_hydra)["hydra"]["runtime"]
+        runtime = _read_yaml(of_hydra)["hydra"]["runtime"]
     choices = runtime["choices"]
     fields: dict[str, Any] = {
         "optimizer": choices["optimizer"],
         "data": choices["data"],
         "seed": int(config["seed"]),
-        "config": flat(config),
-        "where": folder.relative_to(folder_of(folder)).as_posix(),
+        "config": flatten_settings(config),
+        "where": folder.relative_to(find_sweep_folder(folder)).as_posix(),
         "folder": runtime.get("cwd", ""),
     }
     if unfinished:
         return SearchRun(**fields, **unfinished)
-    with _readable(folder / "result.json") as path:
+    with _refuse_unreadable(folder / "result.json") as path:
         result = files.read_json(path)
-        ended = ended_search(result)
-        fields |= {key: float(ended[key]) for key in ENDED} | {"parameters": parameters_of(ended)}
-        fields["code"] = code_of(result)
-    with _readable(folder / "history.csv") as path:
-        return SearchRun(**fields, **_history(files.read_text(path, files.RESULT)))
+        ended = find_search_end(result)
+        fields |= {key: float(ended[key]) for key in ENDED} | {"parameters": list_parameters(ended)}
+        fields["code"] = describe_code(result)
+    with _refuse_unreadable(folder / "history.csv") as path:
+        return SearchRun(**fields, **_read_history(files.read_text(path, files.RESULT)))
 
 
-def _history(text: str) -> dict[str, Any]:
+def _read_history(text: str) -> dict[str, Any]:
     """The search by iteration, of a `history.csv`."""
     simulations, seconds, history = parse_history(text)
     return {"simulations": simulations, "seconds": seconds, "history": history}
 
 
-def ended_search(result: Mapping[str, Any]) -> Mapping[str, Any]:
+def find_search_end(result: Mapping[str, Any]) -> Mapping[str, Any]:
     """Where the optimizer itself ended, of a `result.json`: in early ones, that was the whole of
     it.
     """
     return result.get("search") or result
 
 
-def code_of(result: Mapping[str, Any]) -> str:
+def describe_code(result: Mapping[str, Any]) -> str:
     """The version and commit of the package, of a `result.json`: "0.4.0 at 1c2d3e4f"; "" in early
     ones.
     """
@@ -142,13 +142,13 @@ def code_of(result: Mapping[str, Any]) -> str:
     return f"{version} at {commit[:8]}{dirty}" if version and commit else version
 
 
-def parameters_of(ended: Mapping[str, Any]) -> dict[str, float]:
+def list_parameters(ended: Mapping[str, Any]) -> dict[str, float]:
     """{name: value}, where it differs by event {"T_m[1]": value, ...} as well."""
     return name_by_event(ended.get("parameters", {}), ended.get("per_event", {}))
 
 
 @contextmanager
-def _readable(path: Path) -> Iterator[Path]:
+def _refuse_unreadable(path: Path) -> Iterator[Path]:
     """Turn what goes wrong with a job's file into a sentence."""
     try:
         with warnings.catch_warnings():
@@ -161,13 +161,13 @@ def _readable(path: Path) -> Iterator[Path]:
         raise UserError(f"{path} cannot be read: {reason}; {MEND}") from error
 
 
-def _status(folder: Path) -> Mapping[str, Any]:
+def _read_status(folder: Path) -> Mapping[str, Any]:
     """The content of `status.json`; {} where the job was none of a sweep of ours, or
     has not begun.
     """
     if not (folder / "status.json").is_file():
         return {}
-    with _readable(folder / "status.json") as path:
+    with _refuse_unreadable(folder / "status.json") as path:
         content = files.read_json(path, files.CONFIGURATION)
         return {"message": "", **content, "status": str(content["status"])}
 
@@ -184,13 +184,13 @@ def _explain_missing_result(folder: Path, status: Mapping[str, Any]) -> dict[str
     return {"interruption": "it left no result: it was ended, or still runs"}
 
 
-def _yaml(path: Path) -> Any:
+def _read_yaml(path: Path) -> Any:
     """The content of a file of a run."""
-    with _readable(path):
+    with _refuse_unreadable(path):
         return yaml_files.read_yaml(path)
 
 
-def flat(node: Mapping[str, Any]) -> dict[str, Any]:
+def flatten_settings(node: Mapping[str, Any]) -> dict[str, Any]:
     """A nested configuration as {"optimizer.population": 50}, without mappings that are empty."""
     return {key: value for key, value in list_leaves(node) if not isinstance(value, dict)}
 
@@ -234,7 +234,7 @@ def _read_logged_run(one: Any) -> SearchRun:
         "optimizer": one.tags["optimizer"],
         "data": one.tags["data"],
         "seed": int(one.tags["seed"]),
-        "config": {key: _value(text) for key, text in one.parameters.items()},
+        "config": {key: _parse_value(text) for key, text in one.parameters.items()},
         "where": one.name,
     }
     curve = one.curves.get("fitness_by_simulations")
@@ -247,11 +247,14 @@ def _read_logged_run(one: Any) -> SearchRun:
     for key in (*ENDED, "simulations", "seconds"):
         ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
     result = files.parse_json(one.files.get("result.json", "{}"), f"the result.json of {one.name}")
-    details = {"parameters": parameters_of(ended_search(result)), "code": code_of(result)}
+    details = {
+        "parameters": list_parameters(find_search_end(result)),
+        "code": describe_code(result),
+    }
     total = ended.pop("simulations")
     seconds = ended.pop("seconds")
     if "history.csv" in one.files:
-        return SearchRun(**fields, **ended, **_history(one.files["history.csv"]), **details)
+        return SearchRun(**fields, **ended, **_read_history(one.files["history.csv"]), **details)
     simulations = np.fmin(curve[0], total)
     spent = seconds * simulations / simulations[-1]
     return SearchRun(
@@ -259,7 +262,7 @@ def _read_logged_run(one: Any) -> SearchRun:
     )
 
 
-def _value(text: str) -> Any:
+def _parse_value(text: str) -> Any:
     """A parameter of MLflow as the value that it was."""
     try:
         return json.loads(text)

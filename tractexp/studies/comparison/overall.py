@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp.studies.comparison.ablation import Ablation, VariantFamily, family
+from tractexp.studies.comparison.ablation import Ablation, VariantFamily, find_family
 from tractexp.studies.comparison.comparison import Comparison
 from tractexp.studies.comparison.runs import SearchRun
-from tractexp.studies.comparison.statistics import LEAST_SEEDS, Ranks, friedman
+from tractexp.studies.comparison.statistics import LEAST_SEEDS, Ranks, rank_by_friedman
 
 if TYPE_CHECKING:
     from tractexp.studies.bbob.runs import BbobRuns
@@ -70,14 +70,14 @@ def merge_records(
     first, *others = comparisons.values()
     variants = [v for v in first.gathered.variants if all(_has(other, v.name) for other in others)]
     names = [v.name for v in variants]
-    logs = {label: _logs(comparison, names) for label, comparison in comparisons.items()}
+    logs = {label: _list_logs(comparison, names) for label, comparison in comparisons.items()}
     seeds = sorted(set.intersection(*(set(by_seed) for by_seed in logs.values())))
     table = np.array([by_seed[seed] for by_seed in logs.values() for seed in sorted(by_seed)])
     ranks = _rank_optimizers(names, table)
-    chosen = family(variants, plain)
+    chosen = find_family(variants, plain)
     whole = _ablate_mean(chosen, names, logs, seeds) if chosen and seeds else None
     medians = {
-        name: tuple(_median_over_floor(c, name) for c in comparisons.values())
+        name: tuple(_find_median_over_floor(c, name) for c in comparisons.values())
         for name in _order_names(names, ranks)
     }
     problems = f"{len(seeds)} seeds"
@@ -94,7 +94,7 @@ def merge_records(
         ranks,
         {names_of[label]: c.ablation for label, c in comparisons.items() if c.ablation},
         whole,
-        _cost(chosen, comparisons.values()),
+        _find_cost(chosen, comparisons.values()),
     )
 
 
@@ -111,7 +111,7 @@ def _ablate_mean(
     return chosen.ablation(dict(zip(names, mean.T, strict=True)))
 
 
-def _median_over_floor(comparison: Comparison, name: str) -> float:
+def _find_median_over_floor(comparison: Comparison, name: str) -> float:
     """The median objective of a variant's runs, over the floor."""
     objectives = [run.objective for run in comparison.gathered[name].runs]
     return float(np.median(objectives) / comparison.floor.value)
@@ -173,7 +173,7 @@ def _has(comparison: Comparison, name: str) -> bool:
     return name in (variant.name for variant in comparison.gathered.variants)
 
 
-def _logs(comparison: Comparison, names: Sequence[str]) -> dict[int, list[float]]:
+def _list_logs(comparison: Comparison, names: Sequence[str]) -> dict[int, list[float]]:
     """{seed: log10 of each variant's objective over the floor}, of the seeds that all finished."""
     least = (1 + comparison.ties) * comparison.floor.value
     variants = [comparison.gathered[name] for name in names]
@@ -190,7 +190,7 @@ def _logs(comparison: Comparison, names: Sequence[str]) -> dict[int, list[float]
 
 def _rank_optimizers(names: Sequence[str], table: np.ndarray) -> Ranks | None:
     """Friedman's ranks of a table (blocks, variants); None for too few."""
-    return friedman(names, table) if len(names) > 2 and len(table) >= LEAST_SEEDS else None
+    return rank_by_friedman(names, table) if len(names) > 2 and len(table) >= LEAST_SEEDS else None
 
 
 def _order_names(names: Sequence[str], ranks: Ranks | None) -> list[str]:
@@ -202,7 +202,7 @@ def _order_names(names: Sequence[str], ranks: Ranks | None) -> list[str]:
     )
 
 
-def _cost(chosen: VariantFamily | None, comparisons: Iterable[Comparison]) -> dict[str, float]:
+def _find_cost(chosen: VariantFamily | None, comparisons: Iterable[Comparison]) -> dict[str, float]:
     """The simulations of an iteration that each switch adds, {switch: number}."""
     if chosen is None:
         return {}

@@ -4,10 +4,10 @@ import itertools
 from collections.abc import Sequence
 
 from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
-from tractexp.studies.comparison.claims import number
+from tractexp.studies.comparison.claims import format_number
 from tractexp.studies.comparison.overall import Overall, Several
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
-from tractexp.text.wording import format_probability, join_words, percent
+from tractexp.text.wording import format_probability, format_share, join_words
 
 
 def answer(several: Several) -> str:
@@ -56,9 +56,9 @@ def describe_effect(effect: SwitchEffect) -> str:
         if effect.factor < 1
         else "harms"
     )
-    pairs = f"; better in {percent(effect.better[0])} of the pairs" if effect.better else ""
-    interval = f"{number(effect.low)} to {number(effect.high)}"
-    return f"{effect.switches[0]} {verdict} (× {number(effect.factor)}, {interval}{pairs})"
+    pairs = f"; better in {format_share(effect.better[0])} of the pairs" if effect.better else ""
+    interval = f"{format_number(effect.low)} to {format_number(effect.high)}"
+    return f"{effect.switches[0]} {verdict} (× {format_number(effect.factor)}, {interval}{pairs})"
 
 
 def describe_costs(overall: Overall) -> str:
@@ -79,8 +79,8 @@ def describe_agreement(several: Several) -> str:
     helps = _list_help(ablations)
     always = [s for s, each in helps.items() if sum(each) == len(ablations)]
     never = [s for s, each in helps.items() if not any(each)]
-    parts = [f"{_help(always)} everywhere" if always else "no ingredient helps everywhere"]
-    parts += [f"{_help(never)} nowhere"] if never else []
+    parts = [f"{_say_help(always)} everywhere" if always else "no ingredient helps everywhere"]
+    parts += [f"{_say_help(never)} nowhere"] if never else []
     return f"Over all terms together, {' and '.join(parts)}."
 
 
@@ -92,12 +92,12 @@ def _list_help(ablations: Sequence[Ablation]) -> dict[str, list[bool]]:
     return helps
 
 
-def _help(names: list[str]) -> str:
+def _say_help(names: list[str]) -> str:
     """ "levy helps", or "levy and tent help"."""
     return f"{join_words(names)} {'helps' if len(names) == 1 else 'help'}"
 
 
-def sentences(several: Several) -> list[str]:
+def list_overall_claims(several: Several) -> list[str]:
     """All claims, the most general first."""
     claims = [describe_agreement(several)]
     for overall in several.overall:

@@ -15,7 +15,7 @@ from tractexp.studies.comparison import charts
 from tractexp.studies.comparison import overall_claims as claims
 from tractexp.studies.comparison import page as one
 from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
-from tractexp.studies.comparison.claims import number
+from tractexp.studies.comparison.claims import format_number
 from tractexp.studies.comparison.overall import Overall, Several
 from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
 
@@ -39,17 +39,17 @@ def report(several: Several, source: str) -> Report:
     if several.notes:
         page.heading("Mind").items(several.notes)
     for overall in several.overall:
-        _overall(page, overall)
+        _add_overall(page, overall)
     page.heading("Each problem by itself")
     for label, comparison in several.comparisons.items():
         with page.fold_blocks(label):
-            one.quality(page, comparison)
+            one.add_quality(page, comparison)
             if comparison.ablation:
                 one.add_ablation(page, comparison.ablation)
-    return _reading(page)
+    return _add_reading(page)
 
 
-def _overall(page: Report, overall: Overall) -> None:
+def _add_overall(page: Report, overall: Overall) -> None:
     """Add what comes out over all problems."""
     page.heading(f"{overall.terms}: {overall.where}" if overall.terms else overall.where)
     if overall.ablation:
@@ -58,20 +58,22 @@ def _overall(page: Report, overall: Overall) -> None:
             ("distance to the optimum", " over functions") if overall.share else ("objective", "")
         )
         page.chart(
-            effects(overall),
+            draw_effects(overall),
             f"The factor by which switching an ingredient on multiplies the {what}, with 95 %"
             f" bootstrap intervals{over}: left of 1 it helps.",
         )
-        _effects(page, overall, overall.ablation)
+        _add_effects(page, overall, overall.ablation)
     if overall.ranks:
         page.text(claims.describe_mean_ranks(overall))
         page.chart(
-            charts.mean_ranks(overall.ranks, f"mean rank within a {overall.block} (1 is best)"),
+            charts.draw_mean_ranks(
+                overall.ranks, f"mean rank within a {overall.block} (1 is best)"
+            ),
             f"Mean ranks over {overall.ranks.seeds} blocks, one for each {overall.block}, with half"
             " of Nemenyi's critical difference to either side: variants whose bars do not overlap"
             f" differ significantly at {SIGNIFICANCE_LEVEL:.0%}.",
         )
-    tell = (lambda x: f"{x:.0%}") if overall.share else (lambda x: number(x, 3))
+    tell = (lambda x: f"{x:.0%}") if overall.share else (lambda x: format_number(x, 3))
     ranks = dict(zip(overall.ranks.names, overall.ranks.mean, strict=True)) if overall.ranks else {}
     rows = [
         [name, *([f"{ranks[name]:.2f}"] if ranks else []), *map(tell, values)]
@@ -81,7 +83,7 @@ def _overall(page: Report, overall: Overall) -> None:
     page.table(columns, rows, f"{overall.measure.capitalize()}, the best ranked first.")
 
 
-def effects(overall: Overall) -> Chart:
+def draw_effects(overall: Overall) -> Chart:
     """The main effects on each problem and on all together, a row for each, one color for each
     switch.
     """
@@ -128,7 +130,7 @@ def _add_switch(
     chart.points(switch, factors, rows, color, hover=labels, spans=spans)
 
 
-def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
+def _add_effects(page: Report, overall: Overall, ablation: Ablation) -> None:
     """Add the table of what each switch does."""
     cost = overall.cost
     columns = ["switched on", "factor", "from", "to", "better in", "from", "to", "shown"]
@@ -157,7 +159,7 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
 def _describe_effect(effect: SwitchEffect, cost: Mapping[str, float]) -> list[str]:
     """A row of what a switch does by itself, and what it costs where that is known."""
     return [
-        *one.factor(effect),
+        *one.format_factor(effect),
         *(f"{x:.0%}" for x in effect.better or ()),
         "yes" if effect.is_significant else "no",
         *([f"{cost[effect.switches[0]]:+.1f}"] if cost else []),
@@ -166,10 +168,10 @@ def _describe_effect(effect: SwitchEffect, cost: Mapping[str, float]) -> list[st
 
 def _describe_interaction(effect: SwitchEffect) -> list[str]:
     """A row of what a switch does beside others, and whether that is shown."""
-    return [*one.factor(effect), "yes" if effect.is_significant else "no"]
+    return [*one.format_factor(effect), "yes" if effect.is_significant else "no"]
 
 
-def _reading(page: Report) -> Report:
+def _add_reading(page: Report) -> Report:
     """Add how the page is read."""
     return page.heading("How to read this page").items(
         [
@@ -189,15 +191,18 @@ def _reading(page: Report) -> Report:
     )
 
 
-def content(several: Several, source: str) -> dict[str, Any]:
+def build_overall_content(several: Several, source: str) -> dict[str, Any]:
     """The content of `comparison.json`: each problem as if it were alone, and all together."""
     return files.make_plain(
         {
             "source": source,
             "answer": claims.answer(several),
-            "sentences": claims.sentences(several),
+            "sentences": claims.list_overall_claims(several),
             "notes": several.notes,
             "overall": several.overall,
-            "problems": {label: one.content(c, source) for label, c in several.comparisons.items()},
+            "problems": {
+                label: one.build_comparison_content(c, source)
+                for label, c in several.comparisons.items()
+            },
         }
     )

@@ -10,11 +10,11 @@ from tractexp.blocks.chart import Chart
 from tractexp.storage import files
 from tractexp.studies.comparison import charts, claims
 from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
-from tractexp.studies.comparison.claims import number, p_value
+from tractexp.studies.comparison.claims import format_number, format_p_value
 from tractexp.studies.comparison.comparison import Comparison, VariantPair
 from tractexp.studies.comparison.floor import FLOOR_SHARE
 from tractexp.studies.comparison.runs import SearchRun, Variant
-from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL, size_of
+from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL, describe_effect_size
 from tractexp.studies.comparison.summary import Spread
 
 AT_END = "at the end of the search"
@@ -33,7 +33,7 @@ def report(comparison: Comparison, source: str) -> Report:
         title, f"{runs} runs of {source}. Objectives, errors and parameters are those {AT_END}."
     )
     headlines = (
-        claims.headline,
+        claims.write_headline,
         claims.describe_floor,
         claims.describe_valley,
         claims.describe_speed,
@@ -43,29 +43,29 @@ def report(comparison: Comparison, source: str) -> Report:
     )
     if comparison.notes:
         page.heading("Mind").items(comparison.notes)
-    quality(page, comparison)
-    _parameters(page, comparison)
-    _speed(page, comparison)
-    _differences(page, comparison)
+    add_quality(page, comparison)
+    _add_parameters(page, comparison)
+    _add_speed(page, comparison)
+    _add_differences(page, comparison)
     if comparison.ablation:
         add_ablation(page, comparison.ablation)
     _add_unjudged_runs(page, comparison)
-    _reading(page, comparison)
+    _add_reading(page, comparison)
     return page
 
 
-def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
+def _format_spread(spread: Spread, scale: float = 1.0) -> list[str]:
     """Best, quartiles and worst as cells."""
     return [
-        number(x * scale, 4)
+        format_number(x * scale, 4)
         for x in (spread.best, spread.lower, spread.median, spread.upper, spread.worst)
     ]
 
 
-def quality(page: Report, comparison: Comparison) -> None:
+def add_quality(page: Report, comparison: Comparison) -> None:
     """Add where the runs ended."""
     page.heading("Where the runs ended")
-    drawn = charts.spread(comparison.variants, comparison.floor)
+    drawn = charts.draw_spread(comparison.variants, comparison.floor)
     page.chart(drawn, f"Objective {AT_END} of every run that finished. Dashed: the floor.")
     columns = [
         "variant",
@@ -83,13 +83,13 @@ def quality(page: Report, comparison: Comparison) -> None:
             s.name,
             str(s.runs),
             str(s.failures),
-            *_spread(s.objective),
+            *_format_spread(s.objective),
             f"{s.at_floor:.0%}",
             _share(s.in_valley),
         ]
         for s in comparison.summaries
     ]
-    floor = f"the floor, {number(comparison.floor.value, 5)} pu² ({comparison.floor.source})"
+    floor = f"the floor, {format_number(comparison.floor.value, 5)} pu² ({comparison.floor.source})"
     page.table(
         [*columns, "in its valley"],
         rows,
@@ -98,7 +98,7 @@ def quality(page: Report, comparison: Comparison) -> None:
         " it.",
     )
     for name in ("epsilon_p", "epsilon_q"):
-        rows = [[s.name, *_spread(getattr(s, name), 100.0)] for s in comparison.summaries]
+        rows = [[s.name, *_format_spread(getattr(s, name), 100.0)] for s in comparison.summaries]
         with page.fold_blocks(f"{name} of Eq. (20)"):
             page.table(["variant", *columns[3:-1]], rows, f"{name} {AT_END}, in percent.")
 
@@ -108,7 +108,7 @@ def _share(value: float | None) -> str:
     return "-" if value is None else f"{value:.0%}"
 
 
-def _parameters(page: Report, comparison: Comparison) -> None:
+def _add_parameters(page: Report, comparison: Comparison) -> None:
     """Every run's parameters against the floor's; nothing where the problem could not
     be put again.
     """
@@ -116,20 +116,21 @@ def _parameters(page: Report, comparison: Comparison) -> None:
     if polished is None or not polished.reached:
         return
     page.heading("The parameters of every run")
-    drawn = charts.parameters(comparison.variants, polished)
+    drawn = charts.draw_parameters(comparison.variants, polished)
     inside = sum(polished.in_valley(run) is True for run in polished.reached)
     page.chart(
         drawn,
         f"Parameters {AT_END}, each axis as wide as the runs scatter; dashed: those of the lowest"
-        f" objective, {number(polished.objective, 5)} pu². Least squares from where they ended lead"
-        f" {inside} of {len(polished.reached)} runs there, and the others to higher valleys.",
+        f" objective, {format_number(polished.objective, 5)} pu². Least squares from where they"
+        f" ended lead {inside} of {len(polished.reached)} runs there, and the others to higher"
+        " valleys.",
     )
     rows = [
         [
             name,
             polished.units[name],
-            number(value, 4),
-            *(number(bound, 4) for bound in polished.bounds[name]),
+            format_number(value, 4),
+            *(format_number(bound, 4) for bound in polished.bounds[name]),
         ]
         for name, value in polished.parameters.items()
     ]
@@ -137,7 +138,7 @@ def _parameters(page: Report, comparison: Comparison) -> None:
         page.table(["parameter", "unit", "value", "lower bound", "upper bound"], rows)
 
 
-def _speed(page: Report, comparison: Comparison) -> None:
+def _add_speed(page: Report, comparison: Comparison) -> None:
     """Add how fast the variants reach the targets."""
     page.heading("How fast")
     goals = [f"{target:g} x floor" for target in comparison.targets]
@@ -150,9 +151,9 @@ def _speed(page: Report, comparison: Comparison) -> None:
     rows = [
         [
             s.name,
-            number(s.simulations.median),
-            *map(number, np.round(s.ert["simulations"]).tolist()),
-            *map(number, s.ert["seconds"]),
+            format_number(s.simulations.median),
+            *map(format_number, np.round(s.ert["simulations"]).tolist()),
+            *map(format_number, s.ert["seconds"]),
         ]
         for s in comparison.summaries
     ]
@@ -164,13 +165,15 @@ def _speed(page: Report, comparison: Comparison) -> None:
         _draw_variants(
             page,
             comparison,
-            charts.fitness(comparison.variants, by, comparison.floor),
+            charts.draw_fitness(comparison.variants, by, comparison.floor),
             caption + costs,
         )
     caption = (
-        f"Runtimes: the share of {charts.targets_in_words()} reached by all runs, by simulations."
+        f"Runtimes: the share of {charts.describe_targets()} reached by all runs, by simulations."
     )
-    _draw_variants(page, comparison, charts.ecdf(comparison.variants, comparison.floor), caption)
+    _draw_variants(
+        page, comparison, charts.draw_ecdf(comparison.variants, comparison.floor), caption
+    )
     page.table(
         columns,
         rows,
@@ -197,13 +200,13 @@ def _draw_variants(
             page.charts(each, f"In gray: {comparison.summaries[0].name}.")
 
 
-def _differences(page: Report, comparison: Comparison) -> None:
+def _add_differences(page: Report, comparison: Comparison) -> None:
     """Add which differences are more than chance."""
     page.heading("Is the difference more than chance?")
     if comparison.ranks:
         page.text(claims.describe_friedman_test(comparison))
         page.chart(
-            charts.mean_ranks(comparison.ranks),
+            charts.draw_mean_ranks(comparison.ranks),
             "Mean ranks over seeds, with half of Nemenyi's critical difference to either side:"
             " variants whose bars do not overlap differ significantly at"
             f" {SIGNIFICANCE_LEVEL:.0%}.",
@@ -211,12 +214,12 @@ def _differences(page: Report, comparison: Comparison) -> None:
     if not comparison.pairs:
         return
     main, rest = claims.split_pairs(comparison)
-    _pairs(page, main)
+    _add_pairs(page, main)
     if rest:
         with page.fold_blocks(
             f"the other {len(rest)} pairs" if len(rest) > 1 else "the other pair"
         ):
-            _pairs(page, rest)
+            _add_pairs(page, rest)
     sentences = [claims.quote_pair(comparison, pair) for pair in (*main, *rest)]
     page.heading("To quote", 3).items(sentences[:MOST_OPEN_SENTENCES])
     if sentences[MOST_OPEN_SENTENCES:]:
@@ -224,17 +227,17 @@ def _differences(page: Report, comparison: Comparison) -> None:
             page.items(sentences[MOST_OPEN_SENTENCES:])
 
 
-def _pairs(page: Report, pairs: list[VariantPair]) -> None:
+def _add_pairs(page: Report, pairs: list[VariantPair]) -> None:
     """Add the table of tested pairs."""
     rows = [
         [
             pair.first,
             pair.second,
             str(pair.seeds),
-            *map(number, pair.medians),
-            *map(p_value, (pair.p, pair.corrected)),
+            *map(format_number, pair.medians),
+            *map(format_p_value, (pair.p, pair.corrected)),
             f"{pair.effect:.2f}",
-            size_of(pair.effect),
+            describe_effect_size(pair.effect),
             "yes" if pair.significant else "no",
         ]
         for pair in pairs
@@ -277,7 +280,12 @@ def add_ablation(page: Report, ablation: Ablation) -> None:
     )
     for effects, caption in groups:
         rows = [
-            [*factor(e), str(e.seeds), "yes" if e.is_significant else "no", str(len(e.contrasts))]
+            [
+                *format_factor(e),
+                str(e.seeds),
+                "yes" if e.is_significant else "no",
+                str(len(e.contrasts)),
+            ]
             for e in effects
         ]
         if rows:
@@ -286,9 +294,12 @@ def add_ablation(page: Report, ablation: Ablation) -> None:
         page.text(unknown)
 
 
-def factor(effect: SwitchEffect) -> list[str]:
+def format_factor(effect: SwitchEffect) -> list[str]:
     """The switches and what they multiply the objective by, with its interval."""
-    return [" with ".join(effect.switches), *map(number, (effect.factor, effect.low, effect.high))]
+    return [
+        " with ".join(effect.switches),
+        *map(format_number, (effect.factor, effect.low, effect.high)),
+    ]
 
 
 def _add_unjudged_runs(page: Report, comparison: Comparison) -> None:
@@ -320,7 +331,7 @@ def _list_runs_without_result(comparison: Comparison) -> list[list[dict[str, Any
     ]
 
 
-def _reading(page: Report, comparison: Comparison) -> None:
+def _add_reading(page: Report, comparison: Comparison) -> None:
     """Add how the page is read."""
     page.heading("How to read this page").items(
         [
@@ -343,7 +354,7 @@ def _reading(page: Report, comparison: Comparison) -> None:
     )
 
 
-def content(comparison: Comparison, source: str) -> dict[str, Any]:
+def build_comparison_content(comparison: Comparison, source: str) -> dict[str, Any]:
     """The content of `comparison.json`: every number of the page. What is not finite is None."""
     failed, interrupted = _list_runs_without_result(comparison)
     polished = comparison.polished
@@ -370,7 +381,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
             ],
             "ranks": comparison.ranks,
             "ablation": comparison.ablation,
-            "sentences": claims.sentences(comparison),
+            "sentences": claims.list_claims(comparison),
             "notes": comparison.notes,
             "failures": failed,
             "interrupted": interrupted,

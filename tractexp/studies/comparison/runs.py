@@ -153,13 +153,13 @@ def gather(runs: Sequence[SearchRun], source: str) -> Gathered:
     _check_same_problem(runs, source)
     _check_any_finished(runs, source)
     ended = [run for run in runs if not run.interruption]
-    unique = {_identity(run): run for run in ended}
+    unique = {_find_identity(run): run for run in ended}
     notes = []
     if left_out := len(ended) - len(unique):
         notes.append(f"Of runs made more than once, the newest count: {left_out} left out.")
     notes += _describe_versions(ended)
-    names = _names(runs)
-    stopped = {_identity(run): run for run in runs if run.interruption}
+    names = _name_variants(runs)
+    stopped = {_find_identity(run): run for run in runs if run.interruption}
     unjudged = [run for key, run in stopped.items() if key not in unique]
     if unjudged:
         count = f"{len(unjudged)} runs were" if len(unjudged) > 1 else "One run was"
@@ -167,10 +167,10 @@ def gather(runs: Sequence[SearchRun], source: str) -> Gathered:
             f"{count} interrupted, or still going on, and not judged: see the end of the page."
         )
     return Gathered(
-        _variants(list(unique.values()), names),
-        _problem_name(runs[0]),
+        _collect_variants(list(unique.values()), names),
+        _name_problem(runs[0]),
         tuple(notes),
-        tuple((names[_settings(run)], run) for run in unjudged),
+        tuple((names[_find_settings(run)], run) for run in unjudged),
     )
 
 
@@ -203,7 +203,7 @@ def _check_any_finished(runs: Sequence[SearchRun], source: str) -> None:
 Settings = tuple[str, tuple[tuple[str, str], ...]]  # the optimizer as chosen, and what is set
 
 
-def _settings(run: SearchRun) -> Settings:
+def _find_settings(run: SearchRun) -> Settings:
     """The optimizer and its settings, which tell variants apart."""
     settings = {
         key: value for key, value in run.config.items() if key.partition(".")[0] in SETTINGS
@@ -211,23 +211,23 @@ def _settings(run: SearchRun) -> Settings:
     return run.optimizer, tuple(sorted((key, repr(value)) for key, value in settings.items()))
 
 
-def _identity(run: SearchRun) -> tuple[Settings, int]:
+def _find_identity(run: SearchRun) -> tuple[Settings, int]:
     """The variant and the seed, which tell runs apart."""
-    return _settings(run), run.seed
+    return _find_settings(run), run.seed
 
 
 def name_variants(runs: Sequence[SearchRun]) -> list[str]:
     """The name of each run's variant."""
-    names = _names(runs)
-    return [names[_settings(run)] for run in runs]
+    names = _name_variants(runs)
+    return [names[_find_settings(run)] for run in runs]
 
 
-def _names(runs: Sequence[SearchRun]) -> dict[Settings, str]:
+def _name_variants(runs: Sequence[SearchRun]) -> dict[Settings, str]:
     """The name of each variant: its optimizer, and the settings in which runs of that optimizer
     differ.
     """
     groups: dict[str, list[Settings]] = defaultdict(list)
-    for settings in dict.fromkeys(map(_settings, runs)):
+    for settings in dict.fromkeys(map(_find_settings, runs)):
         groups[settings[0]].append(settings)
     names = {}
     for optimizer, several in groups.items():
@@ -243,11 +243,11 @@ def _names(runs: Sequence[SearchRun]) -> dict[Settings, str]:
     return names
 
 
-def _variants(runs: list[SearchRun], names: Mapping[Settings, str]) -> tuple[Variant, ...]:
+def _collect_variants(runs: list[SearchRun], names: Mapping[Settings, str]) -> tuple[Variant, ...]:
     """The variants of runs, each with its runs."""
     groups: dict[Settings, list[SearchRun]] = defaultdict(list)
     for run in runs:
-        groups[_settings(run)].append(run)
+        groups[_find_settings(run)].append(run)
     variants = []
     for settings, members in groups.items():
         own = {key.removeprefix("optimizer."): members[0].config[key] for key, _ in settings[1]}
@@ -261,7 +261,7 @@ def _write_as_typed(value: str) -> str:
     return {"None": "null", "True": "true", "False": "false"}.get(value, value.strip("'"))
 
 
-def _problem_name(run: SearchRun) -> str:
+def _name_problem(run: SearchRun) -> str:
     """The data and the model of a run, in a phrase."""
     return (
         f"{run.data}, model {run.config.get('model.motor.name', '?')} with"

@@ -13,7 +13,7 @@ BOOTSTRAP_DRAWS = 4000
 LEAST_SEEDS = 6  # two-sided, Wilcoxon's smallest p is 2 / 2^n: below 0.05 from 6 pairs up
 
 
-def vargha_delaney(a: np.ndarray, b: np.ndarray) -> float:
+def compute_vargha_delaney(a: np.ndarray, b: np.ndarray) -> float:
     """The probability that a value of `a` is lower than one of `b`, ties counting half: 0.5 is no
     difference.
 
@@ -23,7 +23,7 @@ def vargha_delaney(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.mean((a < b) + 0.5 * (a == b)))
 
 
-def size_of(effect: float) -> str:
+def describe_effect_size(effect: float) -> str:
     """Vargha and Delaney's words for an A: 0.56 small, 0.64 medium, 0.71 large, on either side of
     0.5.
     """
@@ -33,7 +33,7 @@ def size_of(effect: float) -> str:
     ]
 
 
-def holm(p: Sequence[float]) -> np.ndarray:
+def correct_by_holm(p: Sequence[float]) -> np.ndarray:
     """Holm's step-down correction of p-values (m,). Source: Holm 1979."""
     values = np.asarray(p, dtype=float)
     order = np.argsort(values, kind="stable")
@@ -44,7 +44,7 @@ def holm(p: Sequence[float]) -> np.ndarray:
     return corrected
 
 
-def wilcoxon(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
+def run_wilcoxon_test(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
     """Two-sided p of the signed-rank test on pairs (n,) each, and the rank sum where `a` is lower
     minus the reverse.
 
@@ -52,7 +52,7 @@ def wilcoxon(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
     """
     from scipy import stats
 
-    a, b = finite(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
+    a, b = replace_infinite(np.asarray(a, dtype=float), np.asarray(b, dtype=float))
     difference = (a - b)[a != b]
     if not len(difference):
         return 1.0, 0.0
@@ -61,7 +61,7 @@ def wilcoxon(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
     return float(result.pvalue), float(-np.sum(np.sign(difference) * ranks))
 
 
-def finite(*samples: np.ndarray) -> list[np.ndarray]:
+def replace_infinite(*samples: np.ndarray) -> list[np.ndarray]:
     """The samples with inf replaced by one number worse than all the others'."""
     together = np.concatenate(samples)
     values = together[np.isfinite(together)]
@@ -83,7 +83,7 @@ class Ranks:
     groups: tuple[tuple[str, ...], ...]
 
 
-def friedman(names: Sequence[str], table: np.ndarray) -> Ranks:
+def rank_by_friedman(names: Sequence[str], table: np.ndarray) -> Ranks:
     """Rank k >= 3 variants within each of N seeds; `table` is (N, k). The chi-square is corrected
     for ties.
 
@@ -91,18 +91,20 @@ def friedman(names: Sequence[str], table: np.ndarray) -> Ranks:
     """
     from scipy import stats
 
-    table = finite(np.asarray(table, dtype=float).ravel())[0].reshape(np.shape(table))
+    table = replace_infinite(np.asarray(table, dtype=float).ravel())[0].reshape(np.shape(table))
     mean = stats.rankdata(table, axis=1).mean(axis=0)
     if (table == table[:, :1]).all():  # nothing but ties: SciPy divides by zero
         chi2, p = 0.0, 1.0
     else:
         chi2, p = map(float, stats.friedmanchisquare(*table.T))
-    difference = critical_difference(len(names), len(table))
-    groups = indifferent(names, mean, difference)
+    difference = compute_critical_difference(len(names), len(table))
+    groups = group_indifferent(names, mean, difference)
     return Ranks(tuple(names), tuple(map(float, mean)), len(table), chi2, p, difference, groups)
 
 
-def critical_difference(variants: int, seeds: int, alpha: float = SIGNIFICANCE_LEVEL) -> float:
+def compute_critical_difference(
+    variants: int, seeds: int, alpha: float = SIGNIFICANCE_LEVEL
+) -> float:
     """Nemenyi's critical difference of mean ranks. Source: Demsar 2006, section 3.2."""
     from scipy import stats
 
@@ -110,7 +112,7 @@ def critical_difference(variants: int, seeds: int, alpha: float = SIGNIFICANCE_L
     return float(q * np.sqrt(variants * (variants + 1) / (6 * seeds)))
 
 
-def indifferent(
+def group_indifferent(
     names: Sequence[str], mean: Sequence[float], difference: float
 ) -> tuple[tuple[str, ...], ...]:
     """The largest sets of two or more neighbors in rank that are less than `difference` apart."""
@@ -125,7 +127,7 @@ def indifferent(
     return tuple(groups)
 
 
-def expected_running_time(spent: np.ndarray, reached: np.ndarray) -> float:
+def compute_expected_running_time(spent: np.ndarray, reached: np.ndarray) -> float:
     """ERT: all that was spent before the target, by failures all they had, per success; inf without
     a success.
 
@@ -135,7 +137,7 @@ def expected_running_time(spent: np.ndarray, reached: np.ndarray) -> float:
     return float(np.sum(spent) / np.sum(reached)) if np.any(reached) else np.inf
 
 
-def bootstrap(values: np.ndarray) -> tuple[float, float]:
+def bootstrap_interval(values: np.ndarray) -> tuple[float, float]:
     """The percentile interval of the mean of `values` (n,). Source: Efron 1979."""
     rng = np.random.default_rng(0)
     values = np.asarray(values, dtype=float)

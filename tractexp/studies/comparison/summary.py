@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.studies.comparison.floor import FLOOR_SHARE, Floor, Polished
 from tractexp.studies.comparison.runs import SearchRun, Variant
-from tractexp.studies.comparison.statistics import expected_running_time
+from tractexp.studies.comparison.statistics import compute_expected_running_time
 
 COSTS = ("simulations", "seconds")
 ECDF_TARGETS = 1 + 10.0 ** np.arange(3.0, -2.01, -0.2)  # multiples of the floor: 1001 down to 1.01
@@ -61,7 +61,7 @@ def summarize(
     }
     reached = [run.objective <= (1 + FLOOR_SHARE) * floor.value for run in variant.runs]
     ert = {
-        cost: [running_time(variant, target * floor.value, cost) for target in targets]
+        cost: [compute_running_time(variant, target * floor.value, cost) for target in targets]
         for cost in COSTS
     }
     simulations = Spread.from_values([run.simulations[-1] for run in done])
@@ -86,12 +86,12 @@ def _share_in_valley(runs: Sequence[SearchRun], polished: Polished | None) -> fl
     return float(np.mean(known)) if known else None
 
 
-def running_time(variant: Variant, target: float, cost: str) -> float:
+def compute_running_time(variant: Variant, target: float, cost: str) -> float:
     """ERT of a variant to an objective, in simulations or seconds."""
     spent = np.array([run.spent(target, cost) for run in variant.runs])
     reached = np.isfinite(spent)
     whole = np.array([_measure_whole_cost(variant, run, cost) for run in variant.runs])
-    return expected_running_time(np.where(reached, spent, whole), reached)
+    return compute_expected_running_time(np.where(reached, spent, whole), reached)
 
 
 def _measure_whole_cost(variant: Variant, run: SearchRun, cost: str) -> float:
@@ -105,7 +105,7 @@ def _measure_whole_cost(variant: Variant, run: SearchRun, cost: str) -> float:
     return float(np.median([getattr(other, cost)[-1] for other in variant.finished_runs] or [0.0]))
 
 
-def runtimes(variant: Variant, floor: Floor) -> np.ndarray:
+def list_runtimes(variant: Variant, floor: Floor) -> np.ndarray:
     """Simulations to each target of the ECDF in each run, (runs * targets,), sorted, inf where not
     reached.
     """
@@ -133,7 +133,7 @@ class Band:
         )
 
 
-def band(variant: Variant, by: str, points: int = 300) -> Band:
+def compute_band(variant: Variant, by: str, points: int = 300) -> Band:
     """The fitness curves of a variant's finished runs by "iterations" or "simulations".
 
     A run that ended earlier keeps its last objective. By simulations, the band starts where every

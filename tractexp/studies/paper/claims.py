@@ -4,15 +4,15 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 
 from tractexp.studies.paper import printed
-from tractexp.studies.paper.figure_claims import figure3, figure4, figure9
+from tractexp.studies.paper.figure_claims import claim_figure3, claim_figure4, claim_figure9
 from tractexp.studies.paper.study import Study
 from tractexp.studies.paper.table_claims import (
-    agreement,
+    claim_agreement,
     claim_generalization,
-    readings,
-    table1,
-    table2,
-    table3,
+    claim_readings,
+    claim_table1,
+    claim_table2,
+    claim_table3,
 )
 from tractexp.studies.paper.verdict import CONFIRMED, DEPENDS, IMPOSSIBLE, REFUTED, Claim
 
@@ -35,19 +35,19 @@ def count_verdicts(claims: Sequence[Claim]) -> str:
 
 
 BY_PART: dict[str, Callable[[Study], Sequence[Claim]]] = {
-    "table1": table1,
-    "table2": table2,
-    "table3": table3,
+    "table1": claim_table1,
+    "table2": claim_table2,
+    "table3": claim_table3,
     "table4": claim_generalization("table4", "interpolation", printed.INTERPOLATION),
     "table5": claim_generalization("table5", "extrapolation", printed.EXTRAPOLATION),
-    "figure3": figure3,
-    "figure4": figure4,
-    "figure9": figure9,
-    "equations": agreement,
-    "readings": readings,
+    "figure3": claim_figure3,
+    "figure4": claim_figure4,
+    "figure9": claim_figure9,
+    "equations": claim_agreement,
+    "readings": claim_readings,
 }
 
 
-def claims(study: Study, parts: Sequence[str]) -> list[Claim]:
+def list_claims(study: Study, parts: Sequence[str]) -> list[Claim]:
     """The claims of some parts."""
     return [claim for part in parts if part in BY_PART for claim in BY_PART[part](study)]

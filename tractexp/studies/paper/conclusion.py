@@ -9,14 +9,21 @@ import numpy as np
 from tractexp.studies.paper import equations, why
 from tractexp.studies.paper.printed import COMPARED, LABELS
 from tractexp.studies.paper.study import FLOOR_FACTOR, NARROW, TRADED, WIDE, Study
-from tractexp.studies.paper.verdict import CONFIRMED, DEPENDS, PAIRS, Claim, compare_ends, number
+from tractexp.studies.paper.verdict import (
+    CONFIRMED,
+    DEPENDS,
+    PAIRS,
+    Claim,
+    compare_ends,
+    format_number,
+)
 from tractexp.text.wording import join_words
 
 # times the lowest objective: a valley that a search might take for the right one
 LARGEST_NEAR_RATIO = 2.0
 
 
-def sentences(study: Study, claims: Sequence[Claim]) -> list[str]:
+def write_conclusion(study: Study, claims: Sequence[Claim]) -> list[str]:
     """The conclusion of the page, of as many of its parts as there are."""
     parts: Mapping[str, list[Claim]] = {
         c.part: [d for d in claims if d.part == c.part] for c in claims
@@ -25,13 +32,13 @@ def sentences(study: Study, claims: Sequence[Claim]) -> list[str]:
     if parts.keys() & {"table2", "table4", "table5"}:
         paragraphs.append(_describe_errors(parts))
     if "equations" in parts or "table3" in parts:
-        paragraphs.append(_values())
+        paragraphs.append(_describe_values())
     if "table3" in parts:
         paragraphs.append(_describe_ranking(study))
     if "figure9" in parts:
-        paragraphs.append(f"{_lack(study)} {_random(study)}")
+        paragraphs.append(f"{_lack(study)} {_describe_random(study)}")
     if "readings" in parts:
-        paragraphs.append(_readings(parts["readings"]))
+        paragraphs.append(_describe_readings(parts["readings"]))
     return paragraphs
 
 
@@ -56,9 +63,9 @@ def _describe_errors(parts: Mapping[str, list[Claim]]) -> str:
     return f"The load model that ISSA identifies {'; '.join(said)}."
 
 
-def _values() -> str:
+def _describe_values() -> str:
     """That the printed parameters do not satisfy the printed equations."""
-    checks = equations.checks()
+    checks = equations.check_printed_numbers()
     failed = sum(not check.holds for check in checks)
     return (
         "The parameters printed are not those of the equations printed: Eq. (3) has no steady state"
@@ -76,10 +83,12 @@ def _describe_ranking(study: Study) -> str:
     ):
         order = sorted(COMPARED, key=lambda name: np.median(study.objectives(name, by)))
         medians = ", ".join(
-            f"{LABELS[n]} {number(float(np.median(study.objectives(n, by))))}" for n in order
+            f"{LABELS[n]} {format_number(float(np.median(study.objectives(n, by))))}" for n in order
         )
         apart = [
-            f"between {LABELS[a]} and {LABELS[b]}" for a, b in PAIRS if not _differ(study, a, b, by)
+            f"between {LABELS[a]} and {LABELS[b]}"
+            for a, b in PAIRS
+            if not _do_differ(study, a, b, by)
         ]
         rest = (
             f" (no significant difference {join_words(apart)})"
@@ -92,12 +101,14 @@ def _describe_ranking(study: Study) -> str:
     return "; ".join(parts) + "." + reading
 
 
-def _differ(study: Study, first: str, second: str, by: str) -> bool:
+def _do_differ(study: Study, first: str, second: str, by: str) -> bool:
     """Whether two optimizers differ by more than chance."""
     pair = PAIRS[[set(p) for p in PAIRS].index({first, second})]
     three = [study.pair(a, b, by) for a, b in PAIRS]
     flipped = [study.pair(b, a, by) for a, b in PAIRS]
-    return why.significant(three, PAIRS.index(pair)) or why.significant(flipped, PAIRS.index(pair))
+    return why.is_significant(three, PAIRS.index(pair)) or why.is_significant(
+        flipped, PAIRS.index(pair)
+    )
 
 
 def _lack(study: Study) -> str:
@@ -108,7 +119,7 @@ def _lack(study: Study) -> str:
     )
 
 
-def _random(study: Study) -> str:
+def _describe_random(study: Study) -> str:
     """How often each search ends in the best valley, beside random points."""
     shares, control = {name: study.shares(name) for name in COMPARED}, study.control_shares
     there = ", ".join(f"{LABELS[n]} {s.valley} of {s.n}" for n, s in shares.items())
@@ -120,7 +131,7 @@ def _random(study: Study) -> str:
     )
 
 
-def _readings(claims: Sequence[Claim]) -> str:
+def _describe_readings(claims: Sequence[Claim]) -> str:
     """Which of the claims about readings and ingredients hold."""
     held = [claim.text for claim in claims if claim.verdict == CONFIRMED]
     if held:
@@ -130,11 +141,11 @@ def _readings(claims: Sequence[Claim]) -> str:
     )
 
 
-def reasons(study: Study) -> list[str]:
+def explain_ranks(study: Study) -> list[str]:
     """Why the three rank as they do, tested."""
     paragraphs = [
         f"Is it convergence at the end, and not exploration, that the sparrows lack? {_lack(study)}"
-        f" {_random(study)}"
+        f" {_describe_random(study)}"
     ]
     paragraphs += [_describe_lack(lack) for lack in why.compare_with_ssa(study)]
     rival, limited, control = (
@@ -142,7 +153,7 @@ def reasons(study: Study) -> list[str]:
         study.shares("pso_limited"),
         study.control_shares,
     )
-    p = why.fisher(rival, control, "valley")
+    p = why.run_fisher_test(rival, control, "valley")
     word = "more" if rival.valley * control.n > control.valley * rival.n else "less"
     word = word if p < why.SIGNIFICANCE_LEVEL else f"not significantly {word}"
     paragraphs.append(
@@ -172,7 +183,7 @@ def _describe_lack(lack: why.Lack) -> str:
     )
 
 
-def static_reactive(study: Study, values: np.ndarray) -> np.ndarray | None:
+def compute_static_reactive(study: Study, values: np.ndarray) -> np.ndarray | None:
     """Q_s0 [pu], what the motor leaves of Q0 to the static load, of free values (n, free); None for
     other motors.
     """
@@ -180,16 +191,20 @@ def static_reactive(study: Study, values: np.ndarray) -> np.ndarray | None:
     if not {"T_m", "X_prime", "C"} <= set(names):
         return None
     whole = [dict(zip(names, row, strict=True)) for row in study.problem.full(values)]
-    return np.array([event.Q0 - equations.motor_reactive(value, event.U0) for value in whole])
+    return np.array(
+        [event.Q0 - equations.compute_motor_reactive(value, event.U0) for value in whole]
+    )
 
 
-def valley(study: Study) -> list[str]:
+def describe_valley(study: Study) -> list[str]:
     """What the second valley is, where it lies and why searches go there; as much of it as this
     model shows.
     """
     groups, names = study.control.group_valleys(), study.problem.space.names
     if len(groups) < 2:
-        return [f"All random points descend to {number(groups[0][0])} pu²: there is one valley."]
+        return [
+            f"All random points descend to {format_number(groups[0][0])} pu²: there is one valley."
+        ]
     (lowest, _, right), (second, count, other) = groups[:2]
     column = names.index(TRADED)
     low, high = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
@@ -212,7 +227,7 @@ def valley(study: Study) -> list[str]:
     ]
     if at_bound and second < LARGEST_NEAR_RATIO * lowest and right[column] > other[column]:
         paragraphs += _explain_attraction(study, lowest, right, other)
-    return [*paragraphs, _bounds(study, (low, high), lowest)]
+    return [*paragraphs, _describe_bounds(study, (low, high), lowest)]
 
 
 def _explain_attraction(
@@ -225,7 +240,7 @@ def _explain_attraction(
     column = study.problem.space.names.index(TRADED)
     between = np.flatnonzero((grid > second_valley[column]) & (grid < lowest_valley[column]))
     ridge = int(between[np.argmax(path.objective[between])])
-    static = static_reactive(study, np.stack((lowest_valley, second_valley)))
+    static = compute_static_reactive(study, np.stack((lowest_valley, second_valley)))
     remark = (
         " There the static load's part of the reactive power, Q_s0 = Q0 - Q_d0, changes its sign:"
         f" {static[0]:+.2f} pu in the lowest valley, {static[1]:+.2f} pu in the other, which stands"
@@ -278,7 +293,7 @@ def _describe_trade(study: Study, along: np.ndarray, here: int, lowest: float) -
     return sentence
 
 
-def _bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
+def _describe_bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
     """How often searches reach the floor within the paper's bounds and within others."""
     shares = {
         bounds: np.mean(ends.objective <= FLOOR_FACTOR * lowest)

@@ -18,13 +18,13 @@ PRINTED_TOLERANCE = 0.01  # of a printed number that rounding explains
 Field = Callable[[np.ndarray], np.ndarray]
 
 
-def steady_state_sine(column: Sequence[float]) -> float:
+def compute_steady_state_sine(column: Sequence[float]) -> float:
     """|2 T_m X'/(C U0²)| at U0 = 1 pu, whose arcsine is in Eq. (3): it must not exceed 1."""
     value = dict(zip(printed.NAMES, column, strict=True))
     return abs(2 * value["T_m"] * value["X_prime"] / value["C"])
 
 
-def refusals(model: Any, drive: Any) -> dict[str, str]:
+def list_refusals(model: Any, drive: Any) -> dict[str, str]:
     """The refusal of each column of Table 3 by the model; "" where it has a steady state."""
     return {
         name: model.refusal(np.array(column), drive) or ""
@@ -43,7 +43,7 @@ class Consistency:
     misses: Mapping[str, float]  # of the printed objective, relative
 
 
-def consistency() -> Consistency:
+def check_consistency() -> Consistency:
     """The mean squares of P and Q by which errors and objectives of Table 3 agree best.
 
     By Eq. (20) the objective of Eq. (8) is epsilon_p² mean(P²) + epsilon_q² mean(Q²). The means are
@@ -66,19 +66,19 @@ def consistency() -> Consistency:
     )
 
 
-def classical(f: Field, y: np.ndarray, h: float) -> np.ndarray:
+def step_classically(f: Field, y: np.ndarray, h: float) -> np.ndarray:
     """One step of the classical Runge-Kutta method."""
-    return _runge_kutta(f, y, h, h / 2)
+    return _step_runge_kutta(f, y, h, h / 2)
 
 
 def step_as_printed(f: Field, y: np.ndarray, h: float) -> np.ndarray:
     """One step of Eq. (4) as printed, h/6 in the second and third stage, its twice named K1 read as
     K3 and K4.
     """
-    return _runge_kutta(f, y, h, h / 6)
+    return _step_runge_kutta(f, y, h, h / 6)
 
 
-def _runge_kutta(f: Field, y: np.ndarray, h: float, inner: float) -> np.ndarray:
+def _step_runge_kutta(f: Field, y: np.ndarray, h: float, inner: float) -> np.ndarray:
     """A step of the classical method, its stages `inner` apart."""
     k1 = f(y)
     k2 = f(y + inner * k1)
@@ -112,14 +112,14 @@ class Check:
     holds: bool
 
 
-def checks() -> list[Check]:
+def check_printed_numbers() -> list[Check]:
     """The printed numbers, put into the printed equations."""
-    return [*_steady_states(), *_errors(), *_methods(), *_rankings()]
+    return [*_check_steady_states(), *_check_errors(), *_check_methods(), *_check_rankings()]
 
 
-def _steady_states() -> list[Check]:
+def _check_steady_states() -> list[Check]:
     """Eqs. (1) to (3) and the definitions below them."""
-    residual = rest_residual(FAIR)
+    residual = compute_rest_residual(FAIR)
     results = [
         Check(
             "Eq. (3)",
@@ -129,7 +129,10 @@ def _steady_states() -> list[Check]:
         )
     ]
     for name, column in printed.TABLE_3.items():
-        value, sine = dict(zip(printed.NAMES, column, strict=True)), steady_state_sine(column)
+        value, sine = (
+            dict(zip(printed.NAMES, column, strict=True)),
+            compute_steady_state_sine(column),
+        )
         where = f"Table 3, {LABELS[name]}"
         C, T = value["C"], value["T_prime"]
         results += [
@@ -151,7 +154,7 @@ def _steady_states() -> list[Check]:
     return results
 
 
-def _errors() -> list[Check]:
+def _check_errors() -> list[Check]:
     """Eqs. (8) and (20)."""
     results = []
     for name, label in LABELS.items():
@@ -165,7 +168,7 @@ def _errors() -> list[Check]:
                     max(P, Q) < ACCEPTED,
                 )
             )
-    gap = consistency()
+    gap = check_consistency()
     for pair, (P, Q) in gap.pairs.items():
         first, second = pair.split(" and ")
         results.append(
@@ -189,10 +192,12 @@ def _errors() -> list[Check]:
     return results
 
 
-def _methods() -> list[Check]:
+def _check_methods() -> list[Check]:
     """Eqs. (4) and (15), and what is printed twice."""
-    wrong, right = order(step_as_printed), order(classical)
-    slopes = {formula: maps.tail_exponent(steps) for formula, steps in maps.tails().items()}
+    wrong, right = order(step_as_printed), order(step_classically)
+    slopes = {
+        formula: maps.estimate_tail_exponent(steps) for formula, steps in maps.draw_tails().items()
+    }
     return [
         Check(
             "Eq. (4)",
@@ -230,7 +235,7 @@ def _methods() -> list[Check]:
     ]
 
 
-def _rankings() -> list[Check]:
+def _check_rankings() -> list[Check]:
     """Whether the paper's tables say of ISSA what its text does."""
     results = []
     tables = {
@@ -270,7 +275,7 @@ def _check_lowest(where: str, what: str, table: Mapping[str, float]) -> Check:
     )
 
 
-def rest_residual(motor: Sequence[float]) -> float:
+def compute_rest_residual(motor: Sequence[float]) -> float:
     """The largest derivative of Eq. (1), as printed, in the state of Eq. (3) at U0 = 1 pu;
     `motor` is T', X', C, M, T_m.
     """
@@ -286,7 +291,7 @@ def rest_residual(motor: Sequence[float]) -> float:
     return float(np.max(np.abs(slopes)))
 
 
-def motor_reactive(value: Mapping[str, float], U0: float) -> float:
+def compute_motor_reactive(value: Mapping[str, float], U0: float) -> float:
     """Q_d [pu] before the event, Eqs. (2) and (3)."""
     sine = -2 * value["T_m"] * value["X_prime"] / (value["C"] * U0**2)
     delta = 0.5 * np.arcsin(np.clip(sine, -1, 1))
@@ -310,7 +315,7 @@ class Sphere:
         return values - self.optimum
 
 
-def bias(budget: int = 10_000, seeds: int = 7) -> dict[str, tuple[float, float]]:
+def measure_bias(budget: int = 10_000, seeds: int = 7) -> dict[str, tuple[float, float]]:
     """Median error on the sphere in ten dimensions, its optimum at zero and one unit off in each
     coordinate.
 

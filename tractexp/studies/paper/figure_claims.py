@@ -4,9 +4,9 @@ import numpy as np
 
 from tractexp.studies.comparison.statistics import (
     SIGNIFICANCE_LEVEL,
-    holm,
-    vargha_delaney,
-    wilcoxon,
+    compute_vargha_delaney,
+    correct_by_holm,
+    run_wilcoxon_test,
 )
 from tractexp.studies.paper import maps, printed, why
 from tractexp.studies.paper.printed import LABELS
@@ -18,13 +18,13 @@ from tractexp.studies.paper.verdict import (
     REFUTED,
     Claim,
     decide,
+    format_number,
+    list_readings,
     merge_verdicts,
-    number,
-    readings_of,
 )
 
 
-def figure9(study: Study) -> list[Claim]:
+def claim_figure9(study: Study) -> list[Claim]:
     """Speed, and local optima."""
     claims = []
     targets = " and ".join(f"{t:g}" for t in TARGETS)
@@ -32,7 +32,7 @@ def figure9(study: Study) -> list[Claim]:
         for by in BUDGETS:
             verdicts = {}
             phrases = []
-            for how, names in readings_of(first, second).items():
+            for how, names in list_readings(first, second).items():
                 verdicts[how], numbers = compare_speed(study, names[first], names[second], by)
                 phrases.append(f"{how} {LABELS[first]} {numbers[0]}, {LABELS[second]} {numbers[1]}")
             text = f"{LABELS[first]} converges faster than {LABELS[second]}, by {by}"
@@ -52,13 +52,13 @@ def compare_speed(study: Study, first: str, second: str, by: str) -> tuple[str, 
         a, b = (
             np.where(*_mark_reached_cost(study.spent(name, target, by))) for name in (first, second)
         )
-        p.append(wilcoxon(a, b)[0])
-        A.append(vargha_delaney(a, b))
+        p.append(run_wilcoxon_test(a, b)[0])
+        A.append(compute_vargha_delaney(a, b))
     times = [
-        ", ".join(number(study.running_time(name, t, by)) for t in TARGETS)
+        ", ".join(format_number(study.running_time(name, t, by)) for t in TARGETS)
         for name in (first, second)
     ]
-    return decide(study, max(holm(p)) < SIGNIFICANCE_LEVEL and min(A) > 0.5), times
+    return decide(study, max(correct_by_holm(p)) < SIGNIFICANCE_LEVEL and min(A) > 0.5), times
 
 
 def _mark_reached_cost(
@@ -77,12 +77,12 @@ def _claim_best_valley(study: Study) -> Claim:
     """
     verdicts = {}
     phrases = []
-    for reading, names in readings_of("issa", "ssa").items():
+    for reading, names in list_readings("issa", "ssa").items():
         counts = {name: study.shares(names[name]) for name in printed.COMPARED}
         others = [counts["ssa"], counts["pso"]]
-        p_values = [why.fisher(counts["issa"], other, "valley") for other in others]
+        p_values = [why.run_fisher_test(counts["issa"], other, "valley") for other in others]
         is_more = all(counts["issa"].valley > other.valley for other in others)
-        is_significant = max(holm(p_values)) < SIGNIFICANCE_LEVEL
+        is_significant = max(correct_by_holm(p_values)) < SIGNIFICANCE_LEVEL
         verdicts[reading] = decide(study, is_more and is_significant)
         told = [
             f"{LABELS[name]} {count.valley} of {count.n} (at its floor {count.floor})"
@@ -99,7 +99,7 @@ def _claim_best_valley(study: Study) -> Claim:
     )
 
 
-def figure3(study: Study) -> list[Claim]:
+def claim_figure3(study: Study) -> list[Claim]:
     """How even the maps are."""
     flock, *_ = study.uniformity.values()
     middle = {name: float(np.median(values)) for name, values in flock.items()}
@@ -112,14 +112,15 @@ def figure3(study: Study) -> list[Claim]:
         Claim(
             "figure3",
             "the tent map is more uniform than the logistic map",
-            f"{measured}tent {number(middle[own])}, logistic {number(middle['logistic'])}",
+            f"{measured}tent {format_number(middle[own])},"
+            f" logistic {format_number(middle['logistic'])}",
             CONFIRMED if middle[own] < middle["logistic"] else REFUTED,
         ),
         Claim(
             "figure3",
             "with alpha = 0.3 it is relatively uniform",
-            f"lowest of the alphas tried: {best.partition(', ')[2]} with {number(tent[best])}; 0.3"
-            f" has {number(tent[own])}",
+            f"lowest of the alphas tried: {best.partition(', ')[2]} with"
+            f" {format_number(tent[best])}; 0.3 has {format_number(tent[own])}",
             CONFIRMED if tent[own] < DIFFERENT * tent[best] else REFUTED,
         ),
         Claim(
@@ -132,9 +133,9 @@ def figure3(study: Study) -> list[Claim]:
     ]
 
 
-def figure4(study: Study) -> list[Claim]:
+def claim_figure4(study: Study) -> list[Claim]:
     """The claims on the Lévy flight."""
-    slopes = {formula: maps.tail_exponent(steps) for formula, steps in study.tails.items()}
+    slopes = {formula: maps.estimate_tail_exponent(steps) for formula, steps in study.tails.items()}
     even = {formula: float(np.mean(steps > 0)) for formula, steps in study.tails.items()}
     return [
         Claim(

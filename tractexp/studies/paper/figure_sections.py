@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.style import PALETTE
-from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
+from tractexp.report.events import CAPTION, CalculatedCurve, draw_event
 from tractexp.studies.comparison import charts
 from tractexp.studies.comparison.floor import Floor
 from tractexp.studies.comparison.runs import SearchRun, Variant
@@ -22,17 +22,17 @@ from tractexp.studies.paper.study import (
     TRADED,
     Study,
 )
-from tractexp.studies.paper.verdict import middle, number
+from tractexp.studies.paper.verdict import format_middle, format_number
 from tractexp.text.wording import finish_sentence
 
 SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
 
 
-def figure3(sheet: Report, study: Study) -> None:
+def add_figure3(sheet: Report, study: Study) -> None:
     """Add the tent map."""
     sheet.heading("Figure 3: the tent map")
     orbits = {
-        f"alpha = {a}": maps.tent_orbit(float(a), 200, 1, np.random.default_rng(0))[:, 0]
+        f"alpha = {a}": maps.compute_tent_orbit(float(a), 200, 1, np.random.default_rng(0))[:, 0]
         for a in SHOWN
     }
     where, flock = next(iter(study.uniformity.items()))
@@ -42,17 +42,17 @@ def figure3(sheet: Report, study: Study) -> None:
     )
     sheet.table(
         ["way to scatter", *study.uniformity],
-        [[way, *(middle(kind[way]) for kind in study.uniformity.values())] for way in flock],
+        [[way, *(format_middle(kind[way]) for kind in study.uniformity.values())] for way in flock],
         "Centered discrepancy (Hickernell 1998), median (lowest .. highest). With alpha = 0.5 an"
         " orbit reaches 0 in about 53 steps of binary arithmetic; it is then started anew.",
     )
 
 
-def figure4(sheet: Report, study: Study) -> None:
+def add_figure4(sheet: Report, study: Study) -> None:
     """Add Lévy flights."""
     sheet.heading("Figure 4: Lévy flights")
     sheet.chart(
-        figures.flights(maps.flights("mantegna", 300, 3, seed=1)),
+        figures.flights(maps.draw_flights("mantegna", 300, 3, seed=1)),
         "Steps of Eq. (15), three dimensions.",
     )
     sheet.chart(
@@ -61,12 +61,15 @@ def figure4(sheet: Report, study: Study) -> None:
     rows = []
     for formula, steps in study.tails.items():
         size = np.abs(steps)
-        cells = [number(float(np.median(size))), *(f"{np.mean(size > x):.2%}" for x in (10, 100))]
-        rows.append([formula, *cells, f"{maps.tail_exponent(steps):.2f}"])
+        cells = [
+            format_number(float(np.median(size))),
+            *(f"{np.mean(size > x):.2%}" for x in (10, 100)),
+        ]
+        rows.append([formula, *cells, f"{maps.estimate_tail_exponent(steps):.2f}"])
     sheet.table(["formula", "median |s|", "|s| > 10", "|s| > 100", "tail exponent"], rows)
 
 
-def figure6(sheet: Report, study: Study) -> None:
+def add_figure6(sheet: Report, study: Study) -> None:
     """Add the record."""
     event = study.train[0]
     record = event.record
@@ -84,29 +87,29 @@ def _fit(sheet: Report, fit: Any, role: str) -> None:
     )
     curve = CalculatedCurve("calculated", np.stack((fit.P, fit.Q)), PALETTE[1])
     sheet.chart(
-        event_chart(fit.event, [curve]),
+        draw_event(fit.event, [curve]),
         " ".join([caption, CAPTION, *map(finish_sentence, record.notes)]),
     )
 
 
-def figure8(sheet: Report, study: Study) -> None:
+def add_figure8(sheet: Report, study: Study) -> None:
     """Add the fit."""
     sheet.heading("Figure 8: the fit")
     _fit(sheet, study.first("issa")[0], "fitted")
 
 
-def figure9(sheet: Report, study: Study) -> None:
+def add_figure9(sheet: Report, study: Study) -> None:
     """Add the searches."""
     sheet.heading("Figure 9: the searches")
     floor = Floor(study.floor, "")
     one = [_collect_variant(study, name, "iterations", 1) for name in COMPARED]
     sheet.chart(
-        charts.fitness(one, "iterations", floor)[0], "One run, seed 0, as the paper shows it."
+        charts.draw_fitness(one, "iterations", floor)[0], "One run, seed 0, as the paper shows it."
     )
     for by in BUDGETS:
         all_ = [_collect_variant(study, name, by, study.seeds) for name in COMPARED]
         sheet.chart(
-            charts.fitness(all_, by, floor)[0],
+            charts.draw_fitness(all_, by, floor)[0],
             f"Median and quartiles of {study.seeds} seeds, by {by}; the line is the lowest"
             " objective known.",
         )
@@ -115,7 +118,11 @@ def figure9(sheet: Report, study: Study) -> None:
         rows.append(
             [
                 label(name),
-                *(number(study.running_time(name, t, by)) for by in BUDGETS for t in TARGETS),
+                *(
+                    format_number(study.running_time(name, t, by))
+                    for by in BUDGETS
+                    for t in TARGETS
+                ),
             ]
         )
     sheet.table(
@@ -156,7 +163,7 @@ def _collect_variant(study: Study, name: str, by: str, seeds: int) -> Variant:
 def _reasons(sheet: Report, study: Study) -> None:
     """Add why the searches rank as they do."""
     sheet.heading("Why they rank so", 3)
-    sheet.text(*conclusion.reasons(study))
+    sheet.text(*conclusion.explain_ranks(study))
     rows = []
     for name in (*LEVEL, "random_search"):
         share = study.shares(name)
@@ -164,7 +171,7 @@ def _reasons(sheet: Report, study: Study) -> None:
             [
                 label(name),
                 *(f"{k} of {share.n}" for k in (share.valley, share.floor, share.done)),
-                middle(study.above_bottom(name)),
+                format_middle(study.above_bottom(name)),
             ]
         )
     control = study.control_shares
@@ -209,12 +216,12 @@ def _reasons(sheet: Report, study: Study) -> None:
 def _valleys(sheet: Report, study: Study) -> None:
     """Add the valleys along the parameters that trade."""
     sheet.heading(f"The valleys along {TRADED}", 3)
-    sheet.text(*conclusion.valley(study))
+    sheet.text(*conclusion.describe_valley(study))
     grid, path = study.path
     index = {name: k for k, name in enumerate(study.problem.space.names)}
     shown = {"objective / lowest": path.objective / study.floor}
     shown |= {"q_v": path.values[:, index["q_v"]]} if "q_v" in index else {}
-    if (static := conclusion.static_reactive(study, path.values)) is not None:
+    if (static := conclusion.compute_static_reactive(study, path.values)) is not None:
         shown["Q_s0 [pu]"] = static
     own = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
     bottoms = [
@@ -237,7 +244,14 @@ def _add_ends(sheet: Report, study: Study) -> None:
     rows = []
     for f, n, values in study.control.group_valleys()[:4]:
         ended = [sum(k for g, k, _ in groups if abs(g / f - 1) < 0.02) for groups in every.values()]
-        rows.append([number(f), *(str(k) for k in ended), str(n), *map(number, values)])
+        rows.append(
+            [
+                format_number(f),
+                *(str(k) for k in ended),
+                str(n),
+                *map(format_number, values),
+            ]
+        )
     sheet.table(
         ["valley: objective", *(LABELS[n] for n in every), "random points", *names],
         rows,
@@ -255,7 +269,7 @@ def _add_valleys_by_bounds(sheet: Report, study: Study, traded: int) -> None:
         right = ends.objective <= FLOOR_FACTOR * study.floor
         at, count = "-", 0
         for f, n, values in ends.group_valleys()[1:2]:
-            at = f"{number(f)} at {TRADED} = {number(float(values[traded]))}"
+            at = f"{format_number(f)} at {TRADED} = {format_number(float(values[traded]))}"
             count = n
         rows.append([f"{low:g} .. {high:g}", f"{np.mean(right):.0%}", at, str(count)])
     sheet.table(

@@ -18,17 +18,17 @@ LEVY_STEPS = 200_000  # Lévy steps whose tail is measured
 LEVY_TAIL_SHARE = 0.005  # share of the steps that count as the tail
 
 
-def issa(**settings: Any) -> Any:
+def build_issa(**settings: Any) -> Any:
     """ISSA with some settings."""
     return build("optimizer", {"name": "issa", **settings})
 
 
-def tent_orbit(alpha: float, n: int, d: int, rng: np.random.Generator) -> np.ndarray:
+def compute_tent_orbit(alpha: float, n: int, d: int, rng: np.random.Generator) -> np.ndarray:
     """(n, d) iterates of the tent map, Eq. (14), one orbit in each column."""
-    return issa(tent_alpha=alpha, population=n).initial(Box.unit(d), rng)
+    return build_issa(tent_alpha=alpha, population=n).initial(Box.unit(d), rng)
 
 
-def logistic_orbit(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
+def compute_logistic_orbit(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
     """(n, d) iterates of the logistic map z -> 4 z (1 - z), one orbit in each column."""
     orbit = [rng.random(d)]
     for _ in range(n - 1):
@@ -36,7 +36,7 @@ def logistic_orbit(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
     return np.array(orbit)
 
 
-def sobol(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
+def draw_sobol(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
     """(n, d) scrambled Sobol points."""
     from scipy.stats import qmc
 
@@ -45,19 +45,21 @@ def sobol(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
         return qmc.Sobol(d, rng=rng).random(n)
 
 
-def flocks(
+def list_flocks(
     n: int, d: int, alphas: tuple[float, ...]
 ) -> dict[str, Callable[[np.random.Generator], np.ndarray]]:
     """The ways to scatter n sparrows over d coordinates, by name."""
-    ways = {f"tent, alpha = {a:g}": lambda rng, a=a: tent_orbit(a, n, d, rng) for a in alphas}
+    ways = {
+        f"tent, alpha = {a:g}": lambda rng, a=a: compute_tent_orbit(a, n, d, rng) for a in alphas
+    }
     return ways | {
-        "logistic": lambda rng: logistic_orbit(n, d, rng),
+        "logistic": lambda rng: compute_logistic_orbit(n, d, rng),
         "uniform": lambda rng: rng.random((n, d)),
-        "Sobol": lambda rng: sobol(n, d, rng),
+        "Sobol": lambda rng: draw_sobol(n, d, rng),
     }
 
 
-def discrepancies(
+def measure_discrepancies(
     n: int, d: int, alphas: tuple[float, ...], draws: int = FLOCK_DRAWS
 ) -> Mapping[str, np.ndarray]:
     """Centered discrepancy of each way to scatter, (draws,) each: the lower, the more even. Source:
@@ -68,21 +70,23 @@ def discrepancies(
     rng = np.random.default_rng(0)
     return {
         name: np.array([qmc.discrepancy(np.clip(draw(rng), 0, 1)) for _ in range(draws)])
-        for name, draw in flocks(n, d, alphas).items()
+        for name, draw in list_flocks(n, d, alphas).items()
     }
 
 
-def flights(formula: str, n: int, d: int, seed: int = 0) -> np.ndarray:
+def draw_flights(formula: str, n: int, d: int, seed: int = 0) -> np.ndarray:
     """(n, d) Lévy steps of Eq. (15), "mantegna" or as "printed"."""
-    return issa(levy_formula=formula).flight((n, d), np.random.default_rng(seed))
+    return build_issa(levy_formula=formula).flight((n, d), np.random.default_rng(seed))
 
 
-def tails() -> dict[str, np.ndarray]:
+def draw_tails() -> dict[str, np.ndarray]:
     """Steps of Eq. (15), {formula: (STEPS,)}."""
-    return {formula: flights(formula, LEVY_STEPS, 1)[:, 0] for formula in ("mantegna", "printed")}
+    return {
+        formula: draw_flights(formula, LEVY_STEPS, 1)[:, 0] for formula in ("mantegna", "printed")
+    }
 
 
-def tail_exponent(steps: np.ndarray) -> float:
+def estimate_tail_exponent(steps: np.ndarray) -> float:
     """a in P(|s| > x) ~ x^-a, from the largest of the steps (n,). Source: Hill 1975."""
     size = np.sort(np.abs(steps.ravel()))
     k = max(2, round(LEVY_TAIL_SHARE * len(size)))

@@ -108,13 +108,13 @@ def fit(
         result.objective,
         tuple(fits),
         uncertainty,
-        duration(problem),
+        measure_duration(problem),
         substeps,
         cost,
     )
 
 
-def duration(problem: Problem) -> float:
+def measure_duration(problem: Problem) -> float:
     """Nanoseconds per sample of one candidate's simulation, objective included: the fastest of some
     repeats.
     """

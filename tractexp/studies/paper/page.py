@@ -10,12 +10,12 @@ from tractexp.blocks import Report
 from tractexp.studies.paper import conclusion, equations, printed
 from tractexp.studies.paper.claims import count_verdicts
 from tractexp.studies.paper.figure_sections import (
+    add_figure3,
+    add_figure4,
+    add_figure6,
+    add_figure8,
+    add_figure9,
     explain_held_out_figure,
-    figure3,
-    figure4,
-    figure6,
-    figure8,
-    figure9,
 )
 from tractexp.studies.paper.printed import LABELS, READINGS
 from tractexp.studies.paper.study import Study
@@ -23,11 +23,11 @@ from tractexp.studies.paper.table_claims import BOTH
 from tractexp.studies.paper.table_sections import (
     TO_THE_LETTER,
     add_generalization_table,
-    table1,
-    table2,
-    table3,
+    add_table1,
+    add_table2,
+    add_table3,
 )
-from tractexp.studies.paper.verdict import Claim, middle
+from tractexp.studies.paper.verdict import Claim, format_middle
 
 TITLE = "The paper, table by table"
 
@@ -41,18 +41,18 @@ LEAD = (
 def report(study: Study, parts: Sequence[str], claims: Sequence[Claim]) -> Report:
     """Measure `parts`, and report them with their claims."""
     sheet = Report(TITLE, LEAD)
-    _top(sheet, study, claims)
+    _add_top(sheet, study, claims)
     for part in parts:
         study.tell(f"writing {_place(part)}")
         SECTIONS[part](sheet, study)
     return sheet
 
 
-def _top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
+def _add_top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
     """Add the verdicts, and what the reader must know first."""
     sheet.verdict(
         f"Of {count_verdicts(claims)}." if claims else "The parts chosen hold no claim.",
-        *conclusion.sentences(study, claims),
+        *conclusion.write_conclusion(study, claims),
     )
     events = (*study.train, *study.held_out)
     notes = dict.fromkeys(note for event in events for note in event.record.notes)
@@ -92,21 +92,21 @@ def _place(part: str) -> str:
     return f"{kind.capitalize()} {part[len(kind) :]}".strip()
 
 
-def equations_section(sheet: Report, study: Study) -> None:
+def add_equations(sheet: Report, study: Study) -> None:
     """Add what the printed values give in the printed equations."""
     sheet.heading("What is printed, in the printed equations")
     sheet.table(
         ["where", "printed", "what the equation gives", "verdict"],
         [
             [c.where, c.printed, c.gives, "agrees" if c.holds else "does not agree"]
-            for c in equations.checks()
+            for c in equations.check_printed_numbers()
         ],
         "Table 2 is the first column of Table 3. Order: measured on an oscillator. Tail exponent:"
         " of 200,000 steps.",
         words=(1, 2, 3),
     )
     sheet.heading("What the model says to Table 3", 3)
-    refusals = equations.refusals(study.problem.model, study.problem.drive)
+    refusals = equations.list_refusals(study.problem.model, study.problem.drive)
     sheet.items(
         [f"{LABELS[name]}: {sentence or 'accepted'}" for name, sentence in refusals.items()]
     )
@@ -118,18 +118,18 @@ def equations_section(sheet: Report, study: Study) -> None:
     )
 
 
-def readings_section(sheet: Report, study: Study) -> None:
+def add_readings(sheet: Report, study: Study) -> None:
     """Add how the text was read."""
     sheet.heading("The readings of the text")
     rows = [
         [
             READINGS[name].words,
-            *(middle(study.objectives(n)) for n in (name.replace("issa", "ssa", 1), name)),
+            *(format_middle(study.objectives(n)) for n in (name.replace("issa", "ssa", 1), name)),
         ]
         for name in BOTH
     ]
     alone = ("issa_by_stage", "issa_printed_levy")
-    rows += [[READINGS[name].words, "", middle(study.objectives(name))] for name in alone]
+    rows += [[READINGS[name].words, "", format_middle(study.objectives(name))] for name in alone]
     sheet.table(
         ["reading", "SSA", "ISSA"],
         rows,
@@ -139,9 +139,9 @@ def readings_section(sheet: Report, study: Study) -> None:
         " section 3.2.3 by stage of the search.",
     )
     sheet.heading("ISSA without one of its ingredients", 3)
-    rows = [["ISSA", *_costs(study, "issa")]]
+    rows = [["ISSA", *_format_costs(study, "issa")]]
     for name, (_, label) in printed.INGREDIENTS.items():
-        rows.append([f"without {label}", *_costs(study, f"issa_no_{name}")])
+        rows.append([f"without {label}", *_format_costs(study, f"issa_no_{name}")])
     sheet.table(
         ["", "objective after 300 iterations [pu²]", "simulations"],
         rows,
@@ -159,25 +159,25 @@ def readings_section(sheet: Report, study: Study) -> None:
     )
 
 
-def _costs(study: Study, name: str) -> tuple[str, str]:
+def _format_costs(study: Study, name: str) -> tuple[str, str]:
     """The median objective and simulations of an optimizer."""
     spent = np.median([search.simulations for search in study.run_searches(name)])
-    return middle(study.objectives(name)), f"{spent:,.0f}"
+    return format_middle(study.objectives(name)), f"{spent:,.0f}"
 
 
 SECTIONS: dict[str, Callable[[Report, Study], None]] = {
-    "table1": table1,
-    "table2": table2,
-    "table3": table3,
+    "table1": add_table1,
+    "table2": add_table2,
+    "table3": add_table3,
     "table4": add_generalization_table("4", "interpolation", printed.INTERPOLATION),
     "table5": add_generalization_table("5", "extrapolation", printed.EXTRAPOLATION),
-    "figure3": figure3,
-    "figure4": figure4,
-    "figure6": figure6,
-    "figure8": figure8,
-    "figure9": figure9,
+    "figure3": add_figure3,
+    "figure4": add_figure4,
+    "figure6": add_figure6,
+    "figure8": add_figure8,
+    "figure9": add_figure9,
     "figure10": explain_held_out_figure("10", "interpolation"),
     "figure11": explain_held_out_figure("11", "extrapolation"),
-    "equations": equations_section,
-    "readings": readings_section,
+    "equations": add_equations,
+    "readings": add_readings,
 }

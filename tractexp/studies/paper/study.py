@@ -15,7 +15,11 @@ from tractexp.identification.search import Limits, SearchResult
 from tractexp.inference.problem import Problem
 from tractexp.record import Event
 from tractexp.studies import searches
-from tractexp.studies.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
+from tractexp.studies.comparison.statistics import (
+    compute_expected_running_time,
+    compute_vargha_delaney,
+    run_wilcoxon_test,
+)
 from tractexp.studies.paper import equations, maps, orders, printed, valleys
 from tractexp.studies.paper.printed import COMPARED, EQUAL, ITERATIONS, LITERAL, READINGS, TEN
 from tractexp.studies.search_store import SearchStore
@@ -182,7 +186,7 @@ class Study:
     def pair(self, first: str, second: str, by: str) -> OptimizerPair:
         """The test of two optimizers, p and Vargha and Delaney's A."""
         a, b = self.objectives(first, by), self.objectives(second, by)
-        return OptimizerPair(wilcoxon(a, b)[0], vargha_delaney(a, b))
+        return OptimizerPair(run_wilcoxon_test(a, b)[0], compute_vargha_delaney(a, b))
 
     def spent(self, name: str, target: float, by: str) -> tuple[np.ndarray, np.ndarray]:
         """The cost of each search until `target` times the floor or in all (seeds,), and whether it
@@ -200,7 +204,7 @@ class Study:
 
     def running_time(self, name: str, target: float, by: str) -> float:
         """Expected "iterations" or "simulations" to `target` times the floor."""
-        return expected_running_time(*self.spent(name, target, by))
+        return compute_expected_running_time(*self.spent(name, target, by))
 
     @functools.cached_property
     def ends(self) -> dict[str, valleys.Ends]:
@@ -353,16 +357,17 @@ class Study:
         self.tell("Figures 3 and 4: maps and flights")
         n, d = printed.POPULATION, len(printed.NAMES)
         return {
-            f"{n} points in {k} dimensions": dict(maps.discrepancies(n, k, ALPHAS)) for k in (d, 2)
+            f"{n} points in {k} dimensions": dict(maps.measure_discrepancies(n, k, ALPHAS))
+            for k in (d, 2)
         }
 
     @functools.cached_property
     def tails(self) -> dict[str, np.ndarray]:
         """Lévy steps of Eq. (15), {formula: (n,)}."""
-        return maps.tails()
+        return maps.draw_tails()
 
     @functools.cached_property
     def bias(self) -> dict[str, tuple[float, float]]:
         """How far searches are drawn to zero."""
         self.tell("section 5: the bias toward zero")
-        return equations.bias()
+        return equations.measure_bias()

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from tractexp.identification.result import ACCEPTED
-from tractexp.studies.comparison.statistics import vargha_delaney
+from tractexp.studies.comparison.statistics import compute_vargha_delaney
 from tractexp.studies.paper import equations, printed
 from tractexp.studies.paper.printed import LABELS
 from tractexp.studies.paper.study import BUDGETS, Study
@@ -19,11 +19,11 @@ from tractexp.studies.paper.verdict import (
     compare_ends,
     compare_final_values,
     decide,
+    format_fraction,
+    format_number,
+    list_readings,
     lower,
     merge_verdicts,
-    number,
-    percent,
-    readings_of,
 )
 
 # with an SSA read alike
@@ -36,7 +36,7 @@ def _is_ranked(best: float, second: float, worst: float) -> bool:
     return best * DIFFERENT < second and second * DIFFERENT < worst
 
 
-def table1(study: Study) -> list[Claim]:
+def claim_table1(study: Study) -> list[Claim]:
     """Accuracy, identifiability and size of the three motor orders."""
     third, first, second = (study.orders[m] for m in ("electromechanical", "mechanical", "voltage"))
     P, Q = ([o.spread("train")[c] for o in (third, first, second)] for c in (0, 1))
@@ -57,13 +57,13 @@ def table1(study: Study) -> list[Claim]:
         Claim(
             "table1",
             "P: the electromechanical model is better, the mechanical good, the voltage model bad",
-            "epsilon_p " + said.format(*map(percent, P)),
+            "epsilon_p " + said.format(*map(format_fraction, P)),
             CONFIRMED if ranked_P else REFUTED,
         ),
         Claim(
             "table1",
             "Q: the electromechanical model is better, the voltage model good, the mechanical bad",
-            "epsilon_q " + said.format(*map(percent, Q)),
+            "epsilon_q " + said.format(*map(format_fraction, Q)),
             CONFIRMED if ranked_Q else REFUTED,
         ),
         Claim(
@@ -92,7 +92,7 @@ def table1(study: Study) -> list[Claim]:
     ]
 
 
-def table2(study: Study) -> list[Claim]:
+def claim_table2(study: Study) -> list[Claim]:
     """The values ISSA identifies and their errors."""
     phrases = []
     worst = {}
@@ -101,11 +101,11 @@ def table2(study: Study) -> list[Claim]:
         P, Q = (np.array([getattr(f, e) for f in fits]) for e in ("epsilon_p", "epsilon_q"))
         worst[describe_reading(name)] = max(P.max(), Q.max())
         phrases.append(
-            f"{describe_reading(name)} medians {percent(np.median(P))} and "
-            f"{percent(np.median(Q))}, worst"
-            f" {percent(worst[describe_reading(name)])}"
+            f"{describe_reading(name)} medians {format_fraction(np.median(P))} and "
+            f"{format_fraction(np.median(Q))}, worst"
+            f" {format_fraction(worst[describe_reading(name)])}"
         )
-    sine = equations.steady_state_sine(printed.TABLE_3["issa"])
+    sine = equations.compute_steady_state_sine(printed.TABLE_3["issa"])
     accepted = {how: CONFIRMED if error < ACCEPTED else REFUTED for how, error in worst.items()}
     return [
         Claim(
@@ -137,14 +137,14 @@ def describe_reading(name: str) -> str:
     )
 
 
-def table3(study: Study) -> list[Claim]:
+def claim_table3(study: Study) -> list[Claim]:
     """Which optimizer ends lower, after as many iterations and after as many simulations."""
     claims = [*_compare_pairs(study), _compare_to_the_letter(study)]
     P, Q = (
         {n: np.median([getattr(s[0], e) for s in study.fits(n)]) for n in printed.COMPARED}
         for e in ("epsilon_p", "epsilon_q")
     )
-    said = "; ".join(f"{LABELS[n]} {percent(P[n])}, {percent(Q[n])}" for n in P)
+    said = "; ".join(f"{LABELS[n]} {format_fraction(P[n])}, {format_fraction(Q[n])}" for n in P)
     claims.append(
         Claim(
             "table3",
@@ -153,7 +153,7 @@ def table3(study: Study) -> list[Claim]:
             CONFIRMED if all(Q[n] < P[n] for n in P) else REFUTED,
         )
     )
-    gap = equations.consistency()
+    gap = equations.check_consistency()
     worst = max(gap.misses, key=lambda n: abs(gap.misses[n]))
     claims.append(
         Claim(
@@ -200,7 +200,7 @@ def claim_generalization(
         residuals = study.residuals(kind)
         own = [min(table, key=lambda n, c=c: table[n][c]) for c in (0, 1)]
         verdicts, phrases, good, worst = {}, [], {}, []
-        for how, names in readings_of("issa", "ssa").items():
+        for how, names in list_readings("issa", "ssa").items():
             errors = [
                 getattr(fits[e], name)
                 for fits in study.fits(names["issa"])
@@ -208,10 +208,13 @@ def claim_generalization(
                 for name in ("epsilon_p", "epsilon_q")
             ]
             good[how] = CONFIRMED if max(errors) < ACCEPTED else REFUTED
-            worst.append(f"{how} {percent(max(errors))}")
+            worst.append(f"{how} {format_fraction(max(errors))}")
             verdicts[how] = _judge_residuals(study, {n: residuals[names[n]] for n in names})
             middle = {n: np.median(residuals[names[n]], axis=0) for n in names}
-            pairs = (f"{LABELS[n]} {number(r[0])}, {number(r[1])}" for n, r in middle.items())
+            pairs = (
+                f"{LABELS[n]} {format_number(r[0])}, {format_number(r[1])}"
+                for n, r in middle.items()
+            )
             phrases.append(f"{how} {', '.join(pairs)}")
         return [
             Claim(
@@ -241,7 +244,7 @@ def _judge_residuals(study: Study, residuals: Mapping[str, np.ndarray]) -> str:
     return decide(study, all(lower(rivals)))
 
 
-def readings(study: Study) -> list[Claim]:
+def claim_readings(study: Study) -> list[Claim]:
     """Whether the ranking survives the readings, and whether the ingredients help."""
     both = [
         (study.objectives(name), study.objectives(name.replace("issa", "ssa", 1))) for name in BOTH
@@ -255,7 +258,8 @@ def readings(study: Study) -> list[Claim]:
     }
     helps = lower([(whole, ends) for ends in without.values()])
     factors = ", ".join(
-        f"{what} × {np.median(ends) / np.median(whole):.2f} (A = {vargha_delaney(whole, ends):.2f}"
+        f"{what} × {np.median(ends) / np.median(whole):.2f}"
+        f" (A = {compute_vargha_delaney(whole, ends):.2f}"
         + (")" if helped else ", not significant)")
         for (what, ends), helped in zip(without.items(), helps, strict=True)
     )
@@ -285,12 +289,12 @@ def readings(study: Study) -> list[Claim]:
     ]
 
 
-def agreement(study: Study) -> list[Claim]:
+def claim_agreement(study: Study) -> list[Claim]:
     """The claims on printed values against the printed equations."""
-    checks = equations.checks()
+    checks = equations.check_printed_numbers()
     failed = [check for check in checks if not check.holds]
     wrong = equations.order(equations.step_as_printed)
-    right = equations.order(equations.classical)
+    right = equations.order(equations.step_classically)
     return [
         Claim(
             "equations",

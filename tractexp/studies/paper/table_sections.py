@@ -9,7 +9,7 @@ from tractexp.blocks import Report
 from tractexp.studies.paper import printed
 from tractexp.studies.paper.printed import COMPARED, LABELS, LITERAL, READINGS, TEN, label
 from tractexp.studies.paper.study import BUDGETS, FLOOR_FACTOR, LEVEL, Study
-from tractexp.studies.paper.verdict import PAIRS, middle, number
+from tractexp.studies.paper.verdict import PAIRS, format_middle, format_number
 
 TO_THE_LETTER = (
     "To the letter: Eqs. (4), (12) and (15) as they are printed, in raw units, every move taken, SD"
@@ -19,7 +19,7 @@ TO_THE_LETTER = (
 THREE = ("paper", "one", "median")
 
 
-def table1(sheet: Report, study: Study) -> None:
+def add_table1(sheet: Report, study: Study) -> None:
     """Add three orders of the motor."""
     sheet.heading("Table 1: three orders of the motor")
     sheet.text(
@@ -102,7 +102,7 @@ def _list_values(study: Study, reading: str, place: int | None) -> list[float]:
     return [] if place is None else [one.values[place] for one in study.run_searches(reading)]
 
 
-def _rows_of_parameters(study: Study, columns: Sequence[tuple[str, str]]) -> list[list[str]]:
+def _list_parameter_rows(study: Study, columns: Sequence[tuple[str, str]]) -> list[list[str]]:
     """One row for each parameter and error; a column is a reading and "paper", "one" (seed 0) or
     "median" of it.
     """
@@ -135,36 +135,41 @@ def _render_cell(values: Any, what: str, table: Any = None, name: str = "") -> s
     """A cell: what the paper prints, the value of seed 0, or the median."""
     if what == "paper":
         return f"{table[name]:g}"
-    return number(float(values[0] if what == "one" else np.median(values))) if len(values) else "-"
+    return (
+        format_number(float(values[0] if what == "one" else np.median(values)))
+        if len(values)
+        else "-"
+    )
 
 
-def _parameters(
+def _add_parameters(
     sheet: Report, study: Study, columns: Sequence[tuple[str, str]], caption: str
 ) -> None:
     captions = {"paper": "the paper", "one": "one run", "median": "median"}
     heads = [f"{label(name)}, {captions[what]}" for name, what in columns]
-    sheet.table(["", "bounds", *heads], _rows_of_parameters(study, columns), caption)
+    sheet.table(["", "bounds", *heads], _list_parameter_rows(study, columns), caption)
 
 
-def table2(sheet: Report, study: Study) -> None:
+def add_table2(sheet: Report, study: Study) -> None:
     """Add what ISSA identifies."""
     sheet.heading("Table 2: what ISSA identifies")
     others = [(name, "median") for name in (TEN["issa"], LITERAL["issa"])]
-    _parameters(
+    _add_parameters(
         sheet,
         study,
         [*(("issa", what) for what in THREE), *others],
-        f"The lowest objective known on this record is {number(study.reference.objective)} pu²,"
-        f" found by least squares from many starts in {study.reference.simulations:,} simulations."
+        "The lowest objective known on this record is"
+        f" {format_number(study.reference.objective)} pu², found by least squares from"
+        f" many starts in {study.reference.simulations:,} simulations."
         " Errors are fractions. Bounds are ours, in s, pu, 1, pu s²/rad, pu, 1 and 1: the paper"
         " prints none. " + TO_THE_LETTER,
     )
 
 
-def table3(sheet: Report, study: Study) -> None:
+def add_table3(sheet: Report, study: Study) -> None:
     """Add ISSA, SSA and PSO."""
     sheet.heading("Table 3: ISSA, SSA and PSO")
-    _parameters(
+    _add_parameters(
         sheet,
         study,
         [(name, what) for name in COMPARED for what in THREE],
@@ -172,7 +177,7 @@ def table3(sheet: Report, study: Study) -> None:
         " end in different valleys (see Figure 9). Bounds are ours; the paper prints none.",
     )
     others = (*TEN.values(), "pso_limited", *LITERAL.values())
-    _parameters(
+    _add_parameters(
         sheet, study, [(name, "median") for name in others], f"The other readings. {TO_THE_LETTER}"
     )
     sheet.table(
@@ -185,10 +190,10 @@ def table3(sheet: Report, study: Study) -> None:
             f"objective after {study.equal:,} simulations",
             "s per search",
         ],
-        [_spent(study, name) for name in (*LEVEL, *LITERAL.values())],
-        f"Median (best .. worst) of {study.seeds} seeds. The floor is {number(study.floor)} pu²; at"
-        f" the floor means within {FLOOR_FACTOR:g} times. ISSA simulates its flock about twice in"
-        f" an iteration: by iterations it has twice the means. Searches of {study.equal:,}"
+        [_list_spent(study, name) for name in (*LEVEL, *LITERAL.values())],
+        f"Median (best .. worst) of {study.seeds} seeds. The floor is {format_number(study.floor)}"
+        f" pu²; at the floor means within {FLOOR_FACTOR:g} times. ISSA simulates its flock about"
+        f" twice in an iteration: by iterations it has twice the means. Searches of {study.equal:,}"
         " simulations are laid out for them, so that every schedule runs whole.",
     )
     rows = []
@@ -199,18 +204,18 @@ def table3(sheet: Report, study: Study) -> None:
     sheet.table(["pair", "p", "A"], rows, "SD = 20, no velocity limit; p is not corrected here.")
 
 
-def _spent(study: Study, name: str) -> list[str]:
+def _list_spent(study: Study, name: str) -> list[str]:
     """A row of what searches of a reading spend and where they end."""
     searches, literal = study.run_searches(name), READINGS[name].literal
     ends = study.objectives(name)
     each = np.median([f.simulations / max(f.iterations, 1) for f in searches])
     return [
         label(name),
-        middle(ends),
+        format_middle(ends),
         f"{np.median([f.simulations for f in searches]):,.0f}",
         f"{each:.0f}",
         "-" if literal else f"{np.mean(ends <= FLOOR_FACTOR * study.floor):.0%}",
-        "-" if literal else middle(study.objectives(name, "simulations")),
+        "-" if literal else format_middle(study.objectives(name, "simulations")),
         f"{np.median([f.seconds for f in searches]):.2f}",
     ]
 
@@ -230,7 +235,11 @@ def add_generalization_table(
             cells = [
                 cell
                 for c in (0, 1)
-                for cell in (f"{own[c]:g}" if own else "", number(ours[0, c]), middle(ours[:, c]))
+                for cell in (
+                    f"{own[c]:g}" if own else "",
+                    format_number(ours[0, c]),
+                    format_middle(ours[:, c]),
+                )
             ]
             rows.append([label(name), *cells])
         sheet.table(

@@ -8,9 +8,9 @@ import numpy as np
 from tractexp.studies.comparison.statistics import (
     LEAST_SEEDS,
     SIGNIFICANCE_LEVEL,
-    holm,
-    vargha_delaney,
-    wilcoxon,
+    compute_vargha_delaney,
+    correct_by_holm,
+    run_wilcoxon_test,
 )
 from tractexp.studies.paper import printed
 from tractexp.studies.paper.study import Study
@@ -39,7 +39,7 @@ class Claim:
         return self.verdict.partition(":")[0]
 
 
-def number(value: float) -> str:
+def format_number(value: float) -> str:
     """Three digits, all of a large number's, or a word where there is none."""
     if not np.isfinite(value):
         return "never"
@@ -48,13 +48,13 @@ def number(value: float) -> str:
     return f"{value:.3g}" if abs(value) >= 1e-3 or value == 0 else f"{value:.2e}"
 
 
-def middle(values: Sequence[float] | np.ndarray) -> str:
+def format_middle(values: Sequence[float] | np.ndarray) -> str:
     """The median and, in brackets, lowest and highest."""
     low, middle, high = np.quantile(values, (0, 0.5, 1))
-    return f"{number(middle)} ({number(low)} .. {number(high)})"
+    return f"{format_number(middle)} ({format_number(low)} .. {format_number(high)})"
 
 
-def percent(value: float) -> str:
+def format_fraction(value: float) -> str:
     """A fraction in percent with two digits."""
     return f"{100 * value:.2f} %"
 
@@ -65,13 +65,13 @@ def compare_ends(study: Study, first: str, second: str, by: str) -> tuple[str, s
     """
     verdicts = {}
     phrases = []
-    for how, names in readings_of(first, second).items():
+    for how, names in list_readings(first, second).items():
         verdicts[how], numbers = compare_final_values(study, names, (first, second), by)
         phrases.append(f"{how} {numbers}")
     return merge_verdicts(verdicts), "; ".join(phrases)
 
 
-def readings_of(first: str, second: str) -> dict[str, dict[str, str]]:
+def list_readings(first: str, second: str) -> dict[str, dict[str, str]]:
     """How the paper can be read where it matters to these two: {how: {optimizer: reading}}."""
     own = {name: name for name in printed.COMPARED}
     readings = {"with SD = 20 (section 4.3)": own}
@@ -98,11 +98,12 @@ def compare_final_values(
 ) -> tuple[str, str]:
     """Whether the first of a pair ends lower, the three optimizers read as `names` says."""
     three = [study.pair(names[a], names[b], by) for a, b in PAIRS]
-    corrected = dict(zip(PAIRS, holm([each.p for each in three]), strict=True))
+    corrected = dict(zip(PAIRS, correct_by_holm([each.p for each in three]), strict=True))
     p = corrected[pair]
     A = three[PAIRS.index(pair)].A
     medians = [float(np.median(study.objectives(names[name], by))) for name in pair]
-    numbers = f"medians {number(medians[0])} and {number(medians[1])} pu², p = {p:.2g}, A = {A:.2f}"
+    lower, higher = map(format_number, medians)
+    numbers = f"medians {lower} and {higher} pu², p = {p:.2g}, A = {A:.2f}"
     return decide(study, p < SIGNIFICANCE_LEVEL and A > 0.5), numbers
 
 
@@ -115,8 +116,8 @@ def lower(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[bool]:
     """Whether the first values (seeds,) of each pair are lower than the second, corrected for all
     pairs.
     """
-    corrected = holm([wilcoxon(a, b)[0] for a, b in pairs])
+    corrected = correct_by_holm([run_wilcoxon_test(a, b)[0] for a, b in pairs])
     return [
-        p < SIGNIFICANCE_LEVEL and vargha_delaney(a, b) > 0.5
+        p < SIGNIFICANCE_LEVEL and compute_vargha_delaney(a, b) > 0.5
         for p, (a, b) in zip(corrected, pairs, strict=True)
     ]

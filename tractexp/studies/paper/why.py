@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 from tractexp.studies.comparison.statistics import (
     SIGNIFICANCE_LEVEL,
-    holm,
-    vargha_delaney,
-    wilcoxon,
+    compute_vargha_delaney,
+    correct_by_holm,
+    run_wilcoxon_test,
 )
 from tractexp.studies.paper.study import OptimizerPair, Shares, Study
 
 SPARROWS, RIVAL = ("issa", "ssa"), "pso"
 
 
-def fisher(a: Shares, b: Shares, of: str) -> float:
+def run_fisher_test(a: Shares, b: Shares, of: str) -> float:
     """Two-sided p of Fisher's exact test: as many searches of both reach the "valley" or the
     "floor".
     """
@@ -26,9 +26,11 @@ def fisher(a: Shares, b: Shares, of: str) -> float:
     return float(fisher_exact(rows)[1])  # type: ignore[arg-type]
 
 
-def significant(pairs: Sequence[OptimizerPair], k: int) -> bool:
+def is_significant(pairs: Sequence[OptimizerPair], k: int) -> bool:
     """Whether the first of pair k ends lower, corrected for all pairs."""
-    return bool(holm([pair.p for pair in pairs])[k] < SIGNIFICANCE_LEVEL and pairs[k].A > 0.5)
+    return bool(
+        correct_by_holm([pair.p for pair in pairs])[k] < SIGNIFICANCE_LEVEL and pairs[k].A > 0.5
+    )
 
 
 @dataclass(frozen=True)
@@ -66,25 +68,27 @@ class Lack:
 
 def compare_with_ssa(study: Study) -> list[Lack]:
     """ISSA's and SSA's; the p-values are corrected over the tests of both."""
-    tests = [test for name in SPARROWS for test in _tests(study, name)]
-    corrected = holm([test.p for test in tests]).tolist()
+    tests = [test for name in SPARROWS for test in _list_tests(study, name)]
+    corrected = correct_by_holm([test.p for test in tests]).tolist()
     final = [Test(p, test.less) for p, test in zip(corrected, tests, strict=True)]
     each = len(final) // len(SPARROWS)
     return [Lack(name, *final[each * k : each * (k + 1)]) for k, name in enumerate(SPARROWS)]
 
 
-def _tests(study: Study, name: str) -> list[Test]:
+def _list_tests(study: Study, name: str) -> list[Test]:
     """Not yet corrected."""
     own, control = study.shares(name), study.control_shares
     rival, best = (study.shares(other) for other in (RIVAL, "random_search"))
     above, beside = study.above_bottom(name), study.above_bottom(RIVAL)
     ended, other = study.ends[name].objective, study.ends[RIVAL].objective
     return [
-        Test(wilcoxon(above, beside)[0], vargha_delaney(above, beside) < 0.5),
-        Test(fisher(own, rival, "valley"), own.valley < rival.valley),
-        Test(fisher(own, control, "valley"), own.valley * control.n < control.valley * own.n),
-        Test(fisher(own, best, "valley"), own.valley < best.valley),
-        Test(wilcoxon(ended, other)[0], vargha_delaney(ended, other) < 0.5),
+        Test(run_wilcoxon_test(above, beside)[0], compute_vargha_delaney(above, beside) < 0.5),
+        Test(run_fisher_test(own, rival, "valley"), own.valley < rival.valley),
+        Test(
+            run_fisher_test(own, control, "valley"), own.valley * control.n < control.valley * own.n
+        ),
+        Test(run_fisher_test(own, best, "valley"), own.valley < best.valley),
+        Test(run_wilcoxon_test(ended, other)[0], compute_vargha_delaney(ended, other) < 0.5),
     ]
 
 
