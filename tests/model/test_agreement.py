@@ -1,4 +1,4 @@
-"""What each event tells and which does not belong, `claim_agreement`: planted faults, and what they
+"""What each event tells and which does not belong, `agreement`: planted faults, and what they
 cost.
 """
 

@@ -493,7 +493,7 @@ memory.munmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t]
 UNUSED = 0x4022  # private, of no file, and never reserved: it costs addresses alone
 room = lambda size: memory.mmap(None, size, 0, UNUSED, -1, 0)
 
-objects.load(steady.text(2))
+objects.load(steady.write_steady(2))
 far, pieces = room(4 << 30), []
 for size in (1 << 24, 1 << 20, 1 << 16, 1 << 12):  # all that is free above is taken
     while (piece := room(size)) > far:
@@ -502,7 +502,7 @@ for size in (1 << 24, 1 << 20, 1 << 16, 1 << 12):  # all that is free above is t
 for piece, size in [entry for entry in pieces if entry[1] > 1 << 12][:3]:  # but single pages
     memory.munmap(piece + (1 << 13), 1 << 12)
 for width in (4, 8):
-    objects.load(steady.text(width))
+    objects.load(steady.write_steady(width))
 """
 
 
