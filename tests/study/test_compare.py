@@ -159,11 +159,11 @@ def test_runs_that_all_reach_the_floor_are_equal_whatever_is_left_of_rounding():
 
 
 def test_the_order_of_the_runs_does_not_matter():
-    from tractexp.studies.comparison.page import build_comparison_content
+    from tractexp.studies.comparison.page import build_content
 
     runs = [*samples({"good": 1.0, "bad": 2.0, "other": 1.05}), a_failure("bad", 99)]
     shuffled = [runs[i] for i in np.random.default_rng(0).permutation(len(runs))]
-    texts = [json.dumps(build_comparison_content(compared(r), "x")) for r in (runs, shuffled)]
+    texts = [json.dumps(build_content(compared(r), "x")) for r in (runs, shuffled)]
     assert texts[0] == texts[1]
 
 

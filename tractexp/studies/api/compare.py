@@ -105,7 +105,7 @@ def compare(
         "bbob": bbob,
     }
     source, comparison = compare_gathered_runs(searches, **call, cores=cores, progress=progress)
-    content = find_page_module(comparison).content(comparison, source)
+    content = find_page_module(comparison).build_content(comparison, source)
     return ComparisonResult(call, source, content, comparison, searches)
 
 

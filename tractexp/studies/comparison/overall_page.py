@@ -191,7 +191,7 @@ def _add_reading(page: Report) -> Report:
     )
 
 
-def build_overall_content(several: Several, source: str) -> dict[str, Any]:
+def build_content(several: Several, source: str) -> dict[str, Any]:
     """The content of `comparison.json`: each problem as if it were alone, and all together."""
     return files.make_plain(
         {
@@ -201,8 +201,7 @@ def build_overall_content(several: Several, source: str) -> dict[str, Any]:
             "notes": several.notes,
             "overall": several.overall,
             "problems": {
-                label: one.build_comparison_content(c, source)
-                for label, c in several.comparisons.items()
+                label: one.build_content(c, source) for label, c in several.comparisons.items()
             },
         }
     )

@@ -354,7 +354,7 @@ def _add_reading(page: Report, comparison: Comparison) -> None:
     )
 
 
-def build_comparison_content(comparison: Comparison, source: str) -> dict[str, Any]:
+def build_content(comparison: Comparison, source: str) -> dict[str, Any]:
     """The content of `comparison.json`: every number of the page. What is not finite is None."""
     failed, interrupted = _list_runs_without_result(comparison)
     polished = comparison.polished
