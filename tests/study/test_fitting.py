@@ -36,7 +36,7 @@ def test_fits_and_what_they_spend_do_not_depend_on_the_number_of_cores(monkeypat
     """
     fit = fit_base_model(bench(base(), events(), ("stator_resistance",)))
     moved = np.clip(fit.fit.unit + np.linspace(-0.02, 0.02, 9)[:, None], 0.0, 1.0)
-    monkeypatch.setattr(fitting.store, "key", lambda *_: "")  # nothing is taken from the store
+    monkeypatch.setattr(fitting.store, "compute_key", lambda *_: "")  # nothing is stored
     found = []
     for number in (1, 3):
         monkeypatch.setattr(cores, "count_cores", lambda number=number: number)
