@@ -20,6 +20,7 @@ OMEGA_N, P0, Q0 = 100 * np.pi, drives.P0, drives.Q0
 OMEGA = OMEGA_N - 1.5  # of the frame of the drives
 NAMES = sorted(discover()["effect"])
 PHASORS_ONLY = {
+    "inductive_static_load",
     "frequency_dependence",
     "measurement_window",
     "negative_sequence_braking",
