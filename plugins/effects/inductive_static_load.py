@@ -54,19 +54,18 @@ class InductiveStaticLoad(Effect):
 
     def edit(self, eq, inductive_share, inductive_time):
         import sympy
-        from sympy import I, conjugate, im, re
+        from sympy import I, im, re
 
         u, P_s = eq[sites.static_voltage], eq.expression(sites.P_static)
         more = eq.lag_vector("inductive_current", "y")
-        current = eq.P_s0 + more
-        pole_0 = 1 / inductive_time + I * (eq.omega_n + eq.omega_s0)
+        turn_0 = eq.omega_n + eq.omega_s0
+        pole_0 = 1 / inductive_time + I * turn_0
         pole = 1 / inductive_time + I * (eq.omega_n + eq.omega_s)
         at_rest = P_s / sympy.Max(u, EMPTY_VOLTAGE)
-        eq.moves(more, pole_0 * at_rest - pole * current, 0)
-        excess = eq.define(
-            "inductive_excess",
-            inductive_share * inductive_time * pole_0 * (u * conjugate(current) - P_s),
-            "s_{ex}",
-        )
-        eq.edit(sites.P_static, lambda P: P + re(excess))
-        eq.edit(sites.Q_static, lambda Q: Q + im(excess))
+        eq.moves(more, pole_0 * at_rest - pole * (eq.P_s0 + more), 0)
+        # s_L T_L a_0 (u conj(P_s0 + y) - P_s) by its parts: the power of a voltage is real
+        in_phase = u * (eq.P_s0 + re(more)) - P_s
+        across = u * im(more)
+        reactance = inductive_time * turn_0
+        eq.edit(sites.P_static, lambda P: P + inductive_share * (in_phase + reactance * across))
+        eq.edit(sites.Q_static, lambda Q: Q + inductive_share * (reactance * in_phase - across))

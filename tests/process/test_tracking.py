@@ -722,7 +722,7 @@ def test_the_process_that_was_started_ahead_is_the_one_that_logs(uri):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="asks for a process by a signal")
-@pytest.mark.parametrize("told", ["", "process.logger(sys.argv[1]); "])
+@pytest.mark.parametrize("told", ["", "process.open_logger(sys.argv[1]); "])
 def test_a_command_that_logs_nothing_waits_for_nothing_and_leaves_no_word(told, uri, tmp_path):
     program = (
         "import sys, time; from tractexp.tracking import process; process.start_ahead();"

@@ -13,12 +13,11 @@ from tractexp.inference.promising import select_promising_starts
 TRIP = ("undervoltage_trip",)
 
 
-@pytest.fixture(scope="module")
-def planted():
-    """The bench of a trip of 5 %, its base fit, and a start at each setting of the catalogue's
-    grid.
+def plant(seed):
+    """The bench of a trip of 5 %, its base fit's noise, a start at each setting of the catalogue's
+    grid, and the nuisances.
     """
-    made = events("undervoltage_trip", 0.5, 800012, noise=LOUD, recorder=FAST)
+    made = events("undervoltage_trip", 0.5, seed, noise=LOUD, recorder=FAST)
     first = fitted_base(made, TRIP)
     at = first.context
     settings = at.catalogue["undervoltage_trip"].settings
@@ -30,18 +29,26 @@ def planted():
     return at, first.noise, units, [*coordinates.base, *coordinates.before, *faults]
 
 
-def test_the_best_of_all_descents_begins_at_a_start_that_promises(planted):
-    at, noise, units, nuisances = planted
-    kept = select_promising_starts(at, noise, TRIP, units, nuisances, fit_effort.MOST_STARTS)
-    assert len(units) == 2 * fit_effort.MOST_STARTS
-    assert len(kept) == fit_effort.MOST_STARTS
-    best = lambda these: min(  # noqa: E731
-        f.deviance
-        for f in fitting.run_descents(
-            at, noise, [(TRIP, u) for u in these], None, fit_effort.ROUGH_DESCENT
+@pytest.fixture(scope="module")
+def planted():
+    return plant(800012)
+
+
+def test_the_best_descents_begin_at_starts_that_promise():
+    """Of the five best of sixteen, half would be among the eight that are kept by chance, in six
+    data sets 15 of 30, and 22 or more in one of 400.
+    """
+    best_kept = 0
+    for seed in range(800012, 800018):
+        at, noise, units, nuisances = plant(seed)
+        kept = select_promising_starts(at, noise, TRIP, units, nuisances, fit_effort.MOST_STARTS)
+        assert (len(units), len(kept)) == (2 * fit_effort.MOST_STARTS, fit_effort.MOST_STARTS)
+        ends = fitting.run_descents(
+            at, noise, [(TRIP, unit) for unit in units], None, fit_effort.ROUGH_DESCENT
         )
-    )
-    assert best(kept) == pytest.approx(best(units), abs=1.0)
+        best = np.argsort([end.deviance for end in ends])[:5]
+        best_kept += sum(any(np.array_equal(units[k], one) for one in kept) for k in best)
+    assert best_kept >= 22
 
 
 def test_what_changes_nothing_promises_least(planted):
