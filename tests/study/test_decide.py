@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from made_sets import CONFIRMED, DENIED, MILD, beside_base, fitted, held_out, off, row, table
 
+from tractexp.configuration.plugin import get
 from tractexp.discrepancy.decide import decide
 from tractexp.discrepancy.ranking import beats, find_nearest, rank_sets
 from tractexp.inference.criteria import Criteria
@@ -128,15 +129,15 @@ def test_the_page_s_own_numbers_give_the_verdict_that_it_tells():
             for what in ("behind", "p_left", "gain", "expected", "all p_left", "all behind")
         )
         of_all = {"p_of_all": p_of_all, "behind_of_all": behind_of_all}
-        rows.append(
-            row(
-                name.strip("`"),
-                behind=behind,
-                p_left=p_left,
-                gap=held_out(gain, expected),
-                **of_all,
-            )
+        effect = get("effect", name.strip("`"))
+        one = row(
+            effect.name,
+            behind=behind,
+            p_left=p_left,
+            gap=held_out(gain, expected),
+            **of_all,
         )
+        rows.append(replace(one, family=(effect.family or effect.name,)))
     assert word(*rows) == ("named", (("undervoltage_trip",),))
 
 
