@@ -275,10 +275,11 @@ def test_the_line_of_the_readme_names_the_stator_transients_and_closes_the_gap_o
 
 
 @pytest.mark.long  # the default order is the tutorial's
-@pytest.mark.parametrize("fitted", [(30, 65), (50, 65)])
-def test_in_other_orders_the_window_is_found_too_and_no_skew_is_named(fitted):
+@pytest.mark.parametrize(("fitted", "window"), [((30, 65), None), ((50, 65), 0.02)])
+def test_in_other_orders_no_skew_is_named_either(fitted, window):
     """With its level taken as known, and too few coefficients for an average over ten samples,
-    noise passed for an oscillation behind the right window: p 2.7e-4 and 1e-4.
+    noise passed for an oscillation behind the right window: p 2.7e-4 and 1e-4. In the first order
+    that window leaves a skew at p 4e-7, so it is not believed.
     """
     (held,) = {30, 50, 65} - {*fitted}
     train, validate = (
@@ -286,5 +287,5 @@ def test_in_other_orders_the_window_is_found_too_and_no_skew_is_named(fitted):
     )
     found = tractexp.investigate(train, validate=validate, progress=False)
     assert (found.verdict, found.names) == ("named", ("stator_transients",)), found.reason
-    assert found.content["phasor_window"] == pytest.approx(0.02)
+    assert found.content["phasor_window"] == (window and pytest.approx(window))
     assert found.content["adequacy"]["grade"] == "adequate"
