@@ -146,7 +146,7 @@ def test_levels_are_drawn_as_far_off_as_quiet_samples_tell_them(memory):
     rng = np.random.default_rng(5)
     stretches = noise.draw(rng, 4000, [400])
     seen = np.sqrt((stretches**2).mean(axis=(1, 2))) * (1 - memory**2) ** 0.5
-    drawn = noise.draw_levels(rng, 4000, 400)
+    drawn = noise.draw_levels(rng, 4000, [slice(0, 400)])
     assert np.mean(drawn**2) == pytest.approx(1.0, abs=0.02)
     assert 0.9 < drawn.std() / seen.std() < 2.1  # a colored one's worth is that of its slowest part
 

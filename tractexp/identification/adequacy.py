@@ -126,8 +126,8 @@ def run_residual_test(
     rng = np.random.default_rng(JUDGEMENT_SEED)
     drawn = likelihood.noise.draw(rng, FIT_DRAWS, np.diff(observed.drive.first).tolist())
     drawn *= likelihood.valid
-    quiet = sum(part.stop - part.start for part in observed.problem.quiet)
-    drawn /= likelihood.noise.draw_levels(rng, FIT_DRAWS, quiet)[:, None, None]
+    levels = likelihood.noise.draw_levels(rng, FIT_DRAWS, observed.problem.quiet)
+    drawn /= levels[:, None, None]
     basis = J.basis()
     split = build_event_basis(J, steady)
 

@@ -110,8 +110,7 @@ def draw_chance(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> Ch
     """
     rng = np.random.default_rng(seed)
     white = _draw_white(t, noise, rng)
-    quiet = sum(part.stop - part.start for part in t.context.problem.quiet)
-    levels = noise.draw_levels(rng, NULL_DRAWS, quiet)
+    levels = noise.draw_levels(rng, NULL_DRAWS, t.context.problem.quiet)
     projection = own.replace_residuals(white / levels[:, None])
     p = projection.least_p
     if noise.loudest_input_mode <= BLURRED:

@@ -239,12 +239,15 @@ class Noise:
         spreads = [a.deviation[0] / a.deviation[-1] for a in channels]
         return samples / max(1.0, *((g / s) ** 2 for g, s in zip(gains, spreads, strict=True)))
 
-    def draw_levels(self, rng: np.random.Generator, count: int, samples: int) -> np.ndarray:
-        """Draws (count,) of the noise's level as so many quiet samples tell it, over the true one.
+    def draw_levels(
+        self, rng: np.random.Generator, count: int, quiet: Sequence[slice]
+    ) -> np.ndarray:
+        """Draws (count,) of the noise's level as quiet stretches tell it, over the true one.
 
         Its square is chi-squared over its degrees of freedom: two channels of as many independent
         samples as this noise lets these be worth.
         """
+        samples = sum(part.stop - part.start for part in quiet)
         freedom = 2 * max(self.worth(samples), FEWEST_WORTH)
         return np.sqrt(rng.chisquare(freedom, count) / freedom)
 

@@ -193,8 +193,8 @@ def _find_heavy_tails(unit: np.ndarray) -> np.ndarray | None:
 
 @functools.cache
 def _compute_quantiles(freedom: float) -> np.ndarray:
-    """Quantiles of Student's t, of unit variance; once for each of `DEGREES`, since draws estimate
-    their noise anew.
+    """Quantiles of Student's t, of unit variance; once for each of `DEGREES`, since each fit
+    estimates its noise.
     """
     from scipy.special import stdtrit
 
