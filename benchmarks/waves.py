@@ -147,20 +147,19 @@ def told_at_truth(event, truth: dict[str, float]) -> dict[str, float]:
     from tractexp.identification.residual_noise import estimate_noise_at
     from tractexp.identification.uncertainty import conclude
     from tractexp.inference.likelihood import Likelihood
-    from tractexp.inference.observed import Observed
     from tractexp.inference.problem import Problem
     from tractexp.model.model import compose
 
     load = compose(
         get("model/motor", "stator_flux")(), get("model/static", "branch")(), domain="waves"
     )
-    observed = Observed.from_problem(Problem(load, [event]))
-    likelihood = Likelihood.from_problem(observed.problem)
-    values = np.array([truth[n] for n in observed.problem.space.names])
+    problem = Problem(load, [event])  # its voltages are as recorded: those of waveforms are
+    likelihood = Likelihood.from_problem(problem)
+    values = np.array([truth[n] for n in problem.space.names])
     unit = likelihood.to_unit(values)[0]
-    noise = estimate_noise_at(observed, likelihood, unit, observed.input_errors(values))
+    noise = estimate_noise_at(likelihood, unit, problem.domain.input_errors(problem, values))
     errors = conclude(replace(likelihood, noise=noise), unit).information.standard_errors
-    return dict(zip(observed.problem.space.names, (errors / values).tolist(), strict=True))
+    return dict(zip(problem.space.names, (errors / values).tolist(), strict=True))
 
 
 def left(kind: str, share: float) -> tuple[complex, complex, complex]:

@@ -12,7 +12,6 @@ from printed_events import one_dip, problem, records
 from tractexp.identification import adequacy
 from tractexp.inference import goodness_of_fit
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.observed import Observed
 
 
 @pytest.fixture(scope="module")
@@ -44,25 +43,23 @@ def test_what_is_judged_is_the_estimate_against_all_draws(known, monkeypatch):
         return 1.0
 
     monkeypatch.setattr(goodness_of_fit, "compute_tail_p", count_draws)
-    adequacy.run_residual_test(
-        Observed.from_problem(known.likelihood.problem), known.likelihood, known.unit
-    )
+    adequacy.run_residual_test(known.likelihood, known.unit)
     assert {*judged} == {(adequacy.FIT_DRAWS, 1)}
 
 
 def test_p_of_noise_alone_is_no_smaller_than_it_says(known):
     """40 judgements of noise drawn anew: one in ten below 0.1, give or take."""
-    observed = Observed.from_problem(known.likelihood.problem)
-    clean = known.likelihood.residuals(known.unit[None])[0] + observed.drive.measurements
+    problem = known.likelihood.problem
+    clean = known.likelihood.residuals(known.unit[None])[0] + problem.drive.measurements
     rng, p = np.random.default_rng(2), []
     for _ in range(40):
         drive = replace(
-            observed.drive, measurements=clean + 0.004 * rng.standard_normal(clean.shape)
+            problem.drive, measurements=clean + 0.004 * rng.standard_normal(clean.shape)
         )
-        noisy = observed.problem.driven_by(observed.problem.events)
+        noisy = problem.driven_by(problem.events)
         noisy.drive = drive
         again = replace(known.likelihood, problem=noisy)
-        p.append(adequacy.run_residual_test(replace(observed, problem=noisy), again, known.unit).p)
+        p.append(adequacy.run_residual_test(again, known.unit).p)
     assert 0.0 <= np.mean(np.array(p) < 0.1) < 0.25
     assert min(p) > goodness_of_fit.ADEQUATE_P
 
@@ -75,8 +72,7 @@ def test_a_model_that_takes_its_error_for_slow_noise_is_found_out_by_least_squar
     squares = Likelihood.of_squares(likelihood.problem, 0.004)
     rows = squares.with_initial_power.rows(known.unit[None])[0]
     least = float(rows @ rows)
-    observed = Observed.from_problem(likelihood.problem)
-    agree = adequacy.run_residual_test(observed, likelihood, known.unit, squares, least)
-    apart = adequacy.run_residual_test(observed, likelihood, known.unit, squares, least / 2)
+    agree = adequacy.run_residual_test(likelihood, known.unit, squares, least)
+    apart = adequacy.run_residual_test(likelihood, known.unit, squares, least / 2)
     assert agree.p > goodness_of_fit.ADEQUATE_P
     assert (apart.loudest, apart.p < goodness_of_fit.ADEQUATE_P) == (adequacy.APART, True)

@@ -27,7 +27,6 @@ from tractexp.inference.goodness_of_fit import (
 from tractexp.inference.least_squares import MOST_NUMBERS
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import ModelError, describe_stall
-from tractexp.inference.observed import Observed
 from tractexp.inference.problem import Problem
 from tractexp.inference.residual_statistics import PER_EVENT
 from tractexp.inference.sandwich import is_off_bounds
@@ -91,7 +90,6 @@ class Adequacy:
 
 
 def run_residual_test(
-    observed: Observed,
     likelihood: Likelihood,
     unit: np.ndarray,
     squares: Likelihood | None = None,
@@ -101,10 +99,8 @@ def run_residual_test(
 
     Parameters
     ----------
-    observed : Observed
-        The problem, driven by smoothed voltages.
     likelihood : Likelihood
-        That of the noise.
+        That of the noise, driven by smoothed voltages.
     unit : (D,)
         Coordinates of the fit.
     squares : Likelihood or None
@@ -117,25 +113,26 @@ def run_residual_test(
     Surprise
         Not judged where too little is quiet.
     """
-    if likelihood.noise.mix is None or not observed.problem.quiet:
+    if likelihood.noise.mix is None or not likelihood.problem.quiet:
         return ResidualTest(None, "", None, "")
+    problem, drive = likelihood.problem, likelihood.problem.drive
     rows, J = likelihood.jacobian(unit)
     inside = is_off_bounds(unit)
     steady = _linear(likelihood)[inside[: likelihood.free]]
     J = J.only(inside)
     rng = np.random.default_rng(JUDGEMENT_SEED)
-    drawn = likelihood.noise.draw(rng, FIT_DRAWS, np.diff(observed.drive.first).tolist())
+    drawn = likelihood.noise.draw(rng, FIT_DRAWS, np.diff(drive.first).tolist())
     drawn *= likelihood.valid
-    levels = likelihood.noise.draw_levels(rng, FIT_DRAWS, observed.problem.quiet)
+    levels = likelihood.noise.draw_levels(rng, FIT_DRAWS, problem.quiet)
     drawn /= levels[:, None, None]
     basis = J.basis()
     split = build_event_basis(J, steady)
 
     def compute_statistics(rest: np.ndarray) -> dict[str, np.ndarray]:
         by_test = residual_statistics.compute_residual_statistics(
-            rest.reshape(len(rest), observed.drive.channels, -1), observed.problem
+            rest.reshape(len(rest), drive.channels, -1), problem
         )
-        return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
+        return by_test | ({PER_EVENT: split.energy(rest)} if drive.events > 1 else {})
 
     excess = squares and compare_with_squares(squares, unit, J, least)
     own = basis.project_out(rows[None])
@@ -152,7 +149,7 @@ def run_residual_test(
         {name: rows[part] for name, rows in by_test.items()} for part in (slice(1), slice(1, None))
     )
     fit = GoodnessOfFit(compare_with_draws(values, draws))
-    ratio, where = find_loudest_stretch(own.reshape(observed.drive.channels, -1), observed.problem)
+    ratio, where = find_loudest_stretch(own.reshape(drive.channels, -1), problem)
     return ResidualTest(fit.p, fit.most_significant_test, ratio, where)
 
 

@@ -6,8 +6,8 @@ likelihood of that noise is then no likelihood: single samples at the edges of a
 move parameters by more than they are worth. Least squares, Eq. (8), need to know nothing of the
 error. So the estimate is the minimum of Eq. (8), from wherever a search ended and from all over the
 box: the same for one set of records whatever was searched with, and never worse than the search.
-Where draws of the noise leave as much as it does, the likelihood of the noise (`likelihood`,
-`observed`) is true and the most precise there is, and the estimate is its maximum.
+Where draws of the noise leave as much as it does, the likelihood of the noise (`likelihood`) is
+true and the most precise there is, and the estimate is its maximum.
 
 Channels weighed by the size of what each leaves were tried beside Eq. (8): the same on 37 sets of a
 generator, and worse on records of ANDES, whose reactive power then counted for more than its error
@@ -33,9 +33,10 @@ from tractexp.inference.multistart import (
     search_box,
     select_distinct,
 )
-from tractexp.inference.observed import Observed
+from tractexp.inference.noise import compute_input_modes
 from tractexp.inference.prior import describe_prior, weigh_prior
 from tractexp.inference.problem import Problem
+from tractexp.inference.records import Records
 
 ESTIMATE_ROUNDS = 2  # of noise and fit in turn
 LARGEST_MINIMUM_RATIO = 1.3  # times the least sum of squares: valleys beyond it are given up
@@ -71,17 +72,17 @@ class DescentEnds:
 
     Attributes
     ----------
-    observed : Observed
-        The problem, driven by smoothed voltages.
+    records : Records
+        The events, their voltages smoothed.
     likelihood : Likelihood
-        That of the least squares.
+        That of the least squares, driven by these.
     descent : Descent
         Coordinates (n, d) and sums of squares (n,).
     origins : n texts
         Where each began.
     """
 
-    observed: Observed
+    records: Records
     likelihood: Likelihood
     descent: Descent
     origins: tuple[str, ...]
@@ -104,6 +105,13 @@ class DescentEnds:
         near = self.descent.deviance <= LARGEST_MINIMUM_RATIO * self.lowest
         return select_distinct(
             Descent(self.descent.unit[near], self.descent.deviance[near], 0), self.likelihood.free
+        )
+
+    def compute_input_modes(self, unit: np.ndarray) -> np.ndarray | None:
+        """The errors of the records at coordinates (D,), as of `compute_input_modes`."""
+        likelihood = self.likelihood
+        return compute_input_modes(
+            likelihood.problem, self.records.smoothed, likelihood.values(unit)
         )
 
     def join_descent(self, more: Descent, origin: str) -> "DescentEnds":
@@ -213,11 +221,11 @@ def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
 
 def _estimate_robust(problem: Problem, values: np.ndarray) -> EstimationResult:
     """The estimate of a robust loss, from where the search ended."""
-    observed = Observed.from_problem(problem)
-    objective = float(observed.problem.objective(values[None])[0])
-    squares = Likelihood.of_objective(observed.problem, objective)
+    records = Records.from_events(problem.events)
+    smooth = problem.driven_by(records.events)
+    squares = Likelihood.of_objective(smooth, float(smooth.objective(values[None])[0]))
     squares = drop_outliers(squares, squares.to_unit(values))
-    ends = DescentEnds(observed, squares, squares.descent(squares.to_unit(values)), ("search",))
+    ends = DescentEnds(records, squares, squares.descent(squares.to_unit(values)), ("search",))
     return _choose_estimate(ends.looked_beside(), robust=True)
 
 
@@ -230,9 +238,9 @@ def _descend_from_box(problem: Problem) -> tuple[DescentEnds, EstimationResult |
     ]
     key = f"{problem.digest()} {events}"
     if key not in _remembered:
-        observed = Observed.from_problem(problem)
-        likelihood, result = search_box(observed.problem)
-        ends = DescentEnds(observed, likelihood, result, ("box",) * len(result.unit))
+        records = Records.from_events(problem.events)
+        likelihood, result = search_box(problem.driven_by(records.events))
+        ends = DescentEnds(records, likelihood, result, ("box",) * len(result.unit))
         if not np.isfinite(ends.lowest):
             return ends, None
         ends = _rescale_ends(ends)
@@ -262,7 +270,7 @@ def _remove_offsets(ends: DescentEnds) -> DescentEnds:
     Offsets of the currents, and of the voltage as the model passes them on, are larger than a
     model's error there.
     """
-    problem = ends.observed.problem
+    problem = ends.likelihood.problem
     offsets = problem.domain.input_errors(problem, ends.likelihood.values(ends.best))
     if offsets is None:
         return ends
@@ -275,18 +283,12 @@ def _choose_estimate(ends: DescentEnds, *, robust: bool = False) -> EstimationRe
     """Least squares where more than noise is left, and the maximum of the likelihood of the noise
     elsewhere.
     """
-    observed = ends.observed
     likelihood, units = _fit_under_noise(ends, robust=robust)
-    surprising = run_residual_test(observed, likelihood, units[0], ends.likelihood, ends.lowest)
+    surprising = run_residual_test(likelihood, units[0], ends.likelihood, ends.lowest)
     if not surprising.adequate:
         return _estimate_by_squares(ends, likelihood, surprising)
-    whole = estimate_noise_at(
-        observed,
-        likelihood,
-        units[0],
-        observed.input_errors(likelihood.values(units[0])),
-        whole=True,
-    )
+    modes = ends.compute_input_modes(units[0])
+    whole = estimate_noise_at(likelihood, units[0], modes, whole=True)
     likelihood = replace(likelihood, noise=whole)  # nothing but noise is left: all of it tells
     result = likelihood.descent(units)
     best = int(result.deviance.argmin())
@@ -343,16 +345,13 @@ def _fit_under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np
     """The likelihood of the noise that the fit leaves in quiet, and its maxima (n, D), the best
     first.
     """
-    observed = ends.observed
     likelihood = ends.likelihood.with_initial_power
     units = likelihood.place_parameters(ends.near)
-    input_modes = observed.input_errors(likelihood.values(units[0]))
+    input_modes = ends.compute_input_modes(units[0])
     for _ in range(ESTIMATE_ROUNDS):
         if robust:
             likelihood = drop_outliers(likelihood, units[:1])
-        likelihood = replace(
-            likelihood, noise=estimate_noise_at(observed, likelihood, units[0], input_modes)
-        )
+        likelihood = replace(likelihood, noise=estimate_noise_at(likelihood, units[0], input_modes))
         result = likelihood.descent(units)
         order = np.argsort(result.deviance, kind="stable")
         units = result.unit[order[result.deviance[order] <= result.deviance.min() + BEHIND]]

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from tractexp.errors import UserError
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.observed import Observed
+from tractexp.inference.noise import estimate_noise
+from tractexp.inference.problem import Problem
 from tractexp.noise.color import (
     FEWEST_NOISE_SAMPLES,
     cut_stretches,
@@ -13,12 +15,15 @@ from tractexp.noise.color import (
     white_noise,
 )
 from tractexp.noise.model import Noise, Pair
+from tractexp.noise.quiet import is_louder
+from tractexp.noise.random_walk import remove_slow
 
+# of a residual's variance: where the fit takes more, it tells nothing of the noise
+LEAST_REST = 0.2
 OUTLIER = 5.0  # robust standard deviations from which a robust loss takes a sample for an outlier
 
 
 def estimate_noise_at(
-    observed: Observed,
     likelihood: Likelihood,
     unit: np.ndarray,
     input_modes: np.ndarray | None,
@@ -31,14 +36,12 @@ def estimate_noise_at(
 
     Parameters
     ----------
-    observed : Observed
-        The problem, driven by smoothed voltages.
     likelihood : Likelihood
-        Whose residuals they are.
+        Whose residuals they are; its problem is driven by smoothed voltages.
     unit : (D,)
         Coordinates of the fit.
     input_modes : (k, C, N) [pu] or None
-        That of `Observed.input_errors`.
+        That of `compute_input_modes`.
     whole : bool
         Whether the whole residual is taken.
 
@@ -46,13 +49,46 @@ def estimate_noise_at(
     -------
     Noise
     """
-    measured = likelihood.problem.drive.measurements
-    rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
-    residual = rows.reshape(measured.shape)
-    values = likelihood.values(unit)
-    return observed.noise(
-        residual, likelihood.valid, J, values, input_modes, whole
-    ) or fit_residual_noise(likelihood, residual)
+    problem = likelihood.problem
+    valid = likelihood.valid
+    rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(valid))).jacobian(unit)
+    residual = rows.reshape(valid.shape)
+    # the fit took the others
+    rest = np.maximum(1 - J.basis().leverage, LEAST_REST).reshape(valid.shape)
+    try:
+        return estimate_noise(
+            problem,
+            residual / np.sqrt(rest),
+            valid,
+            problem.drive.parts if whole else select_noisy_stretches(problem, residual, valid),
+            (problem, likelihood.values(unit)),
+            input_modes,
+            residual,
+            J.columns.reshape(-1, *valid.shape),
+        )
+    except UserError:
+        return fit_residual_noise(likelihood, residual)
+
+
+def select_noisy_stretches(
+    problem: Problem, residuals: np.ndarray, valid: np.ndarray
+) -> list[slice]:
+    """The quiet stretches whose residual (C, N) is noise: those after a dip only where no louder
+    than before it.
+
+    Where a record has less noise than the model has error, what is left at its end is the model's.
+    """
+    first = problem.drive.first
+    starts = [int(first[e]) + event.start for e, event in enumerate(problem.events)]
+    before = [part for part in problem.quiet if part.stop in starts]
+    after = [part for part in problem.quiet if part.stop not in starts]
+    for c in np.flatnonzero(valid.any(axis=1)):
+        calm, late = (
+            [remove_slow(residuals[c, p][valid[c, p]]) for p in parts] for parts in (before, after)
+        )
+        if is_louder(late, calm):
+            return before
+    return problem.quiet
 
 
 def fit_residual_noise(likelihood: Likelihood, residuals: np.ndarray) -> Noise:

@@ -11,7 +11,7 @@ import numpy as np
 
 from tractexp.inference.context import Context
 from tractexp.inference.jumps import find_jump_errors
-from tractexp.inference.observed import Observed, estimate_noise
+from tractexp.inference.noise import compute_input_modes, estimate_noise
 from tractexp.noise import Noise
 
 
@@ -34,11 +34,9 @@ class QuietNoise:
     @classmethod
     def from_context(cls, context: Context, unit: np.ndarray) -> "QuietNoise":
         """The estimator whose errors of the record act as on the base model at coordinates (D,)."""
-        observed = Observed(context.kernels.bare, context.records.smoothed)
-        return cls(
-            context,
-            observed.input_errors(observed.problem.space.from_unit(unit[context.coordinates.base])),
-        )
+        bare = context.kernels.bare
+        values = bare.space.from_unit(unit[context.coordinates.base])
+        return cls(context, compute_input_modes(bare, context.records.smoothed, values))
 
     def of_fit(self, unit: np.ndarray, names: Sequence[str] = ()) -> Noise:
         """The noise of the quiet residuals at coordinates (D,), of a fit with these effects."""
@@ -74,21 +72,15 @@ class QuietNoise:
             Where too few samples are quiet.
         """
         context = self.context
-        problem = self.context.problem
-        errors = [
-            shapes
-            for shapes in (self.input_modes, find_jump_errors(context, unit))
-            if shapes is not None
-        ]
-        shapes = np.concatenate(errors) if errors else None
-        there = context.kernels.select_problem(context.coordinates.present(unit), unit)
+        both = self.input_modes, find_jump_errors(context, unit)
+        errors = [shapes for shapes in both if shapes is not None]
         return estimate_noise(
-            problem,
+            context.problem,
             residual,
             context.valid,
-            problem.quiet,
-            there,
-            shapes,
+            context.problem.quiet,
+            context.kernels.select_problem(context.coordinates.present(unit), unit),
+            np.concatenate(errors) if errors else None,
             left,
             columns,
         )
