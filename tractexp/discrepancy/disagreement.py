@@ -15,6 +15,7 @@ from tractexp.inference.fitting import Refit, refit_from
 from tractexp.inference.goodness_of_fit import GoodnessOfFit
 from tractexp.inference.linearization import Linearization, linearize_fit, remove_explained
 from tractexp.inference.noise_in_quiet import QuietNoise
+from tractexp.inference.sandwich import compute_moves_without_blocks, compute_robust_root
 from tractexp.inference.score_test import Score, ScoreTest
 from tractexp.noise import Noise
 
@@ -190,9 +191,7 @@ def examine_fit(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disag
     context = quiet.context
     t = linearize_fit(context, fit, noise)
     for _ in range(NOISE_ROUNDS):
-        noise = quiet.estimate_noise(
-            fit.unit, remove_explained(t, t.residual[None])[0], t.residual, t.explaining_columns
-        )
+        noise = _estimate_unexplained_noise(quiet, t)
         fit = refit_from(context, noise, fit.names, fit.unit)
         t = linearize_fit(context, fit, noise)
         if fit.deviance > QUIETER * context.samples:
@@ -205,3 +204,43 @@ def examine_fit(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disag
             result, chance=replace(result.chance, scales=draw_scales(t, projection, noise, seed))
         )
     return result
+
+
+def _estimate_unexplained_noise(quiet: QuietNoise, t: Linearization) -> Noise:
+    """The noise of what no candidate explains at a fit."""
+    return quiet.estimate_noise(
+        t.unit, remove_explained(t, t.residual[None])[0], t.residual, t.explaining_columns
+    )
+
+
+def examine_least_squares(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:
+    """Make all tests at a fit by least squares, under the noise that it shows where little happens,
+    with a covariance of its parameters that holds where what it leaves is no noise. It was fitted
+    under `noise`, that of `assume_residual_noise`.
+
+    Under a wrong model the likelihood of the noise before the dip is no likelihood: a few samples
+    at the edges, many times louder than that noise, bend every parameter. Least squares asks for no
+    noise, and the covariance of its estimates holds where residuals are correlated within blocks,
+    and where they are noise (White 1982; Bell and McCaffrey 2002, as in
+    `tractexp.inference.sandwich`).
+    """
+    quiet = replace(quiet, context=quiet.context.with_measured_power)
+    t = linearize_fit(quiet.context, fit, noise)
+    root = _compute_robust_rows(quiet.context, t.build_score_test(noise))
+    own = _estimate_unexplained_noise(quiet, t)
+    projection = t.build_score_test(own)
+    chance = draw_chance(t, projection, own, seed)
+    return Disagreement(fit, own, t, projection, chance, root)
+
+
+def _compute_robust_rows(context: Context, projection: ScoreTest) -> np.ndarray:
+    """Rows (k, d) whose inverse products are the covariance of all that is free, from blocks left
+    out in turn.
+    """
+    J = projection.Q @ projection.R  # with the rows of the prior
+    r = projection.r[0] + projection.Q @ projection.along[0]
+    measured = context.drive.measurements
+    columns = J[: measured.size].reshape(*measured.shape, -1)
+    rows = r[: measured.size].reshape(measured.shape)
+    blocks = cut_blocks(context.events, context.drive, J.shape[1])
+    return compute_robust_root(J, compute_moves_without_blocks(columns, rows, blocks, J.T @ J))[0]

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.discrepancy.decide import find_predicting
-from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.disagreement import Disagreement, examine_least_squares
 from tractexp.discrepancy.evidence import (
     SLIGHT_ERROR,
     Evidence,
@@ -32,7 +32,6 @@ from tractexp.discrepancy.explanations import (
 )
 from tractexp.discrepancy.families import fit_members
 from tractexp.discrepancy.grades import Grader, fit_as_graded
-from tractexp.discrepancy.least_squares import estimate_residual_noise, examine_least_squares
 from tractexp.discrepancy.proposal.library import list_terms
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, fit_terms
 from tractexp.discrepancy.proposal.screen import ScreeningFit, screen_terms
@@ -43,6 +42,7 @@ from tractexp.inference.context import Context
 from tractexp.inference.cores import map_on_cores
 from tractexp.inference.fitting import Refit, key_by_names, refit, select_best_fits
 from tractexp.inference.model_error import estimate_noise_variance, sum_blocks
+from tractexp.inference.noise_in_quiet import assume_residual_noise
 from tractexp.inference.wide_fit import refit_sets_widely
 from tractexp.noise import Noise
 
@@ -89,12 +89,12 @@ def predict_errors(explained: Explanations, grader: Grader) -> Evidence | None:
     """
     plain = explained.base.context.with_measured_power
     context = plain.held_to_usual
-    noise = estimate_residual_noise(plain, explained.chosen)
+    noise = assume_residual_noise(plain, explained.chosen)
     criteria = context.criteria
     family = context.catalogue.textbook
     bare = fit_as_graded(context, noise, grader.grade((), context.window))
     if context.prior:  # its rows stand beside what the base model leaves, as in an identification
-        noise = estimate_residual_noise(plain, bare)
+        noise = assume_residual_noise(plain, bare)
     there = context.move_to_events(grader.validate)
 
     def fill(fits: Sequence[Refit]) -> list[SetEvidence]:

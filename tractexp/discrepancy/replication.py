@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.discrepancy.gap import SPREAD
-from tractexp.discrepancy.least_squares import estimate_residual_noise
 from tractexp.discrepancy.prediction import predict
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit, key_by_names, leave_each_out, refit
 from tractexp.inference.model_error import estimate_noise_variance
+from tractexp.inference.noise_in_quiet import assume_residual_noise
 from tractexp.record import Event
 
 FEWEST_EVENTS = 3  # of which one can be left out
@@ -69,7 +69,7 @@ def replicate(
     context.effort.say("leaving each event out in turn")
     plain = context.with_measured_power.held_to_usual
     at = plain.coordinates
-    noise = estimate_residual_noise(plain, replace(chosen, unit=at.at_measured_power(chosen.unit)))
+    noise = assume_residual_noise(plain, replace(chosen, unit=at.at_measured_power(chosen.unit)))
     smaller: list[tuple[Names, np.ndarray]] = [((), base.unit)]
     if len(chosen.names) > 1:
         smaller += leave_each_out(plain, chosen)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit
 from tractexp.inference.jumps import find_jump_errors
 from tractexp.inference.noise import compute_input_modes, estimate_noise
 from tractexp.noise import Noise
@@ -91,3 +92,13 @@ def assume_white_noise(context: Context) -> Noise:
     each = zip(*(e.levels for e in context.events), strict=True)
     levels = [float(np.sqrt(np.mean([level**2 for level in channel]))) for channel in each]
     return Noise(Noise.white(*levels).pairs, np.eye(len(levels)))
+
+
+def assume_residual_noise(context: Context, fit: Refit) -> Noise:
+    """White noise as loud as what a fit leaves, alike in each channel.
+
+    Under it the deviance is the sum of squares by which names are judged.
+    """
+    residual = context.residual(fit.unit, fit.names)
+    level = float(np.sqrt(np.mean(residual[context.valid] ** 2)))
+    return Noise(Noise.white(*[level] * len(residual)).pairs, np.eye(len(residual)))

@@ -21,7 +21,6 @@ from tractexp.discrepancy.gap import (
 )
 from tractexp.discrepancy.grades import fit_as_graded
 from tractexp.discrepancy.held_out import carry_fits
-from tractexp.discrepancy.least_squares import estimate_residual_noise
 from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, TermFits
 from tractexp.discrepancy.proposal.term_context import carry_over
 from tractexp.identification.grade import GradedModel
@@ -29,6 +28,7 @@ from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.model_error import ModelChange
+from tractexp.inference.noise_in_quiet import assume_residual_noise
 from tractexp.noise import Noise
 from tractexp.record import Event
 
@@ -135,7 +135,7 @@ def measure_changes(
     at = context.coordinates
     found = at.without_faults(fit.unit, ())
     base = fit_as_graded(context, result.noise, graded)
-    noise = estimate_residual_noise(context, base)
+    noise = assume_residual_noise(context, base)
     nested = found.copy()  # from the base model's, so that the term leaves no more
     nested[at.base] = base.unit[at.base]
     nested[at.sizes(fit.names)] = at.null[at.sizes(fit.names)]
