@@ -38,13 +38,13 @@ def estimate_effect_sizes(
     """
     at = context.coordinates
     own = context.catalogue.sizes(names)
-    values = [at.value(p.name, fit.unit) for p in own]
-    if tests is None:
-        return [ParameterEstimate(p, value, np.nan) for p, value in zip(own, values, strict=True)]
-    errors = compute_standard_errors(tests)
+    errors = compute_standard_errors(tests) if tests else {}
+    freedom = tests.freedom if tests else np.inf
     return [
-        ParameterEstimate(p, value, errors.get(p.name, np.nan), freedom=tests.freedom)
-        for p, value in zip(own, values, strict=True)
+        ParameterEstimate(
+            p, at.value(p.name, fit.unit), errors.get(p.name, np.nan), freedom=freedom
+        )
+        for p in own
     ]
 
 

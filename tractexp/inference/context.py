@@ -16,7 +16,7 @@ from tractexp.inference.differences import divide_differences, replace_diverged,
 from tractexp.inference.effort import Effort
 from tractexp.inference.free_set import FreeSet
 from tractexp.inference.kernels import Family, Kernels, Key
-from tractexp.inference.prior import compute_departures, weigh_prior
+from tractexp.inference.prior import compute_prior_rows, weigh_prior
 from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records
 from tractexp.inference.separable import SeparableColumns
@@ -367,12 +367,19 @@ class Context:
         white = self.whiten(noise, raw)
         white = white if len(chosen) == len(unit) else white[copies]
         at = self.coordinates
-        prior = [(unit[:, k] - at.null[k])[:, None] / at.prior_deviation[k] for k in faults]
-        if self.prior:
-            bare = self.kernels.bare
-            values = bare.space.from_unit(unit[:, at.base])
-            prior.append(self.prior * compute_departures(bare, values))
-        return np.concatenate([white, *prior], axis=1)
+        bare = self.kernels.bare
+        motor = compute_prior_rows(bare, bare.space.from_unit(unit[:, at.base]), self.prior)
+        return np.concatenate([white, at.measure_departures(unit, faults), motor], axis=1)
+
+    def differentiate(
+        self, unit: np.ndarray, columns: Sequence[int], names: Sequence[str]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The residuals (C, N) [pu] of a fit with these effects at coordinates (D,), and their
+        derivatives (k, C, N) by k columns, per range.
+        """
+        points, width = step_both_ways(unit, columns)
+        raw = self.residuals(np.concatenate([unit[None], points]), names)
+        return raw[0], divide_differences(raw[1:], width)
 
     def linearize(
         self, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
@@ -400,15 +407,14 @@ class Context:
         """
         at = self.coordinates
         k = len(columns)
-        points, width = step_both_ways(unit, columns)
-        raw = self.residuals(np.concatenate([unit[None], points]), names)
-        white = self.whiten(noise, np.concatenate([raw[:1], divide_differences(raw[1:], width)]))
+        residual, derivatives = self.differentiate(unit, columns, names)
+        white = self.whiten(noise, np.concatenate([residual[None], derivatives]))
         held = [(i, c) for i, c in enumerate(columns) if c in at.prior_deviation]
         prior = np.zeros((1 + k, len(held)))
+        prior[0] = at.measure_departures(unit[None], [c for _, c in held])[0]
         for row, (i, c) in enumerate(held):
             prior[1 + i, row] = 1 / at.prior_deviation[c]
-            prior[0, row] = (unit[c] - at.null[c]) / at.prior_deviation[c]
-        return raw[0], np.concatenate([white, prior], axis=1)
+        return residual, np.concatenate([white, prior], axis=1)
 
     @property
     def separable_columns(self) -> SeparableColumns:

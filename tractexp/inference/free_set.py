@@ -201,6 +201,14 @@ class FreeSet:
         ]
         return faults | {self.column[name]: spread / self.width(name) for name, spread in likely}
 
+    def measure_departures(self, unit: np.ndarray, columns: Sequence[int]) -> np.ndarray:
+        """The residuals (n, k) of the priors of some columns at coordinates (n, D): how far each is
+        from its null, in standard deviations.
+        """
+        columns = list(columns)
+        deviations = np.array([self.prior_deviation[k] for k in columns])
+        return (unit[:, columns] - self.null[columns]) / deviations
+
     def shapes(self, effects: Sequence[str]) -> list[int]:
         """The columns of the effects' parameters that are held to likely values by a prior."""
         return [self.column[name] for n in effects for name in self.catalogue[n].effect.likely]

@@ -15,7 +15,7 @@ from tractexp.domain import find_domain
 from tractexp.inference.differences import compute_central_differences
 from tractexp.inference.fit_problem import FitProblem
 from tractexp.inference.least_squares import Descent, descend
-from tractexp.inference.prior import compute_departures
+from tractexp.inference.prior import compute_prior_rows
 from tractexp.inference.problem import Problem
 from tractexp.inference.separable import Sensitivities
 from tractexp.noise.color import SMALLEST_DEVIATION, cut_stretches, fit_autoregression
@@ -130,9 +130,7 @@ class Likelihood(FitProblem):
         """The residuals of the prior (n, k) at coordinates (n, D): weighted departures from the
         parameters that machines usually have. k is 0 without a prior.
         """
-        if not self.prior:
-            return np.empty((len(unit), 0))
-        return self.prior * compute_departures(self.problem, self.values(unit))
+        return compute_prior_rows(self.problem, self.values(unit), self.prior)
 
     def jacobian(self, unit: np.ndarray) -> tuple[np.ndarray, Sensitivities]:
         """Whitened residuals, and their central differences.

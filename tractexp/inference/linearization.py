@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.inference.context import Context
-from tractexp.inference.differences import divide_differences, step_both_ways
 from tractexp.inference.fit_effort import BOUND_MARGIN
 from tractexp.inference.fitting import Refit
 from tractexp.inference.injection import PUSHES, inject_perturbations
@@ -137,13 +136,10 @@ def linearize_fit(context: Context, fit: Refit, noise: Noise) -> Linearization:
     at = context.coordinates
     faults = {name: at.sizes([name]) for name in context.catalogue.of_measurement}
     nuisances = at.nuisances(fit.names)
-    moved, width = step_both_ways(fit.unit, nuisances)
     points, spans, labels = _place_candidate_points(context, fit)
     injected, groups = inject_perturbations(context, fit.unit)
     k = len(nuisances)
-    raw = context.residuals(np.concatenate([fit.unit[None], moved]), fit.names)
-    base = raw[0]
-    nuisance = divide_differences(raw[1:], width)
+    base, nuisance = context.differentiate(fit.unit, nuisances, fit.names)
     beside = [candidate.name for candidate, _, first, last in labels for _ in range(first, last)]
     changes = context.changes(
         fit.unit, np.concatenate([points, injected]), fit.names, beside + [PUSHES] * len(injected)

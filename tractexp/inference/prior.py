@@ -46,6 +46,13 @@ def compute_departures(problem: Problem, values: np.ndarray) -> np.ndarray:
     return np.stack(rows, axis=1) if rows else np.empty((len(np.atleast_2d(values)), 0))
 
 
+def compute_prior_rows(problem: Problem, values: np.ndarray, weight: float) -> np.ndarray:
+    """The residuals (n, k) of the motor's prior at free values (n, d): weighted departures; k is 0
+    where the weight is.
+    """
+    return weight * compute_departures(problem, values) if weight else np.empty((len(values), 0))
+
+
 def weigh_prior(events: Sequence[Event], drive: Drive, free: int) -> float:
     """The weight of a prior's rows beside residuals in units of what is left.
 
