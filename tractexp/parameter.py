@@ -38,6 +38,9 @@ class Parameter:
     physical : (float, float) or None
         The range of real devices, within the bounds, to which records from the field are held;
         None: the bounds are.
+    natural_ends : tuple of float
+        Bounds that are ordinary values, such as a share of 1 that a device may have: to rest on one
+        is no sign that the search ended there.
 
     Examples
     --------
@@ -56,6 +59,7 @@ class Parameter:
     null: float | None = None
     power_exponent: int = field(default=0, kw_only=True)
     physical: tuple[float, float] | None = field(default=None, kw_only=True)
+    natural_ends: tuple[float, ...] = field(default=(), kw_only=True)
     name: str = field(default="", compare=False)
 
     @property
@@ -108,6 +112,11 @@ class Parameter:
             raise UserError(
                 f"{where}: the physical range {list(self.physical)} must lie within the bounds"
                 f" [{low:g}, {high:g}], the lower end first"
+            )
+        if not set(self.natural_ends) <= {low, high}:
+            raise UserError(
+                f"{where}: the natural ends {list(self.natural_ends)} must be bounds, of"
+                f" [{low:g}, {high:g}]"
             )
 
 

@@ -34,7 +34,13 @@ class DcLinkLag(Effect):
         0.05, (0.005, 0.5), "s", "time constant of dc link and its control", SOURCE, "T_{dc}"
     )
     held_current = Parameter(
-        1.0, (0.0, 1.0), "1", "how far the control holds current, not power", SOURCE, "a"
+        1.0,
+        (0.0, 1.0),
+        "1",
+        "how far the control holds current, not power",
+        SOURCE,
+        "a",
+        natural_ends=(0.0, 1.0),
     )
 
     places, kind = ("converter share",), "lag"

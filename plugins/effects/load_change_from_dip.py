@@ -28,7 +28,13 @@ class LoadChangeFromDip(Effect):
     dip_change_wait = Parameter(0.0, (0.0, 2.0), "s", "time before it begins", SOURCE, "T_w")
     dip_change_time = Parameter(5.0, (0.002, 5.0), "s", "time that it takes", SOURCE, "T_c")
     dip_change_static = Parameter(
-        0.0, (0.0, 1.0), "1", "1 where only the static load changes", SOURCE, "w"
+        0.0,
+        (0.0, 1.0),
+        "1",
+        "1 where only the static load changes",
+        SOURCE,
+        "w",
+        natural_ends=(0.0, 1.0),
     )
 
     order = 3

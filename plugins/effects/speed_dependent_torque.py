@@ -19,7 +19,14 @@ class SpeedDependentTorque(Effect):
     """
 
     quadratic_share = Parameter(
-        0.0, (0.0, 1.0), "1", "share of the torque that is quadratic", SOURCE, "k", null=0.0
+        0.0,
+        (0.0, 1.0),
+        "1",
+        "share of the torque that is quadratic",
+        SOURCE,
+        "k",
+        null=0.0,
+        natural_ends=(1.0,),  # of fans and pumps
     )
 
     places, kind = ("load torque",), "law"

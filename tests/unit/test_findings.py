@@ -14,18 +14,26 @@ from tractexp.inference.model_error import ModelChange
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "ends"),
+    ("effect", "name", "value", "ends"),
     [
-        ("tripped_share", 0.0, True),
-        ("trip_level", 0.95, True),
-        ("trip_delay", 0.5, True),
-        ("trip_delay", 0.0, False),
-        ("reconnect_delay", 0.02, True),
+        ("undervoltage_trip", "tripped_share", 0.0, True),
+        ("undervoltage_trip", "trip_level", 0.95, True),
+        ("undervoltage_trip", "trip_delay", 0.5, True),
+        ("undervoltage_trip", "trip_delay", 0.0, False),
+        ("undervoltage_trip", "reconnect_delay", 0.02, True),
+        ("speed_dependent_torque", "quadratic_share", 1.0, False),
+        ("speed_dependent_torque", "quadratic_share", 0.0, True),
+        ("dc_link_lag", "lag_share", 1.0, True),
+        ("static_var_compensator", "compensator_exponent", 2.0, False),
     ],
 )
-def test_a_setting_rests_at_the_end_of_its_range_unless_nature_ends_there(name, value, ends):
-    """The level of a relay at the end of what was tried is no level; a delay of 0 is one."""
-    own = {p.name: p for p in get("effect", "undervoltage_trip")().parameters}
+def test_a_setting_rests_at_the_end_of_its_range_unless_nature_ends_there(
+    effect, name, value, ends
+):
+    """The level of a relay at the end of what was tried is no level; a delay of 0 is one, and so
+    is a torque that is all quadratic.
+    """
+    own = {p.name: p for p in get("effect", effect)().parameters}
     assert is_end_of_range(own[name], value) == ends
 
 

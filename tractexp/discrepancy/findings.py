@@ -388,4 +388,5 @@ def is_end_of_range(parameter: Parameter, value: float) -> bool:
     where nature does: no time, level or margin is below 0.
     """
     nearest = min(parameter.bounds, key=lambda bound: abs(bound - value))
-    return parameter.null is not None or nearest != 0
+    is_natural = nearest in parameter.natural_ends or (parameter.null is None and nearest == 0)
+    return not is_natural
