@@ -796,6 +796,23 @@ def test_a_compensator_settles_at_its_gain_or_its_limit(drop, exponent, given):
     assert later[-1] == pytest.approx(extra[-1] * (1 - np.exp(-1)), rel=0.02)
 
 
+def test_the_droop_of_a_compensator_of_susceptance_acts_on_its_current():
+    """Kundur 1994, section 11.2: at rest the current is K dU, whatever is regulated; a deep dip
+    ends at the rated susceptance.
+    """
+    t = np.arange(1200) * 1e-3
+    size = {"compensator": 0.3, "compensator_time": 0.02, "compensator_exponent": 2.0}
+
+    def find_current(drop, gain):
+        excitation = event(np.where(t < 0.1, 1.0, 1 - drop))
+        chosen = values("static_var_compensator", compensator_gain=gain, **size)
+        extra = run("static_var_compensator", excitation, chosen)[1] - base(excitation)[1]
+        return -extra[-1] / (0.3 * (1 - drop))
+
+    assert find_current(0.2, 2.0) == pytest.approx(0.4, rel=1e-6)
+    assert find_current(0.5, 2.0) == pytest.approx(0.5, rel=1e-6)  # of which the order is 1
+
+
 def test_skew_is_a_shift():
     P, Q = base(dip())
     for lag in (3, -2):

@@ -92,6 +92,18 @@ def test_a_base_model_that_leaves_less_than_matters_of_all_events_lacks_nothing(
     assert (verdict.word, verdict.complete) == (told, False)
 
 
+@pytest.mark.parametrize("share", [np.nan, 0.0, -3.7])
+def test_what_each_event_left_out_denies_is_kept_only_where_it_alone_explains(share):
+    """A skew of clocks was a candidate of two loads that lack nothing, and three effects together
+    of one that each event lost nothing by.
+    """
+    denied = row("a", gap=CONFIRMED, is_fitted_to_all=True, replicated_share=share)
+    assert word(denied, base_p=0.5) == ("none", ())
+    assert word(denied, base_p=1e-4) == ("candidate", (("a",),))
+    predicted = replace(off("a", error=0.1), replicated_share=share)
+    assert decide(table(off(error=1.0), predicted), Criteria()).word == "unexplained"
+
+
 def test_of_one_family_the_best_member_is_kept():
     member = replace(row("a_member", behind=2.0, gap=CONFIRMED), family=("a",))
     assert word(row("a", gap=CONFIRMED), member) == ("named", (("a",),))
@@ -99,7 +111,7 @@ def test_of_one_family_the_best_member_is_kept():
 
 @pytest.mark.parametrize(
     ("share", "told"),
-    [(0.9, "named"), (0.49, "candidate"), (np.nan, "candidate"), (None, "candidate")],
+    [(0.9, "named"), (0.49, "candidate"), (0.01, "candidate"), (None, "candidate")],
 )
 def test_what_held_out_events_chose_is_named_if_each_event_left_out_in_turn_shows_it(share, told):
     """Whatever the fitted events alone put first."""

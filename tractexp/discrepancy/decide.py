@@ -15,10 +15,12 @@ A set is *kept* by one of two rules.
 Several sets kept are tied. One is *named* where an event confirms it that took no part in choosing
 it, or each of several that was left out in turn, where it has one or two effects, whose sizes are
 known within their bounds, and the model with it is not graded a wrong model; else it is a
-*candidate*. A set that has no size in the model that is graded is the base model, whose grade
-decides. Where none is kept the records agree with the base model, or they do not. They do as well
-where it leaves more than noise, but less than matters: below `SLIGHT_ERROR` of the response, of the
-fitted and of the held-out events.
+*candidate*. It is not kept where these events deny it, unless it explains what the base model does
+not: by what it predicts of one of them, or since the base model leaves noise alone. A set that has
+no size in the model that is graded is the base model, whose grade decides. Where none is kept the
+records agree with the base model, or they do not. They do as well where it leaves more than noise,
+but less than matters: below `SLIGHT_ERROR` of the response, of the fitted and of the held-out
+events.
 """
 
 from collections.abc import Sequence
@@ -51,8 +53,11 @@ def decide(evidence: Evidence, criteria: Criteria) -> Verdict:
     Verdict
     """
     find_kept = find_predicting if evidence.is_predicted else find_explaining
-    kept = find_kept(evidence, criteria)
     least_p = min(evidence.base.p_left, evidence.base.p_of_all)
+    agrees = least_p >= criteria.adequate_p and bool(find_adequate(evidence, criteria))
+    kept = find_kept(evidence, criteria)
+    if (agrees or evidence.is_predicted) and any(map(is_denied_in_turn, kept)):
+        kept = []
     if len(kept) > 1:
         word = TIED
     elif kept:
@@ -62,7 +67,6 @@ def decide(evidence: Evidence, criteria: Criteria) -> Verdict:
         is_sound = is_few and not row.open_sizes and row.grade != WRONG_MODEL
         word = NAMED if is_sound and is_confirmed(row, evidence) else CANDIDATE
     else:
-        agrees = least_p >= criteria.adequate_p and bool(find_adequate(evidence, criteria))
         suffices = evidence.base.is_slight or evidence.base.grade == ADEQUATE
         word = NONE if agrees or suffices else UNEXPLAINED
     return Verdict(word, tuple(kept), word != UNEXPLAINED and not evidence.is_predicted)
@@ -122,6 +126,12 @@ def is_confirmed(row: SetEvidence, evidence: Evidence) -> bool:
         share = row.replicated_share
         return share is not None and share >= CONFIRMED_SHARE
     return all(gap.outcome == SHOWN for gap in row.gaps)
+
+
+def is_denied_in_turn(row: SetEvidence) -> bool:
+    """Whether no event, left out in turn, shows a set beyond noise, or one loses nothing by it."""
+    share = row.replicated_share
+    return share is not None and not share > 0
 
 
 def chose_by_all(row: SetEvidence, evidence: Evidence) -> bool:

@@ -16,6 +16,7 @@ from tractexp.discrepancy.decide import (
     chose_by_all,
     find_adequate,
     is_confirmed,
+    is_denied_in_turn,
 )
 from tractexp.discrepancy.evidence import SLIGHT_ERROR, Evidence, SetEvidence, Verdict
 from tractexp.discrepancy.gap import DENIED, MILD, SHOWN
@@ -299,6 +300,10 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
         name = join_words(label_effects(beaten.names, context))
         misses = f"misses {_format_error(beaten)} of the response of the held-out events"
         return f"{name} would be named, but {misses}, and {_describe_term(evidence)}"
+    if leading := [row for row in evidence.every if is_denied_in_turn(row)]:
+        name = join_words(label_effects(leading[0].names, context))
+        why = explain_replication(leading[0].replicated_share)
+        return f"{name} would be named, but {why}"
     labels = join_words(label_effects(near.names, context))
     why = f"a name must divide that by {criteria.divides:g}"
     if compute_factor(near, evidence.base) > criteria.divides:
