@@ -101,7 +101,8 @@ def test_what_each_event_left_out_denies_is_kept_only_where_it_alone_explains(sh
     assert word(denied, base_p=0.5) == ("none", ())
     assert word(denied, base_p=1e-4) == ("candidate", (("a",),))
     predicted = replace(off("a", error=0.1), replicated_share=share)
-    assert decide(table(off(error=1.0), predicted), Criteria()).word == "unexplained"
+    told = decide(table(off(error=1.0), predicted), Criteria()).word
+    assert told == ("candidate" if np.isnan(share) else "unexplained")
 
 
 def test_of_one_family_the_best_member_is_kept():

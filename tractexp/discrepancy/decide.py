@@ -15,14 +15,15 @@ A set is *kept* by one of two rules.
 Several sets kept are tied. One is *named* where an event confirms it that took no part in choosing
 it, or each of several that was left out in turn, where it has one or two effects, whose sizes are
 known within their bounds, and the model with it is not graded a wrong model; else it is a
-*candidate*. It is not kept where these events deny it, unless it explains what the base model does
-not: by what it predicts of one of them, or since the base model leaves noise alone. A set that has
-no size in the model that is graded is the base model, whose grade decides. Where none is kept the
-records agree with the base model, or they do not. They do as well where it leaves more than noise,
-but less than matters: below `SLIGHT_ERROR` of the response, of the fitted and of the held-out
-events.
+*candidate*. It is not kept where one of these events loses nothing by it, and it goes by what it
+predicts or the base model leaves noise alone; in the latter case also where noise hides it in each
+of them. A set that has no size in the model that is graded is the base model, whose grade decides.
+Where none is kept the records agree with the base model, or they do not. They do as well where it
+leaves more than noise, but less than matters: below `SLIGHT_ERROR` of the response, of the fitted
+and of the held-out events.
 """
 
+import math
 from collections.abc import Sequence
 
 from tractexp.discrepancy.evidence import Evidence, SetEvidence, Verdict
@@ -56,8 +57,8 @@ def decide(evidence: Evidence, criteria: Criteria) -> Verdict:
     least_p = min(evidence.base.p_left, evidence.base.p_of_all)
     agrees = least_p >= criteria.adequate_p and bool(find_adequate(evidence, criteria))
     kept = find_kept(evidence, criteria)
-    if (agrees or evidence.is_predicted) and any(map(is_denied_in_turn, kept)):
-        kept = []
+    if agrees or evidence.is_predicted:
+        kept = [row for row in kept if not is_denied_in_turn(row, agrees=agrees)]
     if len(kept) > 1:
         word = TIED
     elif kept:
@@ -128,10 +129,14 @@ def is_confirmed(row: SetEvidence, evidence: Evidence) -> bool:
     return all(gap.outcome == SHOWN for gap in row.gaps)
 
 
-def is_denied_in_turn(row: SetEvidence) -> bool:
-    """Whether no event, left out in turn, shows a set beyond noise, or one loses nothing by it."""
+def is_denied_in_turn(row: SetEvidence, *, agrees: bool) -> bool:
+    """Whether an event, left out in turn, loses nothing by a set; where the base model `agrees`
+    with the records, also whether noise hides the set in each.
+    """
     share = row.replicated_share
-    return share is not None and not share > 0
+    if share is None or math.isnan(share):
+        return agrees and share is not None
+    return share <= 0
 
 
 def chose_by_all(row: SetEvidence, evidence: Evidence) -> bool:

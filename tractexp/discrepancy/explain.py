@@ -300,7 +300,7 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
         name = join_words(label_effects(beaten.names, context))
         misses = f"misses {_format_error(beaten)} of the response of the held-out events"
         return f"{name} would be named, but {misses}, and {_describe_term(evidence)}"
-    if leading := [row for row in evidence.every if is_denied_in_turn(row)]:
+    if leading := [row for row in evidence.every if is_denied_in_turn(row, agrees=False)]:
         name = join_words(label_effects(leading[0].names, context))
         why = explain_replication(leading[0].replicated_share)
         return f"{name} would be named, but {why}"
