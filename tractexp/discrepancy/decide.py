@@ -1,5 +1,4 @@
-"""What it comes to: one of five words, from the table of evidence alone. Nothing is fitted here and
-nothing is said.
+"""What it comes to: one of five words, from the table of evidence alone. Nothing is fitted.
 
 A set is *kept* by one of two rules.
 
@@ -15,12 +14,11 @@ A set is *kept* by one of two rules.
 Several sets kept are tied. One is *named* where an event confirms it that took no part in choosing
 it, or each of several that was left out in turn, where it has one or two effects, whose sizes are
 known within their bounds, and the model with it is not graded a wrong model; else it is a
-*candidate*. It is not kept where one of these events loses nothing by it, and it goes by what it
-predicts or the base model leaves noise alone; in the latter case also where noise hides it in each
-of them. A set that has no size in the model that is graded is the base model, whose grade decides.
+*candidate*. An event left out that loses nothing by it denies it, where it goes by what it predicts
+or the base model leaves noise alone; in the latter case noise denies it that hides it in each.
 Where none is kept the records agree with the base model, or they do not. They do as well where it
-leaves more than noise, but less than matters: below `SLIGHT_ERROR` of the response, of the fitted
-and of the held-out events.
+leaves less than matters (`SLIGHT_ERROR` of the response, of the fitted and the held-out events), or
+where it is graded adequate: a set without a size in the model that is graded is the base model.
 """
 
 import math
@@ -130,13 +128,12 @@ def is_confirmed(row: SetEvidence, evidence: Evidence) -> bool:
 
 
 def is_denied_in_turn(row: SetEvidence, *, agrees: bool) -> bool:
-    """Whether an event, left out in turn, loses nothing by a set; where the base model `agrees`
-    with the records, also whether noise hides the set in each.
+    """Whether an event left out loses nothing by a set; or, where the base model `agrees` with the
+    records, noise hides it in each.
     """
     share = row.replicated_share
-    if share is None or math.isnan(share):
-        return agrees and share is not None
-    return share <= 0
+    is_hidden = share is not None and math.isnan(share)
+    return agrees if is_hidden else share is not None and share <= 0
 
 
 def chose_by_all(row: SetEvidence, evidence: Evidence) -> bool:
