@@ -47,7 +47,7 @@ def test_the_answer_of_an_identification_is_one_screen(printed):
     assert (short.returncode, every.returncode) == (0, 0)
     rows = count_rows(short.stdout, WIDTH)
     assert len(rows) <= LINES - 1, "\n".join(rows)  # one more is the line of the log
-    assert rows[0].startswith("load: U 0.9998 pu, P 0.9995 pu, Q 0.7005 pu, ")
+    assert rows[0].startswith("load: U 0.9998 pu, P 0.9995 pu, Q 0.7005 pu, S 1.221 pu, ")
     assert "tibet_50pct" in rows[0]
     assert any(row.startswith("doubtful: the model describes this load within") for row in rows)
     assert next(row.split()[0] for row in rows if row.split()[-1:] == ["yes"]) == "T_prime"
@@ -155,7 +155,7 @@ def test_at_sixty_columns_each_parameter_is_a_line():
     lines = out.getvalue().splitlines()
     assert max(map(cell_len, lines)) <= narrow
     names = [*fitted().result.parameters]
-    head = lines.index("parameter: value, unit, 95 % interval, known")
+    head = lines.index("parameter: value ± std. error, unit, 95 % interval, known")
     assert [line.partition(":")[0] for line in lines[head + 1 :][: len(names)]] == names
     assert len(lines) <= LINES - 1
     assert not any(len(line.split()) == 1 and len(line.strip()) < 2 for line in lines if line)

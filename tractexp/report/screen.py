@@ -2,6 +2,7 @@
 the page, and printed by `--all`.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -66,13 +67,15 @@ def describe_judged_load(fit: "Identification") -> Report:
 
 
 def describe_load(result: Result, names: Sequence[str]) -> str:
-    """Station and load, voltage and power before the dip, and which dips were fitted."""
+    """Station and load, voltage and power before the dip, and which dips were fitted.
+
+    S is what shares "of S" are told of.
+    """
     own, before = result.base, result.before
     scale, units = choose_units(result)
-    powers = [
-        write_quantity(key[0], scale * before[key], unit)
-        for key, unit in zip(("P0", "Q0"), units, strict=True)
-    ]
+    P, Q = scale * before["P0"], scale * before["Q0"]
+    drawn = zip("PQS", (P, Q, math.hypot(P, Q)), units, strict=True)
+    powers = [write_quantity(symbol, power, unit) for symbol, power, unit in drawn]
     identities: list[Identity] = result.identities
     voltage = identities[0].voltage if identities else None
     level = write_quantity("U", before["U0"] * (voltage or 1.0), "kV" if voltage else "pu")
@@ -82,12 +85,12 @@ def describe_load(result: Result, names: Sequence[str]) -> str:
     return f"load: {', '.join(filter(None, parts))}{unknown}"
 
 
-def choose_units(result: Result) -> tuple[float, tuple[str, str]]:
-    """The factor of powers, and the units of P and Q that they then have: MW and Mvar where the
-    record tells them.
+def choose_units(result: Result) -> tuple[float, tuple[str, str, str]]:
+    """The factor of powers, and the units of P, Q and S that they then have: MW, Mvar and MVA where
+    the record tells them.
     """
     own = result.base
-    return (own.power, ("MW", "Mvar")) if own.in_mva else (own.ratio, ("pu", "pu"))
+    return (own.power, ("MW", "Mvar", "MVA")) if own.in_mva else (own.ratio, ("pu", "pu", "pu"))
 
 
 def tabulate_parameters(fit: "Identification") -> Table:
@@ -104,7 +107,8 @@ def tabulate_parameters(fit: "Identification") -> Table:
         ]
         for e in fit.own_parameters[:MOST_PARAMETERS]
     ]
-    return Table(["parameter", "value", "unit", "95 % interval", "known"], rows, words=(2, 4))
+    columns = ["parameter", "value ± std. error", "unit", "95 % interval", "known"]
+    return Table(columns, rows, words=(2, 4))
 
 
 def name_verdict(verdict: str) -> str:

@@ -76,7 +76,7 @@ def _tabulate_powers(fit: "Identification") -> Table:
     if point is not None:
         static = point.P - point.P_motor, point.Q - point.Q_motor
         rows += [["motor", point.P_motor, point.Q_motor], ["static load", *static]]
-    columns = ["before the dip", *(f"{x} [{u}]" for x, u in zip("PQ", units, strict=True))]
+    columns = ["before the dip", *(f"{x} [{u}]" for x, u in zip("PQ", units[:2], strict=True))]
     refused = "" if point else "The model has no motor at rest, so that its parts are not told."
     return Table(columns, rows, "", refused)
 
@@ -107,8 +107,8 @@ def _add_machine(page: Report, fit: "Identification") -> None:
     except UserError as error:
         page.text(finish_sentence(str(error)))
         return
-    scale, (unit, _) = choose_units(fit.result)
-    size = f"{scale * machine.rating:.4g} {'MVA' if unit == 'MW' else 'pu'}"
+    scale, (*_, unit) = choose_units(fit.result)
+    size = f"{scale * machine.rating:.4g} {unit}"
     rows = [
         [q.about, q.value, q.unit, f"{q.low:.3g} to {q.high:.3g}", q.place]
         for q in machine.quantities
