@@ -11,7 +11,6 @@ from made_alike import fitted_alike
 from tractexp.discrepancy.next_event.choose import DECIDED, LEAST_CHANCE, EventTrial, _fit_sides
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, imagine_dips, record_imagined
 from tractexp.discrepancy.next_event.separation import (
-    EventView,
     Separation,
     _reduce_blocks,
     linearize_side,
@@ -33,7 +32,7 @@ def test_a_rival_is_linearised_as_its_refit_moves():
     sides = [linearize_side(bench, noise, fit) for fit in (bare, truth, rival)]
     views = [view_events(bench, noise, side, [event])[0] for side in sides]
     separation = Separation(sides, bench.criteria)
-    rows = _reduce_blocks([np.vstack([v.f - views[0].f, v.K]) for v in views])
+    rows = _reduce_blocks([np.vstack([v[0] - views[0][0][0], v[1:]]) for v, _ in views])
     linear = separation._deviance(2, (rows[2][0] - rows[1][0])[None], rows[2][1:])
     exact = separation._deviance(1, np.zeros((1, len(rows[1][0]))), rows[1][1:])
     moved = _fit_sides(bench, noise, sides, sides[1], event)[2]
@@ -72,7 +71,7 @@ def test_a_set_is_not_told_from_itself_whatever_the_recorder_did():
     unit[at.parameters(["time_skew", "load_change"])] += 0.1
     sides = [linearize_side(bench, noise, f) for f in (bare, fit, replace(fit, unit=unit))]
     event = ImaginedDip(0.5, 0.4)
-    own, other = (view_events(bench, noise, side, [event])[0].f for side in sides[1:])
+    own, other = (view_events(bench, noise, side, [event])[0][0][0] for side in sides[1:])
     assert other == pytest.approx(own, abs=1e-9)
 
 
@@ -82,7 +81,7 @@ def test_what_a_model_does_not_survive_tells_nothing():
         linearize_side(bench, noise, f)
         for f in (bare, fits["stator_resistance"], fits["leakage_loss"])
     ]
-    lost = EventView(np.full(10, np.nan), np.zeros((3, 10)))
+    lost = np.full((4, 10), np.nan), 0.0
     assert not Separation(sides, bench.criteria).find_denied_rivals([lost] * 3, 1).any()
 
 

@@ -5,7 +5,7 @@ left of them.
 import numpy as np
 import pytest
 
-from tractexp.noise.random_walk import EventRest, Load, find
+from tractexp.noise.random_walk import Load, find
 
 
 def steady(samples):
@@ -52,7 +52,7 @@ def test_a_load_that_seems_steady_before_the_events_may_wander_within_them():
     calm = draw_calm(rng)
 
     def is_found(left):
-        rests = [EventRest(left(), columns, np.ones(1000)) for _ in range(3)]
+        rests = [(left(), columns, np.ones(1000)) for _ in range(3)]
         return find(calm, 0.002, steady(1000), rests) is not None
 
     assert find(calm, 0.002, steady(1000)) is None
@@ -66,7 +66,7 @@ def wander_within():
     """What is left of an event shows a little more than the stretch before it."""
     rng = np.random.default_rng(24)
     left = draw_white(rng, 1000) + draw_walk(rng, 1000, 0.012)
-    return [EventRest(left, np.zeros((1, 2, 1000)), np.ones(1000))]
+    return [(left, np.zeros((1, 2, 1000)), np.ones(1000))]
 
 
 @pytest.mark.parametrize("rests", [list, wander_within])

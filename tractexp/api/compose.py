@@ -130,7 +130,7 @@ class LoadModel(Portable, Plain, Tabulated):
 
     def _choose_structure(self, names: Sequence[str], events: Sequence["Event"]) -> "LoadModel":
         """The winner of a race, with what is said of its parameters here."""
-        from tractexp.identification.race import Entry, Structure, race_structures
+        from tractexp.identification.race import Entry, race_structures
 
         models, refused = dict[str, LoadModel](), list[Entry]()
         for name in names:
@@ -142,7 +142,7 @@ class LoadModel(Portable, Plain, Tabulated):
                 refused.append(Entry(name, 0, math.inf, math.inf, str(error)))
         if not models:
             raise UserError(f"none of the structures can be fitted: {refused[0].why}")
-        candidates = [Structure(name, one.model, one.bounds) for name, one in models.items()]
+        candidates = {name: (one.model, one.bounds) for name, one in models.items()}
         entries = race_structures(candidates, events, self.fixed)
         race = [entry.to_dict() for entry in (*entries, *refused)]
         return replace(models[entries[0].name], race=race)

@@ -25,16 +25,8 @@ from tractexp.text.progress import Counting, make_silent_counter
 
 STRETCHES = 5  # of a single dip
 AS_GOOD = 1.05  # times the least error: a simpler structure within it wins
+Structure = tuple[Model, Mapping[str, Sequence[float]]]  # a model, and what bounds it
 WORSE_FITTED = "fitted it already leaves more than the best predicts"
-
-
-@dataclass(frozen=True)
-class Structure:
-    """A structure that takes part: the name of its choice, its model and what bounds it."""
-
-    name: str
-    model: Model
-    bounds: Mapping[str, Sequence[float]]
 
 
 @dataclass(frozen=True)
@@ -69,19 +61,19 @@ class Entry:
 
 
 def race_structures(
-    candidates: Sequence[Structure],
+    candidates: Mapping[str, Structure],
     events: Sequence[Event],
     fixed: Mapping[str, float] | None = None,
     parts: Any = make_silent_counter,
 ) -> list[Entry]:
-    """The entries of the candidates, the winner first, the others by what they predict. Raises
-    `UserError` where none can be fitted.
+    """The entries of the candidates by name, the winner first, the others by what they predict.
+    Raises `UserError` where none can be fitted.
     """
     counting: Counting = parts(2 * len(candidates))
     entries, fitted = list[Entry](), list[_Fitted]()
     with counting as ended:
-        for candidate in candidates:
-            found = _fit(candidate, events, fixed or {})
+        for name, candidate in candidates.items():
+            found = _fit(name, candidate, events, fixed or {})
             (entries if isinstance(found, Entry) else fitted).append(found)  # type: ignore[arg-type]
             ended()
         best = np.inf
@@ -126,24 +118,25 @@ class _Fitted:
 
 
 def _fit(
-    candidate: Structure, events: Sequence[Event], fixed: Mapping[str, float]
+    name: str, candidate: Structure, events: Sequence[Event], fixed: Mapping[str, float]
 ) -> _Fitted | Entry:
     """A structure fitted to all dips; its entry where it cannot be."""
-    own = {name: value for name, value in fixed.items() if name in candidate.model.names}
+    model, bounds = candidate
+    own = {parameter: value for parameter, value in fixed.items() if parameter in model.names}
     try:
-        problem = Problem(candidate.model, events, candidate.bounds, own)
+        problem = Problem(model, events, bounds, own)
     except UserError as error:
-        return Entry(candidate.name, len(candidate.model.names), np.inf, np.inf, str(error))
+        return Entry(name, len(model.names), np.inf, np.inf, str(error))
     likelihood, ends = search_box(problem)
     if not np.isfinite(ends.deviance.min(initial=np.inf)):
         why = "nothing in its bounds can be simulated"
-        return Entry(candidate.name, problem.space.dimension, np.inf, np.inf, why)
+        return Entry(name, problem.space.dimension, np.inf, np.inf, why)
     compared = _mark_compared(problem)
     size = _measure_response(problem, compared)
     left = likelihood.residuals(ends.best[None])[0]
     error = _share(float(np.sum(np.where(compared, left, 0.0) ** 2)), size)
     starts = select_distinct(ends, likelihood.free)
-    return _Fitted(candidate.name, likelihood, starts, compared, size, error)
+    return _Fitted(name, likelihood, starts, compared, size, error)
 
 
 def _share(squares: float, size: float) -> float:

@@ -382,9 +382,11 @@ def _spread_by_scatter(squares: Likelihood, unit: np.ndarray) -> Spread:
     left = float(np.sum(squares.of_records.rows(unit[None])[0] ** 2)) / max(
         squares.samples - len(unit), 1
     )
-    scattered = estimate_scatter(squares.scale_noise(np.sqrt(left)), unit)
-    likelihood = squares.scale_noise(np.sqrt(left) * scattered.spread)
+    information, quantile, ratio, spread = estimate_scatter(
+        squares.scale_noise(np.sqrt(left)), unit
+    )
+    likelihood = squares.scale_noise(np.sqrt(left) * spread)
     rows = likelihood.rows(unit[None])[0]
-    factors = np.full(len(unit), scattered.quantile)
-    limits = (factors * scattered.ratio / scattered.spread) ** 2
-    return likelihood, float(rows @ rows), scattered.information, factors, limits
+    factors = np.full(len(unit), quantile)
+    limits = (factors * ratio / spread) ** 2
+    return likelihood, float(rows @ rows), information, factors, limits

@@ -16,7 +16,6 @@ scatter and not the bias: what a missing effect moves a parameter by is told by 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -34,29 +33,9 @@ SINGULAR_ROUNDING = 1e-13
 WALL = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class Scatter:
-    """The scatter of an estimate by least squares.
-
-    Attributes
-    ----------
-    information : Information
-        Whose covariance is that of the scatter.
-    quantile : float
-        Student's t at 97.5 %.
-    ratio : (d,)
-        Each standard error over that of independent residuals.
-    spread : float
-        The geometric mean of that over all directions.
-    """
-
-    information: Information
-    quantile: float
-    ratio: np.ndarray
-    spread: float
-
-
-def estimate_scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
+def estimate_scatter(
+    likelihood: Likelihood, unit: np.ndarray
+) -> tuple[Information, float, np.ndarray, float]:
     """How far a fit by Eq. (8) scatters.
 
     Parameters inside their bounds are told with those on a bound held there; one on a bound as if
@@ -71,7 +50,14 @@ def estimate_scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
 
     Returns
     -------
-    Scatter
+    Information
+        Whose covariance is that of the scatter.
+    float
+        Student's t at 97.5 %.
+    (d,) array
+        Each standard error over that of independent residuals.
+    float
+        The geometric mean of that over all directions.
     """
     problem = likelihood.problem
     whole = likelihood.of_records.with_initial_power
@@ -110,7 +96,7 @@ def estimate_scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
         root,
         SINGULAR_ROUNDING,
     )
-    return Scatter(information, compute_interval_factor(len(blocks) - 1), ratio, spread)
+    return information, compute_interval_factor(len(blocks) - 1), ratio, spread
 
 
 def is_off_bounds(unit: np.ndarray) -> np.ndarray:

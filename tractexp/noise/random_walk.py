@@ -33,6 +33,7 @@ LESS = 1.0
 LEAST_WANDERING = 2.0
 # of the intensity, variances of the channel per second
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))
+EventRest = tuple[np.ndarray, np.ndarray, np.ndarray]  # as of `find`
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,25 +190,6 @@ class RandomWalk:
         return np.concatenate([together, np.stack([np.zeros_like(apart), apart], axis=1)])
 
 
-@dataclass(frozen=True, eq=False)
-class EventRest:
-    """What a fit leaves of an event, and what could still explain it.
-
-    Attributes
-    ----------
-    left : (2, n)
-        Residuals of the mixed channels.
-    columns : (k, 2, n)
-        Changes that something known could make.
-    profile : (n,)
-        Apparent power over that before the event.
-    """
-
-    left: np.ndarray
-    columns: np.ndarray
-    profile: np.ndarray  # (n,) power over that before
-
-
 def find(
     before: Sequence[np.ndarray],
     step: float,
@@ -229,8 +211,9 @@ def find(
         Between samples.
     load : Load
         The power of the events.
-    rests : sequence of Rest
-        What a fit leaves of each event.
+    rests : sequence of (left, columns, profile)
+        What a fit leaves of the mixed channels in each event (2, n), changes that something known
+        could make (k, 2, n), and the apparent power over that before (n,).
 
     Returns
     -------
@@ -302,9 +285,7 @@ def find_load_walk(
     rests = []
     if left is not None and columns is not None and valid.all():
         mixed = np.einsum("ij,kjt->kit", mix, columns)
-        rests = [
-            EventRest(mix @ left[:, part], mixed[:, :, part], load.apparent[part]) for part in parts
-        ]
+        rests = [(mix @ left[:, part], mixed[:, :, part], load.apparent[part]) for part in parts]
     stretches = [mix @ b for b in before if np.isfinite(b).all()]
     return find(stretches, events[0].record.step, load, rests)
 
@@ -389,10 +370,11 @@ def _compute_rest_likelihoods(
     """The logarithm of the likelihood of each intensity of the grid in what is left of one event,
     without what its columns explain.
     """
-    columns = rest.columns[:, channel]
+    left, known, profile = rest
+    columns = known[:, channel]
     columns = columns[np.linalg.norm(columns, axis=1) > 0]
     fixed = np.vstack([np.ones(columns.shape[1]), columns])
-    return _compute_log_likelihood(rest.left[channel], fixed, fast, step, rest.profile)
+    return _compute_log_likelihood(left[channel], fixed, fast, step, profile)
 
 
 def _compute_log_likelihood(

@@ -26,6 +26,7 @@ from tractexp.noise import Noise
 DRAWS, FEW = 2000, 200  # of the event chosen, and of each that is tried
 BOX = 12.0  # precision of a parameter of which nothing is known but its range
 POWER_DIFFERENCE = 1e-3  # of P0 and Q0, for their differences [pu]
+EventView = tuple[np.ndarray, float]  # of one explanation, as of `view_events`
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,26 +66,6 @@ class Side:
         return self.J @ self.J.T + self.own @ self.own.T + np.diag(self.box)
 
 
-@dataclass(frozen=True, eq=False)
-class EventView:
-    """An explanation on one new event.
-
-    Attributes
-    ----------
-    f : (n,)
-        Whitened prediction; nan where the model does not survive the event.
-    K : (k + 2, n)
-        Its derivatives, those by P0 and Q0 last.
-    missed : float
-        What the model misses beside the noise.
-    """
-
-    f: np.ndarray
-    K: np.ndarray
-    # by how many times the noise's variance the model's error adds to it
-    missed: float = 0.0
-
-
 def linearize_side(context: Context, noise: Noise, fit: Refit) -> Side:
     """Linearise an explanation at its fit."""
     at = context.coordinates
@@ -108,6 +89,13 @@ def view_events(
     measurement at their null. It misses `error` of the response.
 
     What the recorder did to earlier events says nothing of the load, but it may go on.
+
+    Returns
+    -------
+    list of (rows, missed)
+        Of each event the whitened prediction and its derivatives, those by P0 and Q0 last (k + 3,
+        n), nan where the model does not survive it; and by how many times the noise's variance the
+        model's error adds to it.
     """
     at = context.coordinates
     names = side.fit.names
@@ -147,10 +135,11 @@ def view_events(
     for e in range(len(events)):
         rows = np.concatenate([moved[e], *(b[e] for b in before)])
         rows = white.whiten(np.where(one.weights > 0, rows, 0.0), one, one.weights > 0)
-        K = np.zeros((len(side.columns) + 2, rows.shape[1]))
-        K[:k] = divide_differences(rows[1 : 1 + 2 * k], width) * side.free[:k, None]
-        K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * POWER_DIFFERENCE)
-        chances.append(EventView(rows[0], K, missed[e]))
+        view = np.zeros((len(side.columns) + 3, rows.shape[1]))
+        view[0] = rows[0]
+        view[1 : 1 + k] = divide_differences(rows[1 : 1 + 2 * k], width) * side.free[:k, None]
+        view[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * POWER_DIFFERENCE)
+        chances.append((view, missed[e]))
     return chances
 
 
@@ -187,10 +176,11 @@ class Separation:
         None is denied where a side does not survive, the truth itself always where all do. What the
         models miss is missed again in each of its like: more of them tell more of the noise alone.
         """
-        if not all(np.isfinite(x.f).all() and np.isfinite(x.K).all() for x in seen):
+        if not all(np.isfinite(rows).all() for rows, _ in seen):
             return np.zeros((len(self.sides) - 1, self.draws), bool)
-        weight = np.sqrt(times / (1 + times * max(x.missed for x in seen)))
-        rows = _reduce_blocks([weight * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
+        weight = np.sqrt(times / (1 + times * max(missed for _, missed in seen)))
+        first = seen[0][0][0]
+        rows = _reduce_blocks([weight * np.vstack([x[0] - first, x[1:]]) for x, _ in seen])
         f = [x[0] for x in rows]
         K = [x[1:] for x in rows]
         rng = np.random.default_rng([self.seed, truth])
