@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tractexp.discrepancy.all_events import AllEvents, JointFit
+from tractexp.discrepancy.all_events import AllEvents
 from tractexp.inference.criteria import Criteria
 
 ONE, TWO = ("undervoltage_trip",), ("two_stage_trip",)
@@ -21,16 +21,13 @@ class Stuck(AllEvents):
     def fit_jointly(self, alone, seed, *, anew=False):
         near, everywhere, p_left = self.told
         costs = everywhere if anew else near
-        return [
-            JointFit(SimpleNamespace(names=fit.names, cost=costs[fit.names]), 0.0, p_left)
-            for fit in alone
-        ]
+        return [(SimpleNamespace(names=fit.names, cost=costs[fit.names]), p_left) for fit in alone]
 
 
 def compare(near, everywhere, p_left=0.7):
     alone = [SimpleNamespace(names=ONE), SimpleNamespace(names=TWO)]
     joint = Stuck(near, everywhere, p_left).compare(alone, seed=0)
-    return {one.fit.names: one.fit.cost for one in joint}
+    return {fit.names: fit.cost for fit, _ in joint}
 
 
 @pytest.mark.parametrize(("behind", "ahead"), [(ONE, TWO), (TWO, ONE)])

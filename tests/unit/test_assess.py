@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import pytest
 from made_sets import beside_base, fitted, held_out, row
 
-from tractexp.discrepancy.all_events import JointFit
 from tractexp.discrepancy.decide import decide, holds
 from tractexp.discrepancy.held_out import assess
 from tractexp.inference.criteria import Criteria
@@ -23,8 +22,7 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
     )
     fits = [fitted(0.0, 1, name) for name in ("one", "other")]
     joint = [
-        JointFit(replace(f, deviance=cost - 2), 10.0, p)
-        for f, cost, p in zip(fits, costs, p_left, strict=True)
+        (replace(f, deviance=cost - 2), p) for f, cost, p in zip(fits, costs, p_left, strict=True)
     ]
     both = SimpleNamespace(
         fitted=at,
@@ -32,6 +30,7 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
         bare=fitted(500.0, 0),
         plain=SimpleNamespace(cost=500.0),
         compare=lambda *_: joint,
+        measure_loudness=lambda *_: 10.0,
         without_each=lambda fit: {},
         fit_to_all=lambda fits: fits,
     )
@@ -82,9 +81,13 @@ def test_of_two_effects_each_is_shown_over_the_other_alone(
         fitted(0.0, 2, "one", "other"),
         {"one": fitted(200.0, 1, "other"), "other": fitted(alone, 1, "one")},
     )
-    joint = SimpleNamespace(fit=pair, p_left=1.0, louder=-1.0)
     both = SimpleNamespace(
-        **{**vars(both), "without_each": lambda fit: fewer, "compare": lambda *_: [joint]}
+        **vars(both)
+        | {
+            "without_each": lambda fit: fewer,
+            "compare": lambda *_: [(pair, 1.0)],
+            "measure_loudness": lambda *_: -1.0,
+        }
     )
 
     def judged(context, events, bare, fits):

@@ -28,25 +28,8 @@ from tractexp.inference.wide_fit import refit_widely
 from tractexp.noise import Noise
 from tractexp.record import Event
 
-
-@dataclass(frozen=True, eq=False)
-class JointFit:
-    """A set of effects fitted to fitted and held-out events together.
-
-    Attributes
-    ----------
-    fit : Refit
-        In coordinates of the fitted events.
-    louder : float
-        The deviance that it gains on all events, less what it gains on the fitted ones.
-    p_left : float
-        How often chance leaves as much of all events.
-    """
-
-    fit: Refit
-    # by how much all events speak louder for it than the fitted ones alone, of the deviance
-    louder: float
-    p_left: float  # how often chance leaves as much as it does
+# a set fitted to all events, in coordinates of the fitted ones; how often chance leaves as much
+JointFit = tuple[Refit, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,23 +83,22 @@ class AllEvents:
         """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from
         every setting.
         """
-        by_name = key_by_names(alone)
         effort = self.context.effort
         _ = self.plain  # once, before processes are forked
         refitted = map_on_cores(lambda fit: self._refit(fit, anew=anew), alone, effort)
         fits = select_best_fits(itertools.chain(*refitted))
-        return map_on_cores(lambda fit: self._measure(fit, by_name[fit.names], seed), fits, effort)
+        return map_on_cores(lambda fit: self._test(fit, seed), fits, effort)
 
     def compare(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
         """Sets fitted to all events from where they were; what leaves something there, or would be
         rejected beside another, is fitted from every setting, too.
         """
-        joint = {one.fit.names: one for one in self.fit_jointly(alone, seed)}
+        joint = {one[0].names: one for one in self.fit_jointly(alone, seed)}
         waiting = list(alone)
         while doubtful := self._select_doubtful(waiting, joint):
-            for one in self.fit_jointly(doubtful, seed, anew=True):
-                if one.fit.cost < joint[one.fit.names].fit.cost:
-                    joint[one.fit.names] = one
+            for fit, p_left in self.fit_jointly(doubtful, seed, anew=True):
+                if fit.cost < joint[fit.names][0].cost:
+                    joint[fit.names] = fit, p_left
             waiting = [fit for fit in waiting if fit not in doubtful]
         return list(joint.values())
 
@@ -127,12 +109,13 @@ class AllEvents:
         of all.
         """
         criteria = self.fitted.criteria
-        least = min(one.fit.cost for one in joint.values())
-
-        def is_doubtful(one: JointFit) -> bool:
-            return one.p_left < criteria.false_alarms or criteria.rejects(one.fit.cost - least)
-
-        return [fit for fit in fits if is_doubtful(joint[fit.names])]
+        least = min(fit.cost for fit, _ in joint.values())
+        doubtful = {
+            names
+            for names, (fit, p_left) in joint.items()
+            if p_left < criteria.false_alarms or criteria.rejects(fit.cost - least)
+        }
+        return [fit for fit in fits if fit.names in doubtful]
 
     def without_each(self, fit: Refit) -> dict[str, Refit]:
         """{member: fit} of a set without each of its effects, to the fitted events.
@@ -190,10 +173,13 @@ class AllEvents:
         """The coordinates of a fit without the held-out events' own."""
         return fit.unit[: self.fitted.coordinates.dimension]
 
-    def _measure(self, fit: Refit, alone: Refit, seed: int) -> JointFit:
-        """A set on all events: how much louder it is there than on the fitted ones, and p of what
-        it leaves.
+    def measure_loudness(self, joint: Refit, alone: Refit) -> float:
+        """By how much all events speak louder for a set, fitted to them, than the fitted ones alone
+        do, of the deviance.
         """
-        louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
+        return (self.plain.deviance - joint.deviance) - (self.bare.deviance - alone.deviance)
+
+    def _test(self, fit: Refit, seed: int) -> JointFit:
+        """A set on all events, and p of what it leaves."""
         p_left = examine_fit(self.quiet, fit, self.level, seed).p_left
-        return JointFit(replace(fit, unit=self._narrow(fit)), louder, p_left)
+        return replace(fit, unit=self._narrow(fit)), p_left

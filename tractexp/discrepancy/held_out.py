@@ -117,24 +117,24 @@ def assess(both: AllEvents, rows: Sequence[SetEvidence], seed: int) -> list[SetE
     judged = judge_fits(both, rows, fits, without)
     if not needs_all_events(judged, criteria):
         return judged
-    joint = {one.fit.names: one for one in both.compare(fits, seed)}
-    best = min(one.fit.cost for one in joint.values())
+    joint = {one[0].names: one for one in both.compare(fits, seed)}
+    best = min(fit.cost for fit, _ in joint.values())
     assessed = {}
     for row in judged:
-        own = joint[row.fit.names]
-        assessed[row.fit.names] = replace(
-            row, p_of_all=own.p_left, behind_of_all=own.fit.cost - best
-        )
+        own, p_left = joint[row.fit.names]
+        assessed[row.fit.names] = replace(row, p_of_all=p_left, behind_of_all=own.cost - best)
     again = []
-    for names, one in joint.items():
+    alone = key_by_names(fits)
+    for names, (fit, p_left) in joint.items():
         row = assessed[names]
         assert row.gap is not None
         # shown as it was fitted, and nothing of the held-out events is left
         suffices = row.gap.left <= row.gap.shown and all(gap.outcome == SHOWN for gap in row.gaps)
         # all events speak louder for it than the fitted ones, and it leaves nothing of them
-        is_borne_out = one.louder > 0 and one.p_left >= criteria.adequate_p
+        louder = both.measure_loudness(fit, alone[names])
+        is_borne_out = louder > 0 and p_left >= criteria.adequate_p
         if is_borne_out and not suffices and not criteria.rejects(row.behind_of_all):
-            again.append(one.fit)
+            again.append(fit)
     if again:
         without_of_all = {fit.names: both.fit_to_all(without[fit.names]) for fit in again}
         chosen = [row for fit in again for row in rows if row.fit.names == fit.names]
