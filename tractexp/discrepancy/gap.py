@@ -117,11 +117,7 @@ def compute_curves(
     white = context.whiten(noise, residual)[0]
     calculated = residual[0] + context.drive.measurements
     deviance = float(np.nan_to_num(white @ white, nan=np.inf))
-    each = [
-        context.domain.comparison(event, calculated[:, part])
-        for event, part in zip(context.events, context.drive.parts, strict=True)
-    ]
-    misfit = ModelMisfit.from_played(each)
+    misfit = ModelMisfit.from_played(context.cut_playbacks(calculated))
     chi2 = deviance / max(context.samples, 1)
     return Curves(**vars(misfit), calculated=calculated, deviance=deviance, chi2_per_sample=chi2)
 

@@ -97,8 +97,7 @@ def overlay_held_out(
     fits = [bare, *([nearest.row.fit] if nearest else [])]
     other, units, noise = carry_fits(context, withheld, fits)
     before, *near = [
-        other.residual(unit, fit.names) + other.drive.measurements
-        for unit, fit in zip(units, fits, strict=True)
+        other.calculate(unit, fit.names) for unit, fit in zip(units, fits, strict=True)
     ]
     return _cut_events(other, noise, (before, None, near[0] if near else None), (), held_out=True)
 
@@ -124,8 +123,8 @@ def draw_graded(
 
 def overlay_fit(context: Context, fit: Refit, noise: Noise) -> list[Overlay]:
     """The fitted events by one fit alone."""
-    calculated = context.residual(fit.unit, fit.names) + context.drive.measurements
-    return _cut_events(context, noise, (calculated, None, None), (), held_out=False)
+    before = context.calculate(fit.unit, fit.names)
+    return _cut_events(context, noise, (before, None, None), (), held_out=False)
 
 
 def find_remainder(

@@ -265,11 +265,7 @@ def select_grounds(catalogue: Catalogue, refits: Iterable[Refit]) -> list[Refit]
 def predict(there: Context, fit: Refit) -> PredictedError:
     """What a fit leaves of other events."""
     unit = there.coordinates.at_measured_power(fit.unit)
-    calculated = there.residual(unit, fit.names) + there.drive.measurements
-    played = [
-        there.domain.comparison(event, calculated[:, part])
-        for event, part in zip(there.events, there.drive.parts, strict=True)
-    ]
+    played = there.cut_playbacks(there.calculate(unit, fit.names))
     left = []
     noise = []
     response = []

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.cache import store
-from tractexp.domain import Domain, find_domain
+from tractexp.domain import Domain, Playback, find_domain
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.differences import divide_differences, replace_diverged, step_both_ways
@@ -271,6 +271,15 @@ class Context:
     def residual(self, unit: np.ndarray, names: Sequence[str] = ()) -> np.ndarray:
         """The residual (C, N) [pu] at coordinates (D,), as of `residuals`."""
         return self.residuals(unit[None], names)[0]
+
+    def calculate(self, unit: np.ndarray, names: Sequence[str] = ()) -> np.ndarray:
+        """What is compared of the events (C, N) [pu], as calculated at coordinates (D,)."""
+        return self.residual(unit, names) + self.drive.measurements
+
+    def cut_playbacks(self, calculated: np.ndarray) -> list[Playback]:
+        """Each event beside what is calculated of it, of all events end to end (C, N) [pu]."""
+        of_events = zip(self.events, self.drive.parts, strict=True)
+        return [self.domain.comparison(event, calculated[:, part]) for event, part in of_events]
 
     def residuals_of(self, unit: np.ndarray, sets: Sequence[Sequence[str]]) -> np.ndarray:
         """The residuals at n points, each with a set of effects of its own.
