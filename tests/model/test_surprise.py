@@ -44,7 +44,7 @@ def test_what_is_judged_is_the_estimate_against_all_draws(known, monkeypatch):
 
     monkeypatch.setattr(goodness_of_fit, "compute_tail_p", count_draws)
     adequacy.run_residual_test(known.likelihood, known.unit)
-    assert {*judged} == {(adequacy.FIT_DRAWS, 1)}
+    assert {*judged} == {(goodness_of_fit.NULL_DRAWS, 1)}
 
 
 def test_p_of_noise_alone_is_no_smaller_than_it_says(known):

@@ -18,9 +18,11 @@ from typing import Any
 import numpy as np
 
 from tractexp.inference import residual_statistics
+from tractexp.inference.bounds import is_off_bounds
 from tractexp.inference.goodness_of_fit import (
     ADEQUATE_P,
     LEAST_DISTINCT_SHARE,
+    NULL_DRAWS,
     GoodnessOfFit,
     compare_with_draws,
 )
@@ -29,10 +31,8 @@ from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import ModelError, describe_stall
 from tractexp.inference.problem import Problem
 from tractexp.inference.residual_statistics import PER_EVENT
-from tractexp.inference.sandwich import is_off_bounds
 from tractexp.inference.separable import Sensitivities, SeparableBasis
 
-FIT_DRAWS = 199
 JUDGEMENT_SEED = 20201  # of the draws: the judgement of one record is always the same
 ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
 # of the response: a model that leaves a fifth of it does not describe the load. A word for a size.
@@ -121,9 +121,9 @@ def run_residual_test(
     steady = _linear(likelihood)[inside[: likelihood.free]]
     J = J.only(inside)
     rng = np.random.default_rng(JUDGEMENT_SEED)
-    drawn = likelihood.noise.draw(rng, FIT_DRAWS, np.diff(drive.first).tolist())
+    drawn = likelihood.noise.draw(rng, NULL_DRAWS, np.diff(drive.first).tolist())
     drawn *= likelihood.valid
-    levels = likelihood.noise.draw_levels(rng, FIT_DRAWS, problem.quiet)
+    levels = likelihood.noise.draw_levels(rng, NULL_DRAWS, problem.quiet)
     drawn /= levels[:, None, None]
     basis = J.basis()
     split = build_event_basis(J, steady)
@@ -138,7 +138,7 @@ def run_residual_test(
     own = basis.project_out(rows[None])
     parts = [compute_statistics(own) | ({APART: excess[0]} if excess else {})]
     together = max(1, MOST_NUMBERS // len(rows))
-    for some in np.split(drawn, range(together, FIT_DRAWS, together)):
+    for some in np.split(drawn, range(together, NULL_DRAWS, together)):
         white = likelihood.whiten(some)
         parts.append(
             compute_statistics(basis.project_out(white))

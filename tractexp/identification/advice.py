@@ -11,7 +11,6 @@ from tractexp.identification.plan import DipShape, IntervalForecast, forecast_ov
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import (
     BOUND,
-    BOUND_DISTANCE,
     HELD,
     IDENTIFIED_SHARE,
     UNIDENTIFIED,
@@ -19,6 +18,7 @@ from tractexp.identification.verdict import (
     choose_scale,
     format_half_width,
 )
+from tractexp.inference.bounds import BOUND_DISTANCE
 from tractexp.inference.information import SHARE
 from tractexp.inference.problem import Problem
 from tractexp.record.change import find_runs

@@ -11,7 +11,7 @@ from tractexp.errors import MODEL, UserError
 from tractexp.identification.fit import TRAIN, Fit, play, tabulate_model_errors
 from tractexp.identification.result import Result, name_by_event
 from tractexp.identification.search import REFUSED, SearchResult
-from tractexp.identification.verdict import BOUND_DISTANCE
+from tractexp.inference.bounds import BOUND_DISTANCE
 from tractexp.inference.model_error import compute_relative_errors
 from tractexp.inference.problem import Problem
 from tractexp.record import OwnBase

@@ -18,10 +18,10 @@ from tractexp.identification.fit import Fit, play
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import (
     BOUND,
-    BOUND_DISTANCE,
     END_OF_RANGE,
     ParameterVerdict,
 )
+from tractexp.inference.bounds import BOUND_DISTANCE
 from tractexp.inference.model_error import compute_model_error
 from tractexp.parameter import spread_evenly
 from tractexp.record import Event

@@ -6,7 +6,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.noise import estimate_noise
+from tractexp.inference.noise import estimate_noise, restore_variance
 from tractexp.inference.problem import Problem
 from tractexp.noise.color import (
     FEWEST_NOISE_SAMPLES,
@@ -18,8 +18,6 @@ from tractexp.noise.model import Noise, Pair
 from tractexp.noise.quiet import is_louder
 from tractexp.noise.random_walk import remove_slow
 
-# of a residual's variance: where the fit takes more, it tells nothing of the noise
-LEAST_REST = 0.2
 OUTLIER = 5.0  # robust standard deviations from which a robust loss takes a sample for an outlier
 
 
@@ -53,12 +51,10 @@ def estimate_noise_at(
     valid = likelihood.valid
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(valid))).jacobian(unit)
     residual = rows.reshape(valid.shape)
-    # the fit took the others
-    rest = np.maximum(1 - J.basis().leverage, LEAST_REST).reshape(valid.shape)
     try:
         return estimate_noise(
             problem,
-            residual / np.sqrt(rest),
+            restore_variance(rows, J.basis().leverage).reshape(valid.shape),
             valid,
             problem.drive.parts if whole else select_noisy_stretches(problem, residual, valid),
             (problem, likelihood.values(unit)),

@@ -13,7 +13,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.identification.profile_lanes import descend_others
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import BOUND_DISTANCE
+from tractexp.inference.bounds import BOUND_DISTANCE
 from tractexp.inference.sized_problem import find_torque
 
 SHARES_HELD = 9  # over the range of the torque, all else fitted again at each

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.inference.bounds import BOUND_DISTANCE
 from tractexp.inference.information import SHARE, Information
 
 IDENTIFIED, WEAK, UNIDENTIFIED, BOUND, END_OF_RANGE = (
@@ -24,7 +25,6 @@ NEAR_ZERO = 0.1
 TRADES = 0.8  # correlation from which two parameters are said to trade against each other
 PARTNERS = 2  # named at most
 STEEPEST_COMBINATION = 4.0  # power of a combination that is told
-BOUND_DISTANCE = 1e-3  # of the range: closer than this is at the bound
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,15 @@
-"""Bounds of a model's parameters that somebody sets in place of its own."""
+"""Bounds of a model's parameters that somebody sets in place of its own, and what rests on them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from tractexp.errors import MODEL, UserError, list_allowed, name_setting
 from tractexp.parameter import Parameter
+
+# of the range: what is closer rests on the bound. Descents clip to it, rounding stays far below.
+BOUND_DISTANCE = 1e-3
 
 
 def narrow_bounds(
@@ -58,3 +63,18 @@ def check_name(name: str, by_name: Mapping[str, object], where: str) -> None:
     if name not in by_name:
         lack = f"this model has no parameter '{name}'{list_allowed(name, by_name, 'Parameters')}"
         raise UserError(f"{name_setting(where)}.{name}: {lack}")
+
+
+def is_off_bounds(unit: np.ndarray) -> np.ndarray:
+    """Which coordinates rest on no bound.
+
+    Parameters
+    ----------
+    unit : (D,)
+        In the unit cube.
+
+    Returns
+    -------
+    (D,) array of bools
+    """
+    return (unit > BOUND_DISTANCE) & (unit < 1 - BOUND_DISTANCE)

@@ -15,6 +15,7 @@ from tractexp.inference.context import Context
 from tractexp.inference.cores import map_on_cores
 from tractexp.inference.goodness_of_fit import (
     ADEQUATE_P,
+    NULL_DRAWS,
     SMALLEST_P,
     Scale,
     compare_with_draws,
@@ -24,7 +25,6 @@ from tractexp.inference.score_test import ScoreTest
 from tractexp.noise import Noise
 from tractexp.text.wording import format_probability
 
-NULL_DRAWS = 199
 # Variance from noise of the voltage, over that of the power, from which faults of the measurement
 # are not judged: whatever smooths the calculated power would seem to be there.
 BLURRED = 0.5

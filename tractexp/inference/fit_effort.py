@@ -53,7 +53,3 @@ BOX_POINTS, BOX_STARTS, BOX_APART = 1024, 8, 0.5
 # Noise and fit in turn at one set, as long as the fit leaves less than this share of its noise,
 # which then is that of a worse fit: a relay whose return had been missed was louder by twenty.
 NOISE_ROUNDS, QUIETER = 3, 0.5
-
-# How near a bound, in ranges, a parameter rests on it: descents clip to the bound, rounding stays
-# far below this.
-BOUND_MARGIN = 1e-3

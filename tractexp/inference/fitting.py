@@ -9,6 +9,7 @@ import numpy as np
 
 from tractexp.cache import store
 from tractexp.inference import fit_effort
+from tractexp.inference.bounds import is_off_bounds
 from tractexp.inference.context import Context
 from tractexp.inference.cores import map_on_cores
 from tractexp.inference.least_squares import descend
@@ -287,9 +288,7 @@ def move_off_bounds(
     """
     moved = unit.copy()
     base = context.coordinates.base
-    resting = base[
-        (unit[base] <= fit_effort.BOUND_MARGIN) | (unit[base] >= 1 - fit_effort.BOUND_MARGIN)
-    ]
+    resting = base[~is_off_bounds(unit[base])]
     moved[resting] = context.coordinates.null[resting] if to is None else to
     return [moved] if len(resting) else []
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+NULL_DRAWS = 199  # of the noise, that a fit is compared with
 # p of what a fit leaves, below which it leaves something. Chosen on calibration seeds: where
 # nothing is missing one set in fifty has a smaller one, with an effect of four detection limits
 # nearly all have.

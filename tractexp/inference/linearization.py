@@ -8,18 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.inference.bounds import BOUND_DISTANCE
 from tractexp.inference.context import Context
-from tractexp.inference.fit_effort import BOUND_MARGIN
 from tractexp.inference.fitting import Refit
 from tractexp.inference.injection import PUSHES, inject_perturbations
+from tractexp.inference.noise import restore_variance
 from tractexp.inference.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
 from tractexp.noise.span import compute_basis, project_out
 
 CANDIDATE_STEP = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 LARGEST_MOVE_AT_BOUND = 1e-6  # of it: how far a parameter that rests on a wall may move
-# of a residual's variance: where columns explain more, it tells nothing of the noise
-LEAST_VARIANCE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +204,9 @@ def find_active_bounds(
     (k,) array of bools
     """
     x = unit[list(columns)]
-    leaving = ((x <= BOUND_MARGIN) & (gradient > 0)) | ((x >= 1 - BOUND_MARGIN) & (gradient < 0))
+    leaving = ((x <= BOUND_DISTANCE) & (gradient > 0)) | (
+        (x >= 1 - BOUND_DISTANCE) & (gradient < 0)
+    )
     return leaving & np.isin(columns, context.coordinates.base)
 
 
@@ -237,10 +238,8 @@ def _place_candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, n
 
 
 def remove_explained(t: Linearization, residuals: np.ndarray) -> np.ndarray:
-    """Residuals without everything that any column explains: what noise is estimated from.
-
-    Each is divided by what is left of its variance then, so that the noise does not come out too
-    small.
+    """Residuals without everything that any column explains, their variance restored: what noise is
+    estimated from.
 
     Parameters
     ----------
@@ -255,5 +254,5 @@ def remove_explained(t: Linearization, residuals: np.ndarray) -> np.ndarray:
     """
     right = compute_basis(t.explaining_columns.reshape(-1, residuals[0].size), 1e-6)
     flat = residuals.reshape(len(residuals), -1)
-    rest = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_VARIANCE)
-    return (project_out(flat, right) / np.sqrt(rest)).reshape(residuals.shape)
+    leverage = np.einsum("kn,kn->n", right, right)
+    return restore_variance(project_out(flat, right), leverage).reshape(residuals.shape)

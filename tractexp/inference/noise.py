@@ -15,6 +15,8 @@ from tractexp.noise.model import Noise
 from tractexp.noise.random_walk import find_load_walk
 from tractexp.noise.voltage import SmoothedEvent
 
+# of a residual's variance: where columns explain more, it tells nothing of the noise
+LEAST_VARIANCE = 0.2
 MOST_SAMPLES = 2_000_000  # of voltages with an error that are simulated at once
 
 
@@ -68,6 +70,13 @@ def _simulate_voltage_errors(
     own = np.tile(problem.by_event(values), (count, 1, 1))
     response = problem.model.simulate(drive, own, np.tile(problem.step.substeps, count))
     return response.outputs[:, 0].reshape(drive.channels, count, -1).swapaxes(0, 1)
+
+
+def restore_variance(residuals: np.ndarray, leverage: np.ndarray) -> np.ndarray:
+    """Residuals (..., R) of which columns have taken the share `leverage` (R,), each divided by
+    what is left of its variance, so that the noise does not come out too small.
+    """
+    return residuals / np.sqrt(np.maximum(1 - leverage, LEAST_VARIANCE))
 
 
 def estimate_noise(

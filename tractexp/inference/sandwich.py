@@ -20,6 +20,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tractexp.inference.blocks import cut_blocks
+from tractexp.inference.bounds import is_off_bounds
 from tractexp.inference.differences import compute_central_differences
 from tractexp.inference.information import STRUCTURAL, Information
 from tractexp.inference.interval import compute_interval_factor
@@ -28,9 +29,6 @@ from tractexp.inference.separable import Sensitivities
 
 # of the largest singular value of a covariance's root: what the records do not see is 0 there
 SINGULAR_ROUNDING = 1e-13
-# of a range: what rests on a bound stays there when a block is left out, and takes nothing from a
-# residual
-WALL = 1e-3
 
 
 def estimate_scatter(
@@ -97,21 +95,6 @@ def estimate_scatter(
         SINGULAR_ROUNDING,
     )
     return information, compute_interval_factor(len(blocks) - 1), ratio, spread
-
-
-def is_off_bounds(unit: np.ndarray) -> np.ndarray:
-    """Which coordinates rest on no bound.
-
-    Parameters
-    ----------
-    unit : (D,)
-        In the unit cube.
-
-    Returns
-    -------
-    (D,) array of bools
-    """
-    return (unit > WALL) & (unit < 1 - WALL)
 
 
 def _differentiate_prior(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
