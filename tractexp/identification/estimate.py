@@ -33,12 +33,11 @@ from tractexp.inference.multistart import (
     search_box,
     select_distinct,
 )
-from tractexp.inference.noise import compute_input_modes
+from tractexp.inference.noise import ROUNDS_OF_NOISE, compute_input_modes
 from tractexp.inference.prior import describe_prior, weigh_prior
 from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records
 
-ESTIMATE_ROUNDS = 2  # of noise and fit in turn
 LARGEST_MINIMUM_RATIO = 1.3  # times the least sum of squares: valleys beyond it are given up
 BEHIND = 25.0  # of the deviance under the noise found: valleys farther behind are
 # of the deviance, by which a search's valley must be better than those of the box
@@ -244,7 +243,7 @@ def _descend_from_box(problem: Problem) -> tuple[DescentEnds, EstimationResult |
         if not np.isfinite(ends.lowest):
             return ends, None
         ends = _rescale_ends(ends)
-        for _ in range(ESTIMATE_ROUNDS):
+        for _ in range(ROUNDS_OF_NOISE):
             ends = _remove_offsets(ends)
         refined = ends.likelihood.descent(select_distinct(ends.descent, likelihood.free))
         ends = ends.join_descent(refined, "box").looked_beside()
@@ -348,7 +347,7 @@ def _fit_under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np
     likelihood = ends.likelihood.with_initial_power
     units = likelihood.place_parameters(ends.near)
     input_modes = ends.compute_input_modes(units[0])
-    for _ in range(ESTIMATE_ROUNDS):
+    for _ in range(ROUNDS_OF_NOISE):
         if robust:
             likelihood = drop_outliers(likelihood, units[:1])
         likelihood = replace(likelihood, noise=estimate_noise_at(likelihood, units[0], input_modes))

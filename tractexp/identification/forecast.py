@@ -9,6 +9,7 @@ import numpy as np
 from tractexp.domain import find_domain
 from tractexp.domain.playback import LAST_SHARE, STALLED_POWER
 from tractexp.errors import UserError
+from tractexp.inference.information import UNIFORM_PRECISION
 from tractexp.inference.interval import INTERVAL_LEVEL
 from tractexp.inference.model_error import STALL, format_percent
 from tractexp.inference.prediction_band import (
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 TOLD_DEPTH = 0.4  # of the dip that is told of
 CALCULATED_BEFORE, CALCULATED_AFTER = 0.3, 1.5  # s calculated before and after it
 EDGE = 0.02  # s of its fall and of its recovery
-UNIFORM = 12.0  # a range squared over the variance of a flat distribution in it
 
 Calculate = Callable[[np.ndarray], np.ndarray]  # values (d,) -> P and Q (2, N) [pu]
 
@@ -210,7 +210,7 @@ def _find_covariance_root(J: np.ndarray) -> np.ndarray:
     parameter is a priori as likely everywhere (variance 1/12). J: sensitivities (R, d) over noise.
     """
     d = J.shape[1]
-    stacked = np.vstack([J, np.sqrt(UNIFORM) * np.eye(d)])
+    stacked = np.vstack([J, np.sqrt(UNIFORM_PRECISION) * np.eye(d)])
     _, singular, directions = np.linalg.svd(stacked, full_matrices=False)
     return directions / singular[:, None]
 

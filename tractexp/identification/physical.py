@@ -27,7 +27,6 @@ from tractexp.parameter import spread_evenly
 from tractexp.record import Event
 
 FREE_STARTS = 4  # of the free fit, beside the estimate
-FREE_ITERATIONS = 25
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ def find_free_optimum(
         return None
     known = free.space.to_unit(uncertainty.values)
     starts = np.vstack([known, spread_evenly(FREE_STARTS, len(known))])
-    likelihood, ended = uncertainty.descend_in(free, starts, FREE_ITERATIONS)
+    likelihood, ended = uncertainty.descend_in(free, starts)
     if not ended.deviance.min() < uncertainty.deviance:
         return None
     values = likelihood.values(ended.best)

@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.domain import PHASORS, Domain, find_domain
 from tractexp.errors import TASK, UserError, check_range, list_allowed
-from tractexp.inference.information import Information
+from tractexp.inference.information import UNIFORM_PRECISION, Information
 from tractexp.inference.interval import compute_interval_factor
 from tractexp.inference.likelihood import Likelihood, estimate_noise_before
 from tractexp.inference.model_error import weigh_error
@@ -338,8 +338,7 @@ def choose_best(
     Ends before the event whose gain is below `least`, or after `most`. The parameters' bounds count
     as what is known beforehand, so that a set that leaves a parameter open still has a volume.
     """
-    # per range: the variance of a uniform distribution
-    prior = np.eye(len(informations[0].names)) * 12.0
+    prior = np.eye(len(informations[0].names)) * UNIFORM_PRECISION
     matrices = [i.J.T @ i.J for i in informations]
     volume = lambda chosen: np.linalg.slogdet(prior + sum(matrices[e] for e in chosen))[1]  # noqa: E731
     chosen: list[int] = []

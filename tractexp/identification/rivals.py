@@ -29,7 +29,6 @@ from tractexp.parameter import spread_evenly
 from tractexp.text.progress import Counting, make_silent_counter
 
 STARTS = 5  # of the parameters that the rival alone has
-RIVAL_ITERATIONS = 25
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +147,7 @@ def _fit_rival(uncertainty: Uncertainty, name: str, model: Model) -> RivalStruct
     except UserError:
         return None
     starts = _place_starts(uncertainty, other)
-    likelihood, ended = uncertainty.descend_in(other, starts, RIVAL_ITERATIONS)
+    likelihood, ended = uncertainty.descend_in(other, starts)
     least = float(ended.deviance.min())
     if not least < uncertainty.deviance + compute_threshold():
         return None

@@ -28,6 +28,8 @@ from tractexp.storage import files
 if TYPE_CHECKING:
     from tractexp.identification.rivals import RivalStructure
 
+OTHERS_ITERATIONS = 25  # of descents of another problem on the same events
+
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
@@ -103,9 +105,7 @@ class Uncertainty:
         """
         return self.factors * self.information.standard_errors
 
-    def descend_in(
-        self, problem: Problem, points: np.ndarray, iterations: int
-    ) -> tuple[Likelihood, Descent]:
+    def descend_in(self, problem: Problem, points: np.ndarray) -> tuple[Likelihood, Descent]:
         """The ends of descents of another problem on the same events, whose rows count as this
         estimate's do.
 
@@ -116,8 +116,6 @@ class Uncertainty:
         points : (n, d)
             Its free values in the unit cube to begin at; P0 and Q0, where they are free, begin as
             estimated.
-        iterations : int
-            At most so many.
 
         Returns
         -------
@@ -129,7 +127,7 @@ class Uncertainty:
         start = likelihood.place_parameters(np.clip(points, 0.0, 1.0))
         if self.exact:
             start[:, likelihood.free :] = self.unit[self.likelihood.free :]
-        return likelihood, likelihood.descent(start, iterations=iterations, tolerance=0.01)
+        return likelihood, likelihood.descent(start, iterations=OTHERS_ITERATIONS, tolerance=0.01)
 
     @property
     def exact(self) -> bool:

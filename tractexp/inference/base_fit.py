@@ -11,10 +11,9 @@ from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit, refit, refit_from
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.multistart import find_local_minima
+from tractexp.inference.noise import ROUNDS_OF_NOISE
 from tractexp.inference.noise_in_quiet import QuietNoise, assume_white_noise
 from tractexp.noise import Noise
-
-BASE_FIT_ROUNDS = 2  # of noise and fit in turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +99,7 @@ def fit_from_starts(
     noise = assume_white_noise(context)
     fit = refit(context, noise, [((), start) for start in starts])[0]
     quiet = QuietNoise.from_context(context, fit.unit)
-    for _ in range(BASE_FIT_ROUNDS):
+    for _ in range(ROUNDS_OF_NOISE):
         noise = quiet.of_fit(fit.unit)
         fit = refit_from(context, noise, (), fit.unit)
     return BaseFit(context, fit, noise, quiet, tuple(local_minima))

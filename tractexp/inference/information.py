@@ -12,6 +12,8 @@ import numpy as np
 STRUCTURAL = 1e-6
 # standard deviations per range: what is not known even to a million ranges changes nothing
 BLIND = 1e-6
+# of a parameter of which nothing is known but its range: a flat distribution has it
+UNIFORM_PRECISION = 12.0
 SHARE = 0.02  # of a direction's largest component: smaller ones do not take part in it
 
 

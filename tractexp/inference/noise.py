@@ -17,6 +17,7 @@ from tractexp.noise.voltage import SmoothedEvent
 
 # of a residual's variance: where columns explain more, it tells nothing of the noise
 LEAST_VARIANCE = 0.2
+ROUNDS_OF_NOISE = 2  # and fit in turn
 MOST_SAMPLES = 2_000_000  # of voltages with an error that are simulated at once
 
 

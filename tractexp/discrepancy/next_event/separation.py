@@ -18,13 +18,13 @@ from tractexp.inference.context import Context
 from tractexp.inference.criteria import Criteria
 from tractexp.inference.differences import divide_differences, step_both_ways
 from tractexp.inference.fitting import Refit
+from tractexp.inference.information import UNIFORM_PRECISION
 from tractexp.inference.linearization import find_active_bounds
 from tractexp.inference.model_error import weigh_error
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 
 DRAWS, FEW = 2000, 200  # of the event chosen, and of each that is tried
-BOX = 12.0  # precision of a parameter of which nothing is known but its range
 POWER_DIFFERENCE = 1e-3  # of P0 and Q0, for their differences [pu]
 EventView = tuple[np.ndarray, float]  # of one explanation, as of `view_events`
 
@@ -76,7 +76,7 @@ def linearize_side(context: Context, noise: Noise, fit: Refit) -> Side:
     shared = context.drive.measurements.size + len(faults)
     free = ~find_active_bounds(context, fit.unit, columns, rows[1:] @ rows[0])
     J = rows[1:, :shared] * free[:, None]
-    box = np.where(np.isin(columns, faults), 0.0, BOX)
+    box = np.where(np.isin(columns, faults), 0.0, UNIFORM_PRECISION)
     return Side(
         fit, tuple(columns), free, rows[0, :shared], J, rows[1:, shared:], rows[0, shared:], box
     )
