@@ -55,6 +55,16 @@ def test_a_name_that_the_best_term_takes_is_told_with_what_both_miss():
     )
 
 
+def test_a_name_that_an_event_left_out_denies_is_told_with_why():
+    """Not with the best term of the library, which is there and leaves more."""
+    denied = replace(off("a", error=0.1), replicated_share=-0.2)
+    sets = table(off(error=1.0), denied, term=off(TERM, error=0.9))
+    assert sentence_on(sets) == (
+        "a would be named, but of what an event shows of it 0% is left where that is not fitted:"
+        " 50% of each confirms it"
+    )
+
+
 def test_a_set_that_divides_the_error_by_too_little_is_the_nearest():
     assert sentence_on(table(off(error=1.0), off("a", error=0.6))) == (
         "the model and the records disagree, and none of the 3 effects tested predicts the held-out"

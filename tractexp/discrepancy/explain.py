@@ -295,15 +295,14 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
     if not near.fit.names:
         better = "predicts the held-out events better than the base model"
         return f"{_deny_all(context)} {better}, which misses {bare} of the response there"
+    if denied := [row for row in evidence.every if is_denied_in_turn(row, agrees=False)]:
+        name = join_words(label_effects(denied[0].names, context))
+        return f"{name} would be named, but {explain_replication(denied[0].replicated_share)}"
     if evidence.term is not None:  # it beats the set that would be kept
         beaten = find_leading(evidence, criteria, criteria.divides)[0]
         name = join_words(label_effects(beaten.names, context))
         misses = f"misses {_format_error(beaten)} of the response of the held-out events"
         return f"{name} would be named, but {misses}, and {_describe_term(evidence)}"
-    if leading := [row for row in evidence.every if is_denied_in_turn(row, agrees=False)]:
-        name = join_words(label_effects(leading[0].names, context))
-        why = explain_replication(leading[0].replicated_share)
-        return f"{name} would be named, but {why}"
     labels = join_words(label_effects(near.names, context))
     why = f"a name must divide that by {criteria.divides:g}"
     if compute_factor(near, evidence.base) > criteria.divides:
