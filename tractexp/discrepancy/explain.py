@@ -177,6 +177,13 @@ def label_effects(names: Sequence[str], context: Context) -> list[str]:
     return [context.catalogue.label_effect(name) for name in names]
 
 
+def name_subject(names: Sequence[str], context: Context) -> str:
+    """Effects before a verb: behind one that says what differs stands a comma."""
+    labels = label_effects(names, context)
+    comma = "," if ", " in labels[-1] else ""
+    return f"{join_words(labels)}{comma}"
+
+
 def _describe_name(names: Sequence[str], evidence: Evidence, context: Context) -> str:
     """What explains the disagreement, and what it was set against."""
     labels = label_effects(names, context)
@@ -190,13 +197,12 @@ def _describe_name(names: Sequence[str], evidence: Evidence, context: Context) -
             else sentence
         )
     tested = len(context.catalogue.candidates)
-    comma = "," if ", " in labels[0] else ""
     rest = (
         f"none of the {tested - 1} other effects tested does"
         if tested > 1
         else "no other effect was tested"
     )
-    return f"{labels[0]}{comma} explains the disagreement, and {rest}"
+    return f"{name_subject(names, context)} explains the disagreement, and {rest}"
 
 
 def _describe_tie(sets: Sequence[Sequence[str]]) -> str:
@@ -296,11 +302,11 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
         better = "predicts the held-out events better than the base model"
         return f"{_deny_all(context)} {better}, which misses {bare} of the response there"
     if denied := [row for row in evidence.every if is_denied_in_turn(row, agrees=False)]:
-        name = join_words(label_effects(denied[0].names, context))
+        name = name_subject(denied[0].names, context)
         return f"{name} would be named, but {explain_replication(denied[0].replicated_share)}"
     if evidence.term is not None:  # it beats the set that would be kept
         beaten = find_leading(evidence, criteria, criteria.divides)[0]
-        name = join_words(label_effects(beaten.names, context))
+        name = name_subject(beaten.names, context)
         misses = f"misses {_format_error(beaten)} of the response of the held-out events"
         return f"{name} would be named, but {misses}, and {_describe_term(evidence)}"
     labels = join_words(label_effects(near.names, context))
