@@ -6,7 +6,7 @@ compensator, through a fault at the bus. The machine sees the voltage that HERME
 recorder takes one-cycle phasors of both. What the load draws is told by the law and the states of
 HERMESS at each instant. A network without states is refused: a compensator is always at the bus,
 and is a part of what is recorded only where the load has it. One feeds less than the load draws:
-with HERMESS's own droop it fed several times as much, which the first three rows have.
+with HERMESS's own droop it would feed several times as much.
 """
 
 import tempfile
