@@ -14,7 +14,6 @@ from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.forms import describe_forms, key_forms
 from tractexp.discrepancy.gap import Curves
 from tractexp.discrepancy.judgement import judge_effects
-from tractexp.discrepancy.precision import list_estimates
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.library import find_term
 from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
@@ -121,10 +120,6 @@ def _build_nearest(investigation: Findings) -> dict[str, Any] | None:
     near = investigation.nearest
     if near is None:
         return None
-    assert near.row.tests is not None
-    by_name = {
-        e.parameter.name: e for e in list_estimates(near.row.tests, near.row.fit.unit, near.names)
-    }
     on = {"train": near.fitted, "validate": near.held_out}
     return {
         "effects": list(near.names),
@@ -133,9 +128,7 @@ def _build_nearest(investigation: Findings) -> dict[str, Any] | None:
             {"effects": list(names), "closed": files.make_plain(share)}
             for names, share in near.others
         ],
-        "parameters": {
-            p.name: by_name[p.name].plain() for p in investigation.catalogue.parameters(near.names)
-        },
+        "parameters": {e.parameter.name: e.plain() for e in near.estimates},
     }
 
 

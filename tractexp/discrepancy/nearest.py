@@ -11,11 +11,13 @@ from tractexp.discrepancy.decide import (
 from tractexp.discrepancy.evidence import Evidence, SetEvidence, Verdict
 from tractexp.discrepancy.gap import Curves, compute_curves
 from tractexp.discrepancy.held_out import carry_fits
+from tractexp.discrepancy.precision import list_estimates
 from tractexp.discrepancy.ranking import (
     find_nearest,
 )
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
+from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.model_error import ModelChange
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -37,6 +39,14 @@ class Nearest:
     def names(self) -> tuple[str, ...]:
         """The effects of the set that comes nearest."""
         return self.row.fit.names
+
+    @property
+    def estimates(self) -> list[ParameterEstimate]:
+        """The parameters of its effects, as its tests know them."""
+        tests = self.row.tests
+        assert tests is not None
+        own = tests.context.catalogue.parameters(self.names)
+        return list_estimates(tests, self.row.fit.unit, self.names)[-len(own) :]
 
     @property
     def closed_shares(self) -> tuple[float, float]:

@@ -21,7 +21,6 @@ from tractexp.inference.problem import Problem
 from tractexp.model.model import Model
 from tractexp.noise.color import SMALLEST_DEVIATION
 from tractexp.record import Event
-from tractexp.text.progress import Counting, make_silent_counter
 
 STRETCHES = 5  # of a single dip
 AS_GOOD = 1.05  # times the least error: a simpler structure within it wins
@@ -64,25 +63,20 @@ def race_structures(
     candidates: Mapping[str, Structure],
     events: Sequence[Event],
     fixed: Mapping[str, float] | None = None,
-    parts: Any = make_silent_counter,
 ) -> list[Entry]:
     """The entries of the candidates by name, the winner first, the others by what they predict.
     Raises `UserError` where none can be fitted.
     """
-    counting: Counting = parts(2 * len(candidates))
     entries, fitted = list[Entry](), list[_Fitted]()
-    with counting as ended:
-        for name, candidate in candidates.items():
-            found = _fit(name, candidate, events, fixed or {})
-            (entries if isinstance(found, Entry) else fitted).append(found)  # type: ignore[arg-type]
-            ended()
-        best = np.inf
-        for one in sorted(fitted, key=lambda one: one.error):
-            # what does not follow the records where it is fitted does not predict them
-            entry = one.tell(WORSE_FITTED) if one.error > AS_GOOD * best else one.predict()
-            best = min(best, entry.predicted)
-            entries.append(entry)
-            ended()
+    for name, candidate in candidates.items():
+        found = _fit(name, candidate, events, fixed or {})
+        (entries if isinstance(found, Entry) else fitted).append(found)  # type: ignore[arg-type]
+    best = np.inf
+    for one in sorted(fitted, key=lambda one: one.error):
+        # what does not follow the records where it is fitted does not predict them
+        entry = one.tell(WORSE_FITTED) if one.error > AS_GOOD * best else one.predict()
+        best = min(best, entry.predicted)
+        entries.append(entry)
     entries.sort(key=lambda entry: (entry.predicted, entry.fitted))
     if not np.isfinite(entries[0].predicted):
         raise UserError(f"none of the structures can be fitted: {entries[0].why}")

@@ -12,7 +12,6 @@ from tractexp.blocks import Report, Table
 from tractexp.discrepancy.decide import UNEXPLAINED
 from tractexp.discrepancy.findings import Findings
 from tractexp.discrepancy.nearest import Nearest
-from tractexp.discrepancy.precision import list_estimates
 from tractexp.discrepancy.readings import read_shapes
 from tractexp.discrepancy.recommend import recommend_next
 from tractexp.discrepancy.remainder import Remainder
@@ -279,7 +278,7 @@ def _add_remainder_section(page: Report, findings: Findings) -> None:
     _add_shapes(page, findings, shapes, whose)
     if near is not None:
         _add_shapes(page, findings, findings.rest.of_base, "the base model alone")
-        _add_nearest(page, findings, near)
+        _add_nearest(page, near)
 
 
 def _add_shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose: str) -> None:
@@ -337,17 +336,8 @@ def _add_shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], w
         )
 
 
-def _add_nearest(page: Report, findings: Findings, near: Nearest) -> None:
+def _add_nearest(page: Report, near: Nearest) -> None:
     """The candidates that come nearest, with their shares and sizes."""
-    assert near.row.tests is not None
-    by_name = {
-        e.parameter.name: e for e in list_estimates(near.row.tests, near.row.fit.unit, near.names)
-    }
-    own = [
-        (by_name[p.name], p)
-        for name in near.names
-        for p in findings.catalogue[name].effect.parameters
-    ]
     rows = [[join_words(near.names), *map(_share, near.closed_shares)]]
     rows += [[join_words(names), _share(share), ""] for names, share in near.others]
     page.text("The candidates that come nearest, none of which is accepted:")
@@ -357,14 +347,14 @@ def _add_nearest(page: Report, findings: Findings, near: Nearest) -> None:
             ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],
             [
                 [
-                    p.name,
-                    p.about,
-                    p.unit,
+                    e.parameter.name,
+                    e.parameter.about,
+                    e.parameter.unit,
                     format_estimate(e),
                     format_interval(*e.interval),
                     e.verdict,
                 ]
-                for e, p in own
+                for e in near.estimates
             ],
             "As if they were right; something else is missing, so that the intervals may miss the"
             " truth.",

@@ -166,7 +166,6 @@ def find_next_event(
     bare: Refit,
     rivals: Sequence[Refit],
     labels: Sequence[str],
-    seed: int = 0,
     error: float = 0.0,
 ) -> NextEvent:
     """Choose what to record next, to tell two rivals or more apart.
@@ -183,8 +182,6 @@ def find_next_event(
         The sets that are tied.
     labels : sequence of str
         Their names in sentences.
-    seed : int
-        Of the draws.
     error : float
         What the best of the rivals misses of a response beyond the noise: it will miss as much of
         the next.
@@ -195,7 +192,7 @@ def find_next_event(
     """
     context.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
     sides = [linearize_side(context, noise, fit) for fit in (bare, *rivals)]
-    separation = Separation(sides, context.criteria, FEW, seed)
+    separation = Separation(sides, context.criteria, FEW)
     truths = range(1, len(sides))
     reads = context.catalogue.list_channels(name for fit in rivals for name in fit.names)
     events = []
@@ -223,7 +220,7 @@ def find_next_event(
         for a, b, _ in open_pairs:
             ignored[a, b] = ignored[b, a] = True
     tried = [EventTrial.from_draws(e, d, ignored) for e, d in zip(events, denied, strict=True)]
-    best = _choose_mildest_event(context, noise, sides, tried, ignored, seed, error)
+    best = _choose_mildest_event(context, noise, sides, tried, ignored, error)
     pairs = [(a, b, prove_same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
     hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, pairs, strict=True) if s is None)
@@ -242,7 +239,6 @@ def _choose_mildest_event(
     sides: Sequence[Side],
     tried: Sequence[EventTrial],
     ignored: np.ndarray,
-    seed: int,
     error: float,
 ) -> EventTrial:
     """The mildest event that is sure enough after refits, too."""
@@ -255,7 +251,7 @@ def _choose_mildest_event(
             break
         left.remove(best)
         checked.append(
-            _compute_refitted_chances(context, noise, sides, best, ignored, seed, error)
+            _compute_refitted_chances(context, noise, sides, best, ignored, error)
             if chance >= WORTH
             else best
         )
@@ -270,7 +266,6 @@ def _compute_refitted_chances(
     sides: Sequence[Side],
     best: EventTrial,
     ignored: np.ndarray,
-    seed: int,
     error: float,
 ) -> EventTrial:
     """The chances of one event with rivals linearised where they fit it best, each in turn the
@@ -289,7 +284,7 @@ def _compute_refitted_chances(
             for k, side in enumerate(sides)
         ]
         views = [view_events(context, noise, side, [event], error)[0] for side in there]
-        places.append((Separation(there, context.criteria, seed=seed), views))
+        places.append((Separation(there, context.criteria), views))
 
     def repeat_event(times: int) -> EventTrial:
         denied = np.stack(

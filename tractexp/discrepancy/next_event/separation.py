@@ -24,6 +24,7 @@ from tractexp.inference.model_error import weigh_error
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 
+SEPARATION_SEED = 0  # of the draws: the choice of one event is always the same
 DRAWS, FEW = 2000, 200  # of the event chosen, and of each that is tried
 POWER_DIFFERENCE = 1e-3  # of P0 and Q0, for their differences [pu]
 EventView = tuple[np.ndarray, float]  # of one explanation, as of `view_events`
@@ -157,11 +158,9 @@ class Separation:
     model.
     """
 
-    def __init__(
-        self, sides: Sequence[Side], criteria: Criteria, draws: int = DRAWS, seed: int = 0
-    ):
+    def __init__(self, sides: Sequence[Side], criteria: Criteria, draws: int = DRAWS):
         """Reduce what the records say of each rival to a few rows, from which draws are decided."""
-        self.sides, self.criteria, self.draws, self.seed = sides, criteria, draws, seed
+        self.sides, self.criteria, self.draws = sides, criteria, draws
         rows = _reduce_blocks([np.vstack([x.r, x.J]) for x in sides])
         self.r = [x[0] for x in rows]
         self.J = [x[1:] for x in rows]
@@ -183,7 +182,7 @@ class Separation:
         rows = _reduce_blocks([weight * np.vstack([x[0] - first, x[1:]]) for x, _ in seen])
         f = [x[0] for x in rows]
         K = [x[1:] for x in rows]
-        rng = np.random.default_rng([self.seed, truth])
+        rng = np.random.default_rng([SEPARATION_SEED, truth])
         side = self.sides[truth]
         k = len(side.columns)
         here = side.fit.unit[list(side.columns)]
