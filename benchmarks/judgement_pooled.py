@@ -48,6 +48,7 @@ GROUPS = {  # lines of the table, by the groups of rows
 }
 SILENT = ("none", "unexplained")
 EVENTS = 4  # of a data set
+FORECASTS = "9423c711"  # the first set judged since an event must confirm a name
 HEAD = [
     "hidden",
     "version",
@@ -119,15 +120,15 @@ def is_reached(row: Row) -> bool:
     return evidence.reached(row, multiple) if multiple else True
 
 
-def make_table(rows: list[Row], newest: str) -> str:
-    """A line for what is hidden, earlier sets together and the newest; Markdown."""
+def make_table(rows: list[Row]) -> str:
+    """A line for what is hidden, of the sets before names were forecasts and of those since, in the
+    order of `rows`; Markdown.
+    """
     lines = []
-    for (what, belongs), is_newest in itertools.product(GROUPS.items(), (False, True)):
-        own = [
-            row
-            for row in rows
-            if belongs(row["group"]) and row["reached"] and (row["frozen"] == newest) == is_newest
-        ]
+    first = next(k for k, row in enumerate(rows) if row["frozen"].startswith(FORECASTS))
+    parts = {"before": rows[:first], "since": rows[first:]}
+    for (what, belongs), version in itertools.product(GROUPS.items(), parts):
+        own = [row for row in parts[version] if belongs(row["group"]) and row["reached"]]
         if not own:
             continue
         counts = [
@@ -140,7 +141,6 @@ def make_table(rows: list[Row], newest: str) -> str:
             cells[:2] = "", ""
         named = sum(row["verdict"] == "named" and is_wrong(row, by_class=True) for row in own)
         candidates = sum(row["verdict"] == "candidate" for row in own)
-        version = newest[:8] if is_newest else "before"
         told = [*cells, named, candidates, describe_unused(own)]
         lines.append([what, version, len(own), *told])
     return marked.table(HEAD, lines)
@@ -213,8 +213,7 @@ def main() -> None:
         keep(evidence.read(asked.rows))
         return
     rows = evidence.read(STORED)
-    newest = rows[-1]["frozen"]
-    marked.replace(study.ROOT / "docs" / evidence.PAGE, MARK, make_table(rows, newest))
+    marked.replace(study.ROOT / "docs" / evidence.PAGE, MARK, make_table(rows))
 
 
 if __name__ == "__main__":
