@@ -97,12 +97,22 @@ def test_what_each_event_left_out_denies_is_kept_only_where_it_alone_explains(sh
     """A skew of clocks was a candidate of two loads that lack nothing, and three effects together
     of one that each event lost nothing by.
     """
-    denied = row("a", gap=CONFIRMED, is_fitted_to_all=True, replicated_share=share)
+    denied = row("a", gap=MILD, is_fitted_to_all=True, replicated_share=share)
     assert word(denied, base_p=0.5) == ("none", ())
     assert word(denied, base_p=1e-4) == ("candidate", (("a",),))
     predicted = replace(off("a", error=0.1), replicated_share=share)
     told = decide(table(off(error=1.0), predicted), Criteria()).word
     assert told == ("candidate" if np.isnan(share) else "unexplained")
+
+
+@pytest.mark.parametrize(("expected", "told"), [(10.7, "none"), (10.9, "candidate")])
+def test_what_the_squares_hide_is_denied_only_where_the_likelihood_hides_it_too(expected, told):
+    """A drift that gains 1,900 held out is hidden in each event's squares, and a noise that wanders
+    explains it.
+    """
+    gap = held_out(12.0, expected)
+    hidden = row("a", gap=gap, is_fitted_to_all=True, replicated_share=np.nan)
+    assert word(hidden, base_p=0.5)[0] == told
 
 
 def test_of_one_family_the_best_member_is_kept():

@@ -15,7 +15,7 @@ Several sets kept are tied. One is *named* where an event confirms it that took 
 it, or each of several that was left out in turn, where it has one or two effects, whose sizes are
 known within their bounds, and the model with it is not graded a wrong model; else it is a
 *candidate*. An event left out that loses nothing by it denies it, where it goes by what it predicts
-or the base model leaves noise alone; in the latter case noise denies it that hides it in each.
+or the base model leaves noise alone; in the latter case so does noise that hides it in all events.
 Where none is kept the records agree with the base model, or they do not. They do as well where it
 leaves less than matters (`SLIGHT_ERROR` of the response, of the fitted and the held-out events), or
 where it is graded adequate: a set without a size in the model that is graded is the base model.
@@ -56,7 +56,7 @@ def decide(evidence: Evidence, criteria: Criteria) -> Verdict:
     agrees = least_p >= criteria.adequate_p and bool(find_adequate(evidence, criteria))
     kept = find_kept(evidence, criteria)
     if agrees or evidence.is_predicted:
-        kept = [row for row in kept if not is_denied_in_turn(row, agrees=agrees)]
+        kept = [row for row in kept if not is_denied_in_turn(row, criteria, agrees=agrees)]
     if len(kept) > 1:
         word = TIED
     elif kept:
@@ -127,13 +127,14 @@ def is_confirmed(row: SetEvidence, evidence: Evidence) -> bool:
     return all(gap.outcome == SHOWN for gap in row.gaps)
 
 
-def is_denied_in_turn(row: SetEvidence, *, agrees: bool) -> bool:
-    """Whether an event left out loses nothing by a set; or, where the base model `agrees` with the
-    records, noise hides it in each.
+def is_denied_in_turn(row: SetEvidence, criteria: Criteria, *, agrees: bool) -> bool:
+    """Whether an event left out loses nothing by a set; or, where the base model `agrees`, noise
+    hides it in each, and held-out events are too mild to show it.
     """
     share = row.replicated_share
-    is_hidden = share is not None and math.isnan(share)
-    return agrees if is_hidden else share is not None and share <= 0
+    if share is None or not math.isnan(share):
+        return share is not None and share <= 0
+    return agrees and (row.gap is None or row.gap.expected < criteria.shown)
 
 
 def chose_by_all(row: SetEvidence, evidence: Evidence) -> bool:
@@ -143,7 +144,6 @@ def chose_by_all(row: SetEvidence, evidence: Evidence) -> bool:
 
 def find_predicting(evidence: Evidence, criteria: Criteria) -> list[SetEvidence]:
     """The sets kept by rule 2."""
-    leading = find_leading(evidence, criteria, criteria.divides)
-    if leading and evidence.term is not None and beats(evidence.term, leading[0], criteria):
-        return []
-    return leading
+    term, leading = evidence.term, find_leading(evidence, criteria, criteria.divides)
+    is_beaten = leading and term is not None and beats(term, leading[0], criteria)
+    return [] if is_beaten else leading

@@ -301,7 +301,7 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
     if not near.fit.names:
         better = "predicts the held-out events better than the base model"
         return f"{_deny_all(context)} {better}, which misses {bare} of the response there"
-    if denied := [row for row in evidence.every if is_denied_in_turn(row, agrees=False)]:
+    if denied := [row for row in evidence.every if is_denied_in_turn(row, criteria, agrees=False)]:
         name = name_subject(denied[0].names, context)
         return f"{name} would be named, but {explain_replication(denied[0].replicated_share)}"
     if evidence.term is not None:  # it beats the set that would be kept
