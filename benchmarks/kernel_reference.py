@@ -8,8 +8,8 @@ a test.
 
 Each case is a model by names, 57 candidates (usual ones, ones from all of the bounds, ones far
 outside) and two events with gaps. Kept are each candidate's sums of squared errors and misses, and
-the responses of four at some samples. The 22 cases with a relay were made again when its law
-changed: by Numba's kernels, with today's plugin in that commit.
+the responses of four at some samples. The 22 cases with a relay and the two with a compensator were
+made again when their laws changed: by Numba's kernels, with the new plugin in that commit.
 """
 
 import argparse
