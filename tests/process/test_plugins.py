@@ -458,6 +458,7 @@ def test_what_a_class_forgets_is_refused_when_it_is_registered(made, sentence):
         ),
         ({"bounds": (0.0, float("inf"))}, "must be two finite numbers"),
         ({"null": -1.0}, r"the null -1 is outside the bounds \[0, 1\]"),
+        ({"natural_ends": (0.5,)}, r"the natural ends \[0\.5\] must be bounds, of \[0, 1\]"),
         ({"source": " "}, "the parameter has no source"),
     ],
 )
