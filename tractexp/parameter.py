@@ -40,7 +40,7 @@ class Parameter:
         None: the bounds are.
     natural_ends : tuple of float
         Bounds that are ordinary values, such as a share of 1 that a device may have: to rest on one
-        is no sign that the search ended there.
+        is no sign that the search ended there. Of what is no size 0 is one anyhow.
 
     Examples
     --------

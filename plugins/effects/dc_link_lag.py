@@ -40,7 +40,7 @@ class DcLinkLag(Effect):
         "how far the control holds current, not power",
         SOURCE,
         "a",
-        natural_ends=(0.0, 1.0),
+        natural_ends=(1.0,),
     )
 
     places, kind = ("converter share",), "lag"

@@ -39,7 +39,7 @@ class LoadChangeAfterDip(Effect):
         "1 where only the static load changes",
         SOURCE,
         "w",
-        natural_ends=(0.0, 1.0),
+        natural_ends=(1.0,),
     )
 
     order = 3

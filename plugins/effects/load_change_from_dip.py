@@ -34,7 +34,7 @@ class LoadChangeFromDip(Effect):
         "1 where only the static load changes",
         SOURCE,
         "w",
-        natural_ends=(0.0, 1.0),
+        natural_ends=(1.0,),
     )
 
     order = 3
